@@ -73,7 +73,8 @@
 #![forbid(unsafe_code)]
 
 pub use cft_ident_core::{
-    block, diagnose, effect, friction, inertia, math, motion, number, robot, validate, verdict,
+    block, diagnose, effect, friction, inertia, judge, math, motion, number, robot, validate,
+    verdict,
 };
 pub use cft_ident_export::export;
 pub use cft_ident_files::config;

@@ -6,7 +6,8 @@ Every stage is a function of a :class:`Robot` and logs, with the numbers of the 
 
     robot = ci.Robot.load("configs/emps.toml")
     fit = ci.lsq(robot, "emps_id.csv")
-    fit.parameters()          # a pandas frame
+    fit.parameters            # a pandas frame
+    fit.model.torque(q, v, a) # arrays of N rows and a column per joint, in N or N m
     fit.model.save("emps.toml")
     ci.validate(fit.model, "emps_pulses_val.csv").to_dict()["overall"]
 
@@ -18,13 +19,15 @@ or channel, and what to do. Ctrl-C ends a stage; the interpreter's lock is free 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _native
 from ._native import (
@@ -35,16 +38,17 @@ from ._native import (
     UsageError,
     __version__,
 )
-from .results import Diagnosis, Excitation, Fit, NewRobot, Result, Simulation, Track
+from .results import Diagnosis, Excitation, Fit, Identification, NewRobot, Result, Simulation, Track
 
 __all__ = [
-    "CftIdentError", "Diagnosis", "Excitation", "Fit", "InputError", "Log", "Model", "NewRobot", "Part",
+    "CftIdentError", "Diagnosis", "Excitation", "Fit", "Identification", "InputError", "Log", "Model", "NewRobot", "Part",
     "Result", "Robot", "Simulation", "Track", "UndeterminedError", "UsageError", "__version__", "diagnose",
-    "example", "excite", "export", "friction", "inspect", "lsq", "merge", "new", "reduce", "simulate",
+    "example", "excite", "export", "friction", "identify", "inspect", "lsq", "merge", "new", "reduce", "simulate",
     "track", "validate",
 ]
 
 PathLike = Union[str, "os.PathLike[str]"]
+Array = NDArray[np.float64]
 
 
 class Robot:
@@ -120,9 +124,9 @@ class Log:
         """
         flat = np.ascontiguousarray(t, dtype=np.float64)
 
-        def matrix(values: Any) -> np.ndarray:
-            values = np.ascontiguousarray(values, dtype=np.float64)
-            return values.reshape(len(flat), -1) if values.ndim == 1 and len(flat) else values
+        def matrix(values: Any) -> Array:
+            found: Array = np.ascontiguousarray(values, dtype=np.float64)
+            return found.reshape(len(flat), -1) if found.ndim == 1 and len(flat) else found
 
         other = None if reference is None else matrix(reference)
         warm = None if temperature is None else matrix(temperature)
@@ -132,7 +136,7 @@ class Log:
     def frame(cls, frame: Any, joints: Sequence[str], *, t: str = "t", q: str = "q_{}", tau: str = "tau_{}",
               name: str = "frame") -> Log:
         """A pandas or polars frame; ``q`` and ``tau`` are patterns of its columns with ``{}`` for the joint."""
-        def columns(pattern: str) -> np.ndarray:
+        def columns(pattern: str) -> Array:
             return np.column_stack([np.asarray(frame[pattern.format(joint)], dtype=np.float64) for joint in joints])
 
         return cls.arrays(np.asarray(frame[t], dtype=np.float64), columns(q), columns(tau), name=name)
@@ -198,19 +202,112 @@ class Model:
         with open(path, "w", encoding="utf-8", newline="\n") as file:
             file.write(self.text)
 
+    @property
     def parameters(self) -> Any:
-        """A pandas frame: parameter, joint, value, std, unit."""
+        """A pandas frame: parameter, joint, value and std of the fit, the value in use, unit.
+
+        Torques are computed with ``in_use``: the nearest number of links, drives and friction that can exist.
+        """
         import pandas
 
-        return pandas.DataFrame(self._native.parameters, columns=["parameter", "joint", "value", "std", "unit"])
+        columns = ["parameter", "joint", "value", "std", "in_use", "unit"]
+        return pandas.DataFrame(self._native.parameters, columns=columns)
+
+    @property
+    def covariance(self) -> Any:
+        """A pandas frame of the covariance of the fitted parameters, named as ``NAME`` or ``NAME:JOINT``.
+
+        ``None`` where the model file holds none.
+        """
+        found = _native.covariance(self._native)
+        if found is None:
+            return None
+        import pandas
+
+        names, matrix = found
+        return pandas.DataFrame(matrix, index=names, columns=names)
+
+    def torque(self, q: Any, v: Any, a: Any, *, dt: float | None = None) -> Array:
+        """Torques along a motion, with friction, offsets and effects.
+
+        ``q``, ``v``, ``a``: arrays of shape (N, n) or (n,), in m or rad and per s. Returns the same shape, in N or
+        N m. ``dt`` [s] is the time between rows, where effects of the model remember the motion.
+        """
+        (q, v, a), one = _motion(q, v, a)
+        tau = _native.torque(self._native, q, v, a, dt)
+        return tau[0] if one else tau
+
+    def gravity(self, q: Any) -> Array:
+        """Torques that carry the links at rest, without friction: (N, n) or (n,), in N or N m."""
+        (q,), one = _motion(q)
+        still = np.zeros_like(q)
+        rows = _native.regressor(self._native, q, still, still)
+        weight: Array = rows @ self._theta()
+        return weight[0] if one else weight
+
+    def friction(self, v: Any) -> Array:
+        """Friction of each joint by its declared law at the velocities ``v``: (N, n) or (n,), in N or N m."""
+        (v,), one = _motion(v)
+        found = _native.joint_friction(self._native, v)
+        return found[0] if one else found
+
+    def regressor(self, q: Any, v: Any, a: Any) -> Array:
+        """The matrix Y of the inertial parameters: (N, n, p), or (n, p) for one row."""
+        (q, v, a), one = _motion(q, v, a)
+        rows = _native.regressor(self._native, q, v, a)
+        return rows[0] if one else rows
+
+    def mass_matrix(self, q: Any) -> Array:
+        """The mass matrix: (N, n, n), or (n, n) for one row, in kg, kg m or kg m^2."""
+        (q,), one = _motion(q)
+        mass = _native.mass_matrix(self._native, q)
+        return mass[0] if one else mass
+
+    def _theta(self) -> Array:
+        """Inertial parameters in use, in the order of the regressor's columns."""
+        rows = self._native.parameters
+        return np.array([in_use for _, joint, _, _, in_use, _ in rows if joint is None])
+
+    def to_urdf(self, path: PathLike) -> Result:
+        """Write the model as URDF, with a model file of the rest beside it."""
+        return export(self, urdf=path)
+
+    def to_c(self, path: PathLike) -> Result:
+        """Write the model as a C99 header."""
+        return export(self, c=path)
+
+    def to_rust(self, path: PathLike) -> Result:
+        """Write the model as a Rust module."""
+        return export(self, rust=path)
+
+    def to_mjcf(self, path: PathLike) -> Result:
+        """Write the model for MuJoCo."""
+        return export(self, mjcf=path)
+
+    def to_sdf(self, path: PathLike) -> Result:
+        """Write the model for Gazebo."""
+        return export(self, sdf=path)
+
+    def to_usd(self, path: PathLike) -> Result:
+        """Write the model for Isaac Sim."""
+        return export(self, usd=path)
 
     def __repr__(self) -> str:
         return f"Model({self._native.name!r}, {len(self._native.parameters)} parameters)"
 
 
+def _motion(*arrays: Any) -> tuple[list[Array], bool]:
+    """Arrays of one motion, row after row, and whether they are of one row."""
+    found = [np.ascontiguousarray(x, dtype=np.float64) for x in arrays]
+    one = all(x.ndim == 1 for x in found)
+    return [np.atleast_2d(x) for x in found], one
+
+
 def _model(model: Model | PathLike | None) -> _Model | None:
-    if model is None:
-        return None
+    return None if model is None else _given(model)
+
+
+def _given(model: Model | PathLike) -> _Model:
     return (model if isinstance(model, Model) else Model.load(model))._native
 
 
@@ -245,7 +342,7 @@ class Part:
         keys = ["name", "sha256", "samples", "duration_s", "bounds_s", "blocks"]
         return [dict(zip(keys, log)) for log in self._native.logs]
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return (Part.from_bytes, (self.to_bytes(),))
 
     def __repr__(self) -> str:
@@ -255,7 +352,7 @@ class Part:
 def inspect(logs: PathLike | Iterable[PathLike], robot: Robot | PathLike | None = None) -> Result:
     """What log files hold and what is wrong with them."""
     files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
-    line = ["inspect", *map(os.fspath, files)]
+    line = ["inspect", *[os.fspath(file) for file in files]]
     if robot is not None:
         line += ["-r", robot.path if isinstance(robot, Robot) else os.fspath(robot)]
     return Result(*_command(line))
@@ -269,27 +366,29 @@ def friction(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, join
 
 
 def lsq(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, model: Model | PathLike | None = None,
-        estimator: str = "wls", feasible: bool = False, hold_friction: bool = False,
+        estimator: str = "wls", unconstrained: bool = False, hold_friction: bool = False,
         as_declared: bool = False) -> Fit:
     """Inertial parameters by least squares; ``model`` holds the friction where it is not fitted with them.
 
-    ``estimator`` is ``wls``, ``ols``, ``irls``, ``iv`` or ``oe``; reduced logs serve the first two, and ``feasible``.
+    ``estimator`` is ``wls``, ``ols``, ``irls``, ``iv`` or ``oe``; reduced logs serve the first two. The model holds the
+    plain fit and beside it the nearest parameters of links, drives and friction that can exist, which torques are computed
+    with; ``unconstrained`` leaves those out.
     """
-    told, found = _native.lsq(_robot(robot), _logs(logs), _model(model), estimator, feasible, hold_friction,
+    told, found = _native.lsq(_robot(robot), _logs(logs), _model(model), estimator, unconstrained, hold_friction,
                               as_declared)
     return Fit(*told, Model(found))
 
 
 def validate(model: Model | PathLike, logs: LogLike | Iterable[LogLike]) -> Result:
     """How far the torques of logs are off that were not used."""
-    return Result(*_native.validate(_model(model), _logs(logs)))
+    return Result(*_native.validate(_given(model), _logs(logs)))
 
 
 def diagnose(model: Model | PathLike, logs: LogLike | Iterable[LogLike], *,
              veto: LogLike | Iterable[LogLike] = (), holdout: LogLike | Iterable[LogLike] = (),
              keep: bool = False) -> Diagnosis:
     """Effects that the model lacks; ``.model`` is the refined one, ``None`` where the data are at fault."""
-    told, found = _native.diagnose(_model(model), _logs(logs), _logs(veto), _logs(holdout), keep)
+    told, found = _native.diagnose(_given(model), _logs(logs), _logs(veto), _logs(holdout), keep)
     return Diagnosis(*told, None if found is None else Model(found))
 
 
@@ -310,31 +409,95 @@ def track(robots: dict[str, Sequence[Part | Model | PathLike]] | Sequence[Part |
         robots = {"robot": robots}
     given = []
     for name, sources in robots.items():
-        parts, models = [], []
+        parts: list[_native.Part] = []
+        models: list[_Model] = []
         for source in sources:
             if isinstance(source, (str, os.PathLike)):
                 end = os.fspath(source).endswith(".cfi")
                 source = Part.load(source) if end else Model.load(source)
-            (parts if isinstance(source, Part) else models).append(source._native)
+            if isinstance(source, Part):
+                parts.append(source._native)
+            else:
+                models.append(source._native)
         given.append((name, parts, models))
     return Track(*_native.track(given))
 
 
-def excite(robot: Robot | PathLike, output: PathLike, *options: str) -> Excitation:
-    """Design a motion for a robot file and write it as a trajectory; ``options`` are those of the command."""
+def _options(settings: dict[str, Any]) -> list[str]:
+    """Keyword settings as words of a command: ``joint="q4"`` is ``--joint q4``; lists repeat, ``True`` is a flag."""
+    words: list[str] = []
+    for name, value in settings.items():
+        option = "--" + name.replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            words.append(option)
+            continue
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            words += [option, repr(one) if isinstance(one, float) else os.fspath(one) if isinstance(one, os.PathLike) else str(one)]
+    return words
+
+
+def excite(robot: Robot | PathLike, output: PathLike, *, model: Model | PathLike | None = None,
+           **settings: Any) -> Excitation:
+    """Design a motion for a robot file and write it as a trajectory.
+
+    Without ``model`` torques are foreseen with the mass properties of the robot file, or not at all, as the result says.
+    ``settings`` are the options of the command: ``joint="q4"``, ``criterion="d-optimal"``, ``periods=8``, ``seed=1``,
+    ``with_=["monday.csv"]``, ``samples="motion.csv"``.
+    """
     path = robot.path if isinstance(robot, Robot) else os.fspath(robot)
-    told = _command(["excite", "-r", path, *options, "-o", os.fspath(output)])
+    words = _options({name.rstrip("_"): value for name, value in settings.items()})
+    with _as_file(model) as file:
+        given = ["-m", file] if file is not None else []
+        told = _command(["excite", "-r", path, *given, *words, "-o", os.fspath(output)])
     return Excitation(*told, os.fspath(output))
 
 
-def simulate(robot: Robot | PathLike, output: PathLike, *options: str, seconds: float | None = None,
-             seed: int = 1) -> Simulation:
-    """Simulate a robot file and write its log; ``options`` are those of the command, such as ``"--move", "q4"``."""
+def simulate(robot: Robot | PathLike, output: PathLike, *, model: Model | PathLike | None = None,
+             effects: Sequence[str] = (), seed: int = 1, **settings: Any) -> Simulation:
+    """Simulate a robot file and write its log.
+
+    ``effects`` are as on the command line, ``"ripple:q5"``; ``settings`` are its options: ``move="q4"``,
+    ``reference="motion.toml"``, ``seconds=20.0``.
+    """
     path = robot.path if isinstance(robot, Robot) else os.fspath(robot)
-    line = ["simulate", "-r", path, *options, "--seed", str(seed), "-o", os.fspath(output)]
-    if seconds is not None:
-        line += ["--seconds", repr(float(seconds))]
-    return Simulation(*_command(line), os.fspath(output))
+    words = _options({**settings, "effect": list(effects), "seed": seed})
+    with _as_file(model) as file:
+        given = ["-m", file] if file is not None else []
+        return Simulation(*_command(["simulate", "-r", path, *given, *words, "-o", os.fspath(output)]),
+                          os.fspath(output))
+
+
+def identify(urdf: PathLike, logs: PathLike | Iterable[PathLike], output: PathLike = "cft-ident-run") -> Identification:
+    """Everything from a URDF (or a robot file) and log files: fit, held-out errors, effects that are missing.
+
+    Models, pages and the robot file stand in the folder ``output``; ``.model`` is the one to use.
+    """
+    files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
+    folder = os.fspath(output)
+    document, _, text = _command(["identify", os.fspath(urdf), *[os.fspath(file) for file in files], "-o", folder])
+    kept = [name for name in ("refined.toml", "model.toml") if os.path.exists(os.path.join(folder, name))]
+    page = os.path.join(folder, "report.html")
+    html = None
+    if os.path.exists(page):
+        with open(page, encoding="utf-8") as file:
+            html = file.read()
+    if not kept:
+        raise InputError(f"{folder}: no model was written there")
+    return Identification(document, html, text, Model.load(os.path.join(folder, kept[0])), folder)
+
+
+@contextlib.contextmanager
+def _as_file(model: Model | PathLike | None) -> Iterator[str | None]:
+    """The path of a model's file, of one in memory for as long as it is wanted."""
+    if not isinstance(model, Model):
+        yield None if model is None else os.fspath(model)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "model.toml")
+        model.save(path)
+        yield path
 
 
 def example(name: str, folder: PathLike) -> Result:
@@ -362,11 +525,8 @@ def export(model: Model | PathLike, *, urdf: PathLike | None = None, c: PathLike
     """
     outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust), ("--mjcf", mjcf), ("--sdf", sdf), ("--usd", usd)]
     files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.fspath(model) if not isinstance(model, Model) else os.path.join(folder, "model.toml")
-        if isinstance(model, Model):
-            model.save(path)
-        line = ["export", "-m", path, *map(os.fspath, files)]
+    with _as_file(model) as path:
+        line = ["export", "-m", str(path), *[os.fspath(file) for file in files]]
         for option, output in outputs:
             line += [option, os.fspath(output)] if output is not None else []
         return Result(*_command(line))

@@ -20,12 +20,14 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         """The document; undetermined numbers are ``None``."""
-        return json.loads(self.json)
+        document: dict[str, Any] = json.loads(self.json)
+        return document
 
     @property
     def warnings(self) -> list[str]:
         """What did not come as it should."""
-        return self.to_dict()["warnings"]
+        warnings: list[str] = self.to_dict()["warnings"]
+        return warnings
 
     def save_html(self, path: Any) -> None:
         """Write the report as one page."""
@@ -54,9 +56,24 @@ class Fit(Result):
         super().__init__(document, page, text)
         self.model = model
 
+    @property
     def parameters(self) -> Any:
         """A pandas frame of the model's parameters."""
-        return self.model.parameters()
+        return self.model.parameters
+
+
+class Identification(Result):
+    """A robot identified from a URDF and logs: ``folder`` holds models, pages and the robot file."""
+
+    def __init__(self, document: str, page: str | None, text: str, model: Model, folder: str):
+        super().__init__(document, page, text)
+        self.model = model
+        self.folder = folder
+
+    @property
+    def parameters(self) -> Any:
+        """A pandas frame of the model's parameters."""
+        return self.model.parameters
 
 
 class Diagnosis(Result):

@@ -192,9 +192,9 @@ impl Model {
         self.file.robot.joint_names()
     }
 
-    /// Name, joint, value, standard deviation and unit of every parameter.
+    /// Name, joint, value, standard deviation, value in use and unit of every parameter.
     #[getter]
-    fn parameters(&self) -> Vec<(String, Option<String>, f64, Option<f64>, String)> {
+    fn parameters(&self) -> Vec<(String, Option<String>, f64, Option<f64>, f64, String)> {
         let told = self.file.parameters.iter();
         told.map(|p| {
             (
@@ -202,6 +202,7 @@ impl Model {
                 p.joint.clone(),
                 p.value,
                 p.std,
+                p.in_use(),
                 p.unit.clone(),
             )
         })

@@ -5,6 +5,7 @@
 
 mod data;
 mod errors;
+mod numbers;
 mod stages;
 mod work;
 
@@ -34,5 +35,10 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::reduce, module)?)?;
     module.add_function(wrap_pyfunction!(stages::merge, module)?)?;
     module.add_function(wrap_pyfunction!(stages::track, module)?)?;
+    module.add_function(wrap_pyfunction!(numbers::torque, module)?)?;
+    module.add_function(wrap_pyfunction!(numbers::regressor, module)?)?;
+    module.add_function(wrap_pyfunction!(numbers::joint_friction, module)?)?;
+    module.add_function(wrap_pyfunction!(numbers::mass_matrix, module)?)?;
+    module.add_function(wrap_pyfunction!(numbers::covariance, module)?)?;
     Ok(())
 }

@@ -144,7 +144,7 @@ fn estimator(name: &str) -> PyResult<EstimatorKind> {
 
 /// Inertial parameters by least squares.
 #[pyfunction]
-#[pyo3(signature = (robot, logs, model, estimator, feasible, hold_friction, as_declared))]
+#[pyo3(signature = (robot, logs, model, estimator, unconstrained, hold_friction, as_declared))]
 #[allow(clippy::too_many_arguments)] // those of the command
 pub fn lsq(
     py: Python<'_>,
@@ -152,7 +152,7 @@ pub fn lsq(
     logs: Vec<PyRef<'_, Log>>,
     model: Option<PyRef<'_, Model>>,
     estimator: &str,
-    feasible: bool,
+    unconstrained: bool,
     hold_friction: bool,
     as_declared: bool,
 ) -> PyResult<(Told, Model)> {
@@ -175,7 +175,7 @@ pub fn lsq(
         };
         let settings = LsqSettings {
             estimator: kind,
-            consistent: feasible,
+            consistent: !unconstrained,
             friction,
             hold_friction,
             gains: None,

@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def measured():
     """A measured log by its name; the test is skipped without it."""
 

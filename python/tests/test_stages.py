@@ -20,13 +20,13 @@ SAME = ["parameters", "condition", "rank", "samples", "effective_samples", "join
         ("emps/emps_id.csv", "configs/emps.toml", {}),
         ("emps/emps_id.csv", "configs/emps.toml", {"estimator": "irls"}),
         ("ur10/ur10_exciting.csv", "configs/ur10.toml", {}),
-        ("ur10/ur10_exciting.csv", "configs/ur10.toml", {"feasible": True}),
+        ("ur10/ur10_exciting.csv", "configs/ur10.toml", {"unconstrained": True}),
     ],
 )
 def test_a_fit_and_its_validation_are_those_of_the_command_line(measured, tool, tmp_path, log, robot, options):
     log = measured(log)
     words = ["--estimator", options["estimator"]] if "estimator" in options else []
-    words += ["--feasible"] if options.get("feasible") else []
+    words += ["--unconstrained"] if options.get("unconstrained") else []
     theirs = tool("lsq", log, "-r", robot, "-o", "model.toml", *words)
     fit = ci.lsq(ci.Robot.load(robot), log, **options)
     ours = fit.to_dict()
@@ -35,8 +35,8 @@ def test_a_fit_and_its_validation_are_those_of_the_command_line(measured, tool, 
     assert fit.model.text == (tmp_path / "model.toml").read_text()
     theirs = tool("validate", log, "-m", "model.toml")
     assert ci.validate(fit.model, log).to_dict() == theirs
-    frame = fit.parameters()
-    assert list(frame.columns) == ["parameter", "joint", "value", "std", "unit"]
+    frame = fit.parameters
+    assert list(frame.columns) == ["parameter", "joint", "value", "std", "in_use", "unit"]
     assert len(frame) == len(ours["parameters"])
 
 
@@ -92,7 +92,7 @@ def test_parts_merge_in_any_order_and_are_followed(slide, slide_robot):
 
 def test_files_are_looked_at_simulated_designed_and_exported(tmp_path):
     log = tmp_path / "q4.csv"
-    made = ci.simulate("configs/cft.toml", log, "--move", "q4", seconds=6.0, seed=2)
+    made = ci.simulate("configs/cft.toml", log, move="q4", seconds=6.0, seed=2)
     assert made.path == str(log) and log.exists()
     seen = ci.inspect(log, "configs/cft.toml").to_dict()
     assert seen["rate_hz"] > 100.0

@@ -13,7 +13,7 @@ const WORDS: [(&str, &str); 7] = [
     ("negligible", GREEN),
     ("weak", YELLOW),
     ("lower-bound", YELLOW),
-    ("tentative", YELLOW),
+    ("indicated", YELLOW),
     ("not-identifiable", RED),
     ("worse", RED),
 ];

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup};
+use cft_ident_core::diagnose::Wishes;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::{provenance, quality, residual};
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{
-    self, DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, DiagnosisResult, LoggedRobot,
+    self, DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, DiagnosisResult,
+    DiagnosisVerdict, LoggedRobot,
 };
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
@@ -32,7 +34,7 @@ pub struct Args {
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// Log that may veto a step, in place of blocks that are set aside; may be given more than once
+    /// Log that judges what is added and is never fitted; may be given more than once
     #[arg(long, value_name = "LOG")]
     pub veto: Vec<LogSpec>,
     /// Log that is evaluated once, after everything is decided; may be given more than once
@@ -41,13 +43,22 @@ pub struct Args {
     /// Effects of your own to try beside the known ones: [[candidate]] tables with formulas in q, v, a, load and t
     #[arg(long, value_name = "FILE.toml")]
     pub candidates: Option<PathBuf>,
-    /// Hold the given model within its covariance: finds payload, gain and tilt
+    /// Keep the inertial parameters of the given model: finds payload, gain and tilt
     #[arg(long)]
     pub keep: bool,
     /// Leave the friction of the model file as it is; its covariance stays in the deviations
     #[arg(long, conflicts_with = "keep")]
     pub hold_friction: bool,
-    /// Refined model file to write
+    /// Write the midpoint between the given model and the refined one
+    #[arg(long)]
+    pub cautious: bool,
+    /// Write this effect whatever the data say, as NAME or NAME:JOINT; may be given more than once
+    #[arg(long, value_name = "EFFECT:JOINT")]
+    pub accept: Vec<String>,
+    /// Go on with the set-up as it is declared, whatever the torques say
+    #[arg(long)]
+    pub as_declared: bool,
+    /// Refined model file to write: the given one, byte for byte, where nothing is confirmed
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
     /// Draw the residual before and after; may be given more than once
@@ -74,6 +85,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let given = files::model(&args.model, context)?;
     let (name, file) = (given.name, given.value);
     let machine = LoggedRobot::of_model(&name, &file);
+    let machine = match args.as_declared {
+        true => machine.as_declared(),
+        false => machine,
+    };
     let (train, veto) = (logs_of(&args.leave_out.of(&args.logs)), logs_of(&args.veto));
     let logs = DiagnoseLogs {
         train: &train,
@@ -89,7 +104,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         keep: args.keep,
         candidates: own.map(|given| given.value).unwrap_or_default(),
         hold_friction: args.hold_friction,
-        ..DiagnoseSettings::default()
+        wishes: Wishes {
+            cautious: args.cautious,
+            accepted: args.accept.iter().map(|text| accepted(text)).collect(),
+        },
     };
     let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
     let model = (name.as_str(), &file);
@@ -97,13 +115,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     identify::check_candidates(&settings.candidates, &machine, model)?;
     let report = setup::report(&machine, &train, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
-    let end = match fault {
-        Some(fault) => DiagnoseEnd::DataFault(fault),
-        None => identify::diagnose(&machine, model, &logs, &settings, context.control())?,
-    };
+    let refused = fault.as_ref().filter(|_| !args.as_declared);
+    if let Some(fault) = refused {
+        return Err(at_fault(fault));
+    }
+    let end = identify::diagnose(&machine, model, &logs, &settings, context.control())?;
     let setup = report.findings;
     let found = match end {
         DiagnoseEnd::Diagnosed(found) => *found,
+        DiagnoseEnd::DataFault(fault) if !args.as_declared => return Err(at_fault(&fault)),
         DiagnoseEnd::DataFault(fault) => {
             let mut report = stages::diagnose::data_fault(&fault, &given.provenance);
             if let Some(path) = &args.report {
@@ -131,9 +151,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     };
     let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
+    let plain = found.result(&machine);
     let result = DiagnosisResult {
         setup,
-        ..found.result(&machine)
+        verdict: fault
+            .as_ref()
+            .map_or(plain.verdict, |_| DiagnosisVerdict::DataFault),
+        faults: fault.into_iter().collect(),
+        ..plain
     };
     let document = Document::new("diagnose", inputs, warnings, &result)?;
     let of = stages::diagnose::Diagnose {
@@ -163,9 +188,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     }
     if let Some(path) = &args.output {
-        context.write_text(path, &refined.to_toml()?)?;
-        let unchanged = match found.diagnosis.steps.is_empty() {
-            true => ", the given model unchanged: nothing was added",
+        let unchanged = found.diagnosis.written().next().is_none();
+        let text = match unchanged {
+            true => files::text(&args.model)?,
+            false => refined.to_toml()?,
+        };
+        context.write_text(path, &text)?;
+        let unchanged = match unchanged {
+            true => ", the given model byte for byte: nothing is confirmed",
             false => "",
         };
         let written = format!("written: {}{unchanged}", path.display());
@@ -176,4 +206,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         document,
         missed: Vec::new(),
     })
+}
+
+/// A fault of the data as an error.
+fn at_fault(fault: &DataFault) -> CliError {
+    CliError::input(stages::diagnose::at_fault(fault))
+        .hint(fault.remedy.clone())
+        .hint("--as-declared goes on without")
+}
+
+/// `NAME` or `NAME:JOINT`.
+fn accepted(text: &str) -> (String, Option<String>) {
+    match text.split_once(':') {
+        Some((name, joint)) => (name.to_owned(), Some(joint.to_owned())),
+        None => (text.to_owned(), None),
+    }
 }

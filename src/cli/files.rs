@@ -56,6 +56,11 @@ pub fn model(path: &Path, context: &Context) -> Result<ReadFile<ModelFile>, CliE
     Ok(model)
 }
 
+/// The text of a model file as it stands.
+pub(crate) fn text(path: &Path) -> Result<String, CliError> {
+    Ok(config::text_of_kind(path, Wanted::Own)?)
+}
+
 /// A model file of the robot given.
 pub(crate) fn model_of(
     path: &Path,

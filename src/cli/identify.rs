@@ -101,11 +101,16 @@ struct Work {
 /// # Errors
 /// Every [`CliError`]; nothing is written then but the logs of the built-in campaign, which it reads.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let of_robot = !args.logs.is_empty();
     let folder = args.output.clone().unwrap_or_else(|| match &args.robot {
         None => PathBuf::from(FOLDER),
-        Some(file) => PathBuf::from(file.with_extension("run").file_name().unwrap_or_default()),
+        // beside the campaign; a robot may lie anywhere
+        Some(file) if of_robot => {
+            let name = file.file_stem().unwrap_or_default();
+            PathBuf::from(name).with_extension("run")
+        }
+        Some(file) => file.with_extension("run"),
     });
-    let of_robot = !args.logs.is_empty();
     if let (Some(file), false) = (&args.robot, of_robot) {
         if is_urdf(file) {
             let named = file.display();
@@ -428,7 +433,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     let latest = found.refined.as_ref().unwrap_or(&found.model);
     let result = Identified {
         setup: &checked.report.findings,
-        guesses: &guesses,
+        guesses: (!guesses.is_empty()).then_some(&guesses[..]),
         friction: found.friction.as_ref().map(|(laws, _)| laws),
         lsq: &found.dynamics,
         validate: found.validated.as_ref(),
@@ -476,8 +481,8 @@ fn by_names(campaign: &Campaign) -> String {
 pub struct Identified<'a> {
     /// What the check of the set-up found.
     setup: &'a [Finding],
-    /// What was guessed of the robot file, each with the line to change.
-    guesses: &'a [String],
+    /// What was guessed of the robot file, each with the line to change; null where nothing was.
+    guesses: Option<&'a [String]>,
     /// Null where there is no one-joint log.
     friction: Option<&'a IdentifiedFriction>,
     lsq: &'a IdentifiedDynamics,

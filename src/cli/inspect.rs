@@ -52,8 +52,8 @@ pub struct InspectionResult {
     inspection: Inspection,
     /// What the torques say against the set-up that the robot file declares.
     setup: Vec<Finding>,
-    /// Topics of the recordings, in the order of the logs.
-    topics: Vec<TopicFacts>,
+    /// Topics of the recordings, in the order of the logs; null where no log is a recording.
+    topics: Option<Vec<TopicFacts>>,
 }
 
 /// A robot as it was identified.
@@ -325,11 +325,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let result = InspectionResult {
         inspection: Inspection::of(&logs),
         setup: report.findings,
-        topics: all_topics,
+        topics: (!all_topics.is_empty()).then_some(all_topics),
     };
     let shown = match known.is_some() || context.detail() == Detail::Brief {
         true => String::new(),
-        false => topics_text(&result.topics),
+        false => topics_text(result.topics.as_deref().unwrap_or_default()),
     };
     Ok(Outcome {
         text: text.text_for(context.detail()) + &shown,

@@ -16,6 +16,7 @@ pub mod identify;
 pub mod inspect;
 pub mod lsq;
 pub mod new;
+pub mod payload;
 pub mod reduce;
 pub mod show;
 pub mod simulate;
@@ -159,6 +160,7 @@ commands! {
     Diagnose: diagnose,
     Track: track,
     Compare: compare,
+    Payload: payload,
     Show: show,
     Torque: torque,
     Watch: watch,

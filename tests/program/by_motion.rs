@@ -195,7 +195,8 @@ fn a_log_that_is_too_short_and_a_robot_of_two_joints_are_refused_with_what_to_do
         "-o",
         "m.toml",
         "--open-loop",
-        "--feasible",
+        "-m",
+        "m.toml",
     ];
     refused(&given, 2, "cannot be used with");
 }

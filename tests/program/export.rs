@@ -738,7 +738,7 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
             .code(3)
             .stderr(
                 predicates::str::contains("can be no body")
-                    .and(predicates::str::contains("--feasible")),
+                    .and(predicates::str::contains("--unconstrained")),
             );
     }
     command(&["--c", "told.h", "--without-effects"]).success();

@@ -27,6 +27,7 @@ mod export_effects;
 mod export_observer;
 mod export_support;
 mod friction_prior;
+mod from_log_to_use;
 mod gains;
 mod house;
 mod house_plan;

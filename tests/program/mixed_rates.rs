@@ -80,7 +80,7 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
         .diagnosis
         .steps
         .iter()
-        .map(|s| end.diagnosis.model.effects[s.effect].name())
+        .map(|s| s.estimate.name())
         .collect();
     assert_eq!(names, ["torque-offset"]);
     let holdout = |errors: &cft_ident::diagnose::SplitErrors| {

@@ -19,4 +19,5 @@ pub mod friction;
 pub mod inertia;
 
 pub mod diagnose;
+pub mod judge;
 pub mod validate;

@@ -294,7 +294,7 @@ impl<'a> Reconstruction<'a> {
         row: &mut dyn FnMut(&Reconstructed),
     ) -> Result<Summary, motion::RunError<E>> {
         let n = self.model.robot.joints();
-        let (model, band) = (self.model, self.band);
+        let (model, rest_speed, band) = (self.model, self.rest_speed.clone(), self.band);
         let mut full = settings.clone();
         full.rest_speed.clone_from(&self.rest_speed);
         // every raw sample counts, so rows are thinned here and not by the pipeline
@@ -314,7 +314,7 @@ impl<'a> Reconstruction<'a> {
                     band([sample.q, sample.v, sample.a], &tau[..n], &mut widths[..n]);
                 }
                 for (j, weight) in sample.weight[..n].iter().enumerate() {
-                    out[2 * n + j] = *weight;
+                    out[2 * n + j] = rest::movement(sample.v[j], rest_speed[j]);
                     out[4 * n + j] = weight * out[j];
                     out[5 * n + j] = weight * out[n + j];
                 }
@@ -347,6 +347,11 @@ impl<'a> Reconstruction<'a> {
         let mut full = settings.clone();
         full.decimation = Some(1);
         let parallel = Parallel::design(&full, stretch.dt)?;
+        let movement = |(v, speed): (&Vec<f64>, &f64)| -> Vec<f64> {
+            v.iter().map(|v| rest::movement(*v, *speed)).collect()
+        };
+        let moving = stretch.v.iter().zip(&self.rest_speed);
+        let moving: Vec<Vec<f64>> = moving.map(movement).collect();
         let speeds = self.rest_speed.iter().enumerate();
         let weights: Vec<Vec<f64>> = speeds
             .map(|(j, speed)| parallel.weights(stretch, j, *speed))
@@ -373,7 +378,7 @@ impl<'a> Reconstruction<'a> {
             }
         }
         let channels = stretch.tau.iter().chain(reconstructed);
-        let channels = channels.chain(&weights).chain(&widths).chain(&by_weight);
+        let channels = channels.chain(&moving).chain(&widths).chain(&by_weight);
         let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
         let mut taken = Taken::new(settings);

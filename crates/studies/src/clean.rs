@@ -17,7 +17,7 @@ use crate::machine::{Drive, Kind, LawKind, Machine};
 use crate::model::Model;
 use crate::path::{MOTIONS, Motion};
 use crate::study::{Rows, StudyError};
-use crate::tool::Tool;
+use crate::tool::{ENDED, Tool};
 
 const MACHINES: [(Kind, Drive); 5] = [
     (Kind::Single, Drive::Direct),
@@ -154,7 +154,9 @@ pub fn diagnosed(tool: &Tool, folder: &File) -> Result<Value, StudyError> {
     let refined = folder.join("refined.toml");
     if answer.exit != 0 || !refined.exists() {
         row["said"] = json!(answer.last_words());
-        row["written"] = json!([]);
+        if answer.exit != ENDED {
+            row["written"] = json!([]);
+        }
         return Ok(row);
     }
     let names = |model: &Model| -> Vec<(String, String)> {
@@ -176,6 +178,11 @@ pub fn diagnosed(tool: &Tool, folder: &File) -> Result<Value, StudyError> {
     row["unseen_before"] = json!(errors(tool, folder, "unseen.csv", "model.toml")?);
     row["unseen_after"] = json!(errors(tool, folder, "unseen.csv", "refined.toml")?);
     Ok(row)
+}
+
+/// Whether the diagnosis came to its end.
+pub fn is_done(row: &Value) -> bool {
+    row["written"].is_array() && row["exit"] != ENDED
 }
 
 /// Largest ratio over the joints of two lists of errors.
@@ -213,7 +220,7 @@ pub fn table(rows: &Rows) -> String {
                     .filter(|e| !cell.true_name(e))
                     .collect()
             };
-            let judged: Vec<&&Value> = own.iter().filter(|row| row["written"].is_array()).collect();
+            let judged: Vec<&&Value> = own.iter().filter(|row| is_done(row)).collect();
             let bad = judged.iter().filter(|row| !written(row).is_empty()).count();
             let worse = judged
                 .iter()

@@ -1,9 +1,9 @@
 //! Plants of another make than `simulate`, and studies that judge the `cft-ident` binary by what it writes.
 //!
 //! Nothing here uses code of `cft-ident`: bodies ([`chain`]), friction with an ideal stick ([`plant`]), drives and
-//! controllers ([`drive`]), motions ([`path`]) and sensors are the studies' own. A study writes logs and robot files
-//! as a laboratory would have them ([`files`]), runs the binary on them ([`tool`]), and compares its documents with
-//! the truth, which no estimator sees.
+//! controllers ([`drive`]), motions ([`path`]) and sensors are the studies' own. (The programs under `examples` are
+//! studies of the library's rooms, and do.) A study writes logs and robot files as a laboratory would have them
+//! ([`files`]), runs the binary on them ([`tool`]), and compares its documents with the truth, which no estimator sees.
 //!
 //! | study | asks |
 //! |---|---|

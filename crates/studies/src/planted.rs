@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::added::{Added, Shape};
 use crate::chance::Chance;
-use crate::clean::{diagnosed, worst};
+use crate::clean::{diagnosed, is_done, worst};
 use crate::drive::{Controller, Run};
 use crate::friction::Law;
 use crate::judge::{LIMITS, Share};
@@ -252,7 +252,8 @@ struct Tally {
     named: usize,
     false_free: usize,
     ratios: Vec<f64>,
-    own_share: f64,
+    /// Where it is known.
+    own_share: Option<f64>,
 }
 
 fn tally(member: &Member, rows: &[&Value]) -> Tally {
@@ -261,8 +262,9 @@ fn tally(member: &Member, rows: &[&Value]) -> Tally {
         ..Tally::default()
     };
     for row in rows {
-        all.own_share += row["own_share"].as_f64().unwrap_or(1.0) / rows.len() as f64;
-        let Some(written) = row["written"].as_array() else {
+        let share = row["own_share"].as_f64();
+        all.own_share = share.map(|s| all.own_share.unwrap_or(0.0) + s / rows.len() as f64);
+        let Some(written) = row["written"].as_array().filter(|_| is_done(row)) else {
             continue;
         };
         all.done += 1;
@@ -297,12 +299,12 @@ pub fn table(rows: &Rows) -> String {
                 }
                 let t = tally(&member, &own);
                 let median = t.ratios.get(t.ratios.len() / 2).copied();
-                let told = t.own_share >= LIMITS.own_share;
+                let told = t.own_share.is_none_or(|s| s >= LIMITS.own_share);
                 text += &format!(
-                    "| {cell} | {tool} | {} | {} | {:.2} | {} | {} | {} | {} |\n",
+                    "| {cell} | {tool} | {} | {} | {} | {} | {} | {} | {} |\n",
                     t.campaigns,
                     t.campaigns - t.done,
-                    t.own_share,
+                    t.own_share.map_or("-".to_owned(), |s| format!("{s:.2}")),
                     percent(t.named, t.done),
                     percent(t.false_free, t.done),
                     median.map_or("-".to_owned(), |m| format!("{m:.2}")),
@@ -332,7 +334,7 @@ fn head(rows: &Rows, tool: &str) -> String {
             let t = tally(&member, &own);
             done += t.done;
             clean += t.false_free;
-            if t.own_share >= LIMITS.own_share && !member.family.is_empty() {
+            if t.own_share.is_none_or(|s| s >= LIMITS.own_share) && !member.family.is_empty() {
                 (named, tellable) = (named + t.named, tellable + t.done);
                 ratios.extend(t.ratios);
             }

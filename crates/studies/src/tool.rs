@@ -12,6 +12,9 @@ use crate::study::StudyError;
 /// No command on a minute of log should take longer than this, on a machine that others use too.
 const PATIENCE: Duration = Duration::from_secs(120);
 
+/// Exit status of a run that was ended from outside.
+pub const ENDED: i32 = -1;
+
 /// The binary, and what its column is called in tables.
 #[derive(Debug, Clone)]
 pub struct Tool {
@@ -28,7 +31,7 @@ pub struct Answer {
 
 impl Tool {
     /// Runs it in a folder with `--json`, on one thread; the document is read and removed. A run that goes on for
-    /// longer than [`PATIENCE`] is ended, and has exit status -1.
+    /// longer than [`PATIENCE`] is ended, and has [`ENDED`] for an exit status.
     pub fn run(&self, folder: &Path, words: &[&str]) -> Result<Answer, StudyError> {
         let failed = |source| StudyError::Tool {
             path: self.path.clone(),
@@ -47,11 +50,11 @@ impl Tool {
         let begin = Instant::now();
         let exit = loop {
             if let Some(status) = child.try_wait().map_err(failed)? {
-                break status.code().unwrap_or(-1);
+                break status.code().unwrap_or(ENDED);
             }
             if begin.elapsed() > PATIENCE {
                 child.kill().and_then(|()| child.wait()).map_err(failed)?;
-                break -1;
+                break ENDED;
             }
             std::thread::sleep(Duration::from_millis(5));
         };

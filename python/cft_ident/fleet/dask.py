@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import Fleet
 
 
 def reduce_dask(client: Any, urls: Iterable[str], robot: str, *, model: str | None = None, store: str | None = None,
-                as_declared: bool = False) -> "Fleet":
+                as_declared: bool = False) -> Fleet:
     """Reduce logs where workers of ``client`` are free, and merge them in a tree.
 
     ``robot`` and ``model`` are paths of files. With a ``store``, a folder that all workers see, logs that were reduced
@@ -15,9 +18,10 @@ def reduce_dask(client: Any, urls: Iterable[str], robot: str, *, model: str | No
     """
     from dask.distributed import as_completed
 
-    from . import Fleet, Part, _sorted_out, merge_bytes, reduce_one, text_of, tree
+    from .. import Part
+    from . import Fleet, _sorted_out, merge_bytes, reduce_one, text_of, tree
 
-    texts = (text_of(robot), text_of(model))
+    texts = (text_of(robot) or "", text_of(model))
     # the scheduler gives a lost worker's tasks to the others
     jobs = [client.submit(reduce_one, url, *texts, store, as_declared, pure=False, retries=3) for url in urls]
     found = [job.result() for job in as_completed(jobs)]

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import Fleet
 
 
 def reduce_ray(urls: Iterable[str], robot: str, *, model: str | None = None, store: str | None = None,
-               as_declared: bool = False) -> "Fleet":
+               as_declared: bool = False) -> Fleet:
     """Reduce logs where Ray has room, and merge them in a tree; arguments as of :func:`reduce_dask`.
 
     Ray runs a lost worker's tasks again by itself.
     """
     import ray
 
-    from . import Fleet, Part, _sorted_out, merge_bytes, reduce_one, text_of, tree
+    from .. import Part
+    from . import Fleet, _sorted_out, merge_bytes, reduce_one, text_of, tree
 
-    texts = (text_of(robot), text_of(model))
+    texts = (text_of(robot) or "", text_of(model))
     rows = ray.data.from_items([{"url": url} for url in urls])
     found = rows.map(lambda row: _whole(reduce_one(row["url"], *texts, store, as_declared))).take_all()
     found = [{key: value for key, value in row.items() if value is not None} for row in found]
@@ -25,6 +30,6 @@ def reduce_ray(urls: Iterable[str], robot: str, *, model: str | None = None, sto
     return Fleet(Part.from_bytes(ray.get(joined)) if joined is not None else None, failures, reused)
 
 
-def _whole(row: dict) -> dict:
+def _whole(row: dict[str, Any]) -> dict[str, Any]:
     """A row with every column, as a table needs it."""
     return {"url": None, "key": None, "part": None, "reused": None, "error": None, **row}

@@ -93,9 +93,10 @@ fn sampled(
 /// What is to be known before the robot moves; what nobody has checked comes first.
 fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
     let file = bench.args.robot.file_name().unwrap_or_default();
+    let [first, second] = judged.first_words();
     vec![
-        judged.torques.clone(),
-        escape(&judged.not_checked),
+        escape(first),
+        escape(second),
         match &judged.broken()[..] {
             [] => format!(
                 "Checked: the limits of {}{} along the whole motion{}. {} s at {} Hz, by cft-ident {}.",

@@ -12,8 +12,8 @@ use cft_ident_plant::simulate::truth::TruthFile;
 use cft_ident_report::report::json::{self, Document};
 use cft_ident_stages::compare::RunDifference;
 use cft_ident_stages::identify::{
-    ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong,
-    Tracked, Validated, Watched,
+    ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, Payload,
+    TorqueAlong, Tracked, Validated, Watched,
 };
 
 /// What a schema is of.
@@ -53,6 +53,8 @@ pub enum Kind {
     Simulate,
     /// JSON document of `inspect`
     Inspect,
+    /// JSON document of `payload`
+    Payload,
     /// JSON document of `show`
     Show,
     /// JSON document of `torque`
@@ -100,6 +102,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),
         Kind::Inspect => json::schema::<inspect::InspectionResult>("inspect"),
+        Kind::Payload => json::schema::<Payload>("payload"),
         Kind::Show => json::schema::<show::ShownModel>("show"),
         Kind::Torque => json::schema::<TorqueAlong>("torque"),
         Kind::Watch => json::schema::<Watched>("watch"),

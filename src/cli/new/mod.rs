@@ -1,6 +1,7 @@
 //! `cft-ident new`: a robot file for a robot that the tool has never seen.
 
 mod text;
+mod weights;
 
 use std::path::{Component, Path, PathBuf};
 
@@ -327,6 +328,11 @@ pub(super) fn describe(
             escape(topic),
             cft_ident_logs::log::list(seen.other_topics.iter().map(String::as_str))
         ));
+    }
+    if let (Some(spec), Some(_)) = (&args.log, &args.urdf)
+        && let Some(text) = weights::told(&file, spec, context)?
+    {
+        warnings.push(text);
     }
     let (shape, model, cutoff_hz) = (draft.shape.clone(), draft.model(), draft.cutoff_hz());
     Ok(Described {

@@ -393,7 +393,7 @@ fn columns(joint: &JointColumns, recording: bool) -> Option<String> {
         ("torque", &joint.torque, "tau_"),
     ] {
         if let Some(found) = found
-            && !recording
+            && (!recording || joint.by_path)
             && *found != format!("{plain}{}", joint.joint)
         {
             keys.push(format!("{what} = {}", column(found)));

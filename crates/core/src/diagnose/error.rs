@@ -1,6 +1,5 @@
 //! Why no diagnosis comes out.
 
-use super::faults::channels::Suspicion;
 use crate::motion::MotionError;
 
 /// Why no diagnosis came out.
@@ -10,7 +9,7 @@ pub enum DiagnoseError {
     Motion(#[from] MotionError),
     #[error(
         "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} \
-         unknowns; give a longer log, or logs of their own by --veto and --holdout"
+         unknowns; give a longer log, or logs of their own by --holdout"
     )]
     TooFewRows { rows: usize, unknowns: usize },
     #[error(
@@ -19,8 +18,8 @@ pub enum DiagnoseError {
     NothingDetermined { unknowns: usize },
     #[error("the torque of joint {joint} is zero throughout; check its channel")]
     NoTorque { joint: String },
-    #[error("a torque channel looks sign-flipped or swapped")]
-    Channels(Suspicion),
+    #[error("no effect {name} can be accepted: {why}")]
+    Accept { name: String, why: String },
     #[error("interrupted")]
     Interrupted,
 }

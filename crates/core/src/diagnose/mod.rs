@@ -1,52 +1,47 @@
 //! From a residual to the effect that the model lacks.
 //!
 //! ```text
-//! logs -> stretches -> data split (fit, folds, veto, holdout)
-//!      fit -> orders -> search (candidates) -> accept, placebo, choose, add -> removal -> fit ..
-//!          -> reconsider -> search ..  -> errors
+//! logs -> stretches -> data split -> fit of what is declared -> blocks and parts
+//!      -> one pass over the rows: sums of products of every candidate per block and joint
+//!      -> search (friction laws, then all else) -> parts -> two tables -> held-out data
 //! ```
 //!
-//! Every candidate is tested beside everything that is declared, with its columns projected off it:
-//! a share of its own, an F test that correlated residuals do not break, a criterion with the
-//! effective sample size, cross-validation over blocks with gaps, and data set aside that may
-//! veto. All must agree. Held-out data are evaluated once, at the end.
+//! What decides is the [judge](crate::judge): blocks of time left out screen, the agreement of an amplitude between
+//! parts of the data tests and shrinks it. What fits best and is not confirmed is told, and nothing weaker is put in
+//! its place. Held-out data are looked at once, at the end.
 //!
-//! | room | what |
+//! | room | does |
 //! |---|---|
-//! | `problem` | which rows do what, the unknowns, and their joint fit |
-//! | `faults` | torque channels and disturbances, before any physics |
-//! | `candidates` | every effect at every place, its shape and its significance |
-//! | `placebo` | what chance makes of a model that lacks nothing |
-//! | `selection` | which one is added, and which one goes again |
+//! | `problem` | which rows do what, the unknowns, the pass over the rows, the fit of what is declared |
+//! | `memory`, `orders` | how long the residual remembers, and which waves over the position it has |
+//! | `candidates` | every effect at every place in every shape |
+//! | `search` | the greatest gain on blocks left out, again and again |
+//! | `steps`, `tables`, `held_out` | the parts' verdict, estimates and predictions, held-out data |
+//! | `change` | friction that changes from a time on |
 //! | `unexplained` | errors, the noise floor, and what is above it |
-//! | `uncertainty` | covariance, bias, and the profile of shapes |
 //! | `run` | the loop over all of these |
 
 mod candidates;
+mod change;
 mod error;
-mod faults;
+mod held_out;
+mod memory;
+mod orders;
 mod outcome;
-mod placebo;
-mod prepare;
 mod problem;
 mod run;
-mod selection;
-mod uncertainty;
+mod search;
+mod steps;
+mod tables;
 mod unexplained;
 mod watch;
 
-pub use candidates::candidate::Candidate;
-pub use candidates::score::CandidateScore;
 pub use error::DiagnoseError;
-pub use faults::channels::Suspicion;
-pub use faults::disturbance::CutDisturbance;
-pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors, StepStatus, Turn};
-pub use placebo::blocks::DRAWS as PLACEBOS;
-pub use problem::case::{Case, SelectionLimits};
+pub use outcome::{Diagnosis, FoundEffect, FrictionChange, LeftCandidate, SplitErrors, StepStatus};
+pub use problem::case::{Case, Wishes};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown};
-pub use problem::wide_motion::{TIMES as WIDE_TIMES, WideMotion};
 pub use run::diagnose;
 pub use unexplained::dependence::Dependence;
 pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};

@@ -4,79 +4,75 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::candidates::candidate::Candidate;
-use super::faults::disturbance::CutDisturbance;
 use super::problem::data_split::SetAside;
 use super::problem::unknowns::Unknown;
-use super::uncertainty::covariance;
 use super::unexplained::Unexplained;
 use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::{Errors, JointChange};
-use crate::effect::AugmentedModel;
+use crate::effect::{Added, AugmentedModel, Law, Place};
+use crate::judge::Gain;
 
-/// Part of a joint's structure that may be left where effects are named for the rest of it.
-const NAMED: f64 = 0.1;
-
-/// One accepted effect.
-#[derive(Debug, Clone)]
-pub struct AcceptedEffect {
-    /// Its place in the final model's effects.
-    pub effect: usize,
-    pub candidate: Candidate,
-    /// Candidates that these data do not separate from it, best first.
-    pub alternatives: Vec<Candidate>,
-    /// Mean relative error on the holdout before and after the step.
-    pub holdout: Option<[f64; 2]>,
-    /// The same joint by joint.
-    pub joints: Vec<JointChange>,
-}
-
-/// How firm the name of an effect is.
+/// How firm an effect is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepStatus {
-    /// These data separate it from all other candidates, nothing else is left that chance does not explain, and
-    /// held-out data confirm it.
-    Assured,
-    /// One of these does not hold.
-    Tentative,
-    /// A curve that was measured, and no named law.
-    Empirical,
+    /// All parts of the data ask for it, and held-out data gain by it where there are any.
+    Confirmed,
+    /// The parts agree, with doubt.
+    Indicated,
+    /// It fits best and the parts do not agree: it is not written.
+    Seen,
 }
 
-impl AcceptedEffect {
-    /// Whether held-out data confirm the step: the 95 % CI of the change of the error lies below zero
-    /// on a joint, and no joint is noticeably worse.
-    pub fn confirmed(&self) -> bool {
-        self.joints.iter().any(JointChange::improved)
-            && !self.worse_over_joints()
-            && !self.joints.iter().any(JointChange::noticeably_worse)
-    }
+/// One effect that gained on blocks left out.
+#[derive(Debug, Clone)]
+pub struct FoundEffect {
+    /// With the amplitude of the joint fit of all effects whose parts agree; of one that is seen alone, of the fit with
+    /// all that was found.
+    pub estimate: Added,
+    /// Covariance of its (shape, linear), row-major; shapes stand on a grid and have none.
+    pub covariance: Vec<f64>,
+    /// Its place in the effects of the judge's model; none where the parts do not agree.
+    pub judged: Option<usize>,
+    /// Its place in the effects of the model that is written.
+    pub written: Option<usize>,
+    pub status: StepStatus,
+    /// Factor of its amplitude that the parts' agreement gives, 0..1.
+    pub shrinkage: f64,
+    pub agreement: f64,
+    /// Amplitudes of its coefficients by part of the data.
+    pub parts: Vec<Vec<f64>>,
+    /// Gain on blocks left out, beside the effects before it.
+    pub gain: Gain,
+    /// Part of the squared error of these blocks that it takes off.
+    pub share: f64,
+    /// Effects that these data do not separate from it, best first.
+    pub alternatives: Vec<Added>,
+    /// Mean relative error on held-out data without and with it.
+    pub holdout: Option<[f64; 2]>,
+    /// The same joint by joint.
+    pub joints: Vec<JointChange>,
+    /// The user wants it whatever the judge says.
+    pub accepted_by_user: bool,
+}
 
-    /// Whether it makes held-out data worse as the rms over the joints.
-    pub fn worse_over_joints(&self) -> bool {
-        self.holdout.is_some_and(|[before, after]| after > before)
-    }
-
-    /// Whether it makes held-out data worse: as the rms over the joints, or on one of them by its
-    /// whole interval.
-    pub fn worsens(&self) -> bool {
-        self.worse_over_joints() || self.joints.iter().any(|j| j.worsened)
+impl FoundEffect {
+    /// Whether held-out data took it out.
+    pub fn vetoed(&self) -> bool {
+        self.judged.is_some() && self.written.is_none()
     }
 }
 
-/// One turn of the search.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Turn {
-    /// An effect was added.
-    Added(String),
-    /// An effect went: it does not stand beside the others, or its numbers do not hold with them.
-    Dropped(String),
-    /// Effects went for others that say the same with fewer numbers, or more.
-    Replaced {
-        gone: Vec<String>,
-        come: Vec<String>,
-    },
+/// A candidate that was not chosen.
+#[derive(Debug, Clone)]
+pub struct LeftCandidate {
+    pub law: &'static Law,
+    pub place: Place,
+    /// In its best shape; none where it was not tried.
+    pub effect: Option<Added>,
+    /// Part of the squared error of blocks left out that it would take off.
+    pub score: Option<f64>,
+    pub reason: String,
 }
 
 /// Errors before or after.
@@ -86,34 +82,55 @@ pub struct SplitErrors {
     pub holdout: Option<Errors>,
 }
 
+/// Change of a joint's friction from a time on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrictionChange {
+    pub joint: usize,
+    pub log: usize,
+    /// By the log's own clock \[s\].
+    pub at_s: f64,
+    /// Change of the friction at the joint's rms speed [N or Nm].
+    pub by: f64,
+    /// Gain on blocks left out over its standard error.
+    pub certainty: f64,
+}
+
 /// The outcome.
 pub struct Diagnosis {
-    /// The model with what was added, all refitted; the given one where nothing was added.
+    /// The model that is written: the given one where nothing is.
     pub model: AugmentedModel,
-    /// Unknowns of the final fit and their covariance; where nothing was added, of the given model's refit.
+    /// Unknowns of the declared model, and their covariance with every effect of the estimates, by the block jackknife.
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
-    pub steps: Vec<AcceptedEffect>,
-    /// How the search came to them.
-    pub path: Vec<Turn>,
-    /// Candidates of the last round, in which none was accepted.
-    pub candidates: Vec<Candidate>,
+    /// The declared parameters of the joint fit with every effect whose parts agree, unshrunk.
+    pub estimates: AugmentedModel,
+    pub steps: Vec<FoundEffect>,
+    pub candidates: Vec<LeftCandidate>,
     pub before: SplitErrors,
     /// The declared model refitted to these logs, with nothing added.
     pub refitted: Errors,
+    /// By the judge's model, before held-out data had a say.
     pub after: SplitErrors,
+    /// By the model that is written, where held-out data took something out of it.
+    pub selected: Option<SplitErrors>,
     pub unexplained: Vec<Unexplained>,
     /// What the residuals of joints with structure depend on, the strongest of each joint first.
     pub dependence: Vec<Dependence>,
     /// Part of the structure of each joint's residual that is unexplained on the fitted logs.
     pub part_unexplained: Vec<f64>,
     pub set_aside: Vec<SetAside>,
-    /// Disturbances that were cut out of the logs.
-    pub disturbances: Vec<CutDisturbance>,
+    pub changes: Vec<FrictionChange>,
     /// Root mean square of the filtered residual per joint.
     pub residual_std: Vec<f64>,
     /// Logs that were fitted: the first ones.
     pub fitted_logs: usize,
+    /// Parts of the data that are asked, and the least length of a block \[s\].
+    pub parts: usize,
+    pub block_s: f64,
+    /// Parts that would be enough.
+    pub parts_needed: usize,
+    /// Whether the declared model explains more of blocks left out than no torque does.
+    pub determined: bool,
 }
 
 impl Diagnosis {
@@ -130,40 +147,18 @@ impl Diagnosis {
             .map(|(j, _)| j)
     }
 
-    /// Candidates of the last round that are significant and were not added, for they are too small or came after
-    /// the last that is looked for: treat the effects that were added as approximations then.
-    pub fn remainder(&self) -> impl Iterator<Item = &Candidate> {
-        self.candidates.iter().filter(|c| c.significant)
+    /// Effects of the written model, with what is known of them.
+    pub fn written(&self) -> impl Iterator<Item = &FoundEffect> {
+        self.steps.iter().filter(|step| step.written.is_some())
     }
 
-    /// Whether what was added leaves nothing above noise on any joint. Otherwise it lowers the
-    /// error and may take the place of an effect that the catalogue does not have: joints share inertial
-    /// parameters, and what is missing on one forges effects on the others.
-    pub fn assured(&self) -> bool {
-        !self.structured() && self.remainder().next().is_none()
+    /// Whether held-out data took an effect out of what is written.
+    pub fn holdout_had_a_say(&self) -> bool {
+        self.steps.iter().any(FoundEffect::vetoed)
     }
 
-    /// How firm the name of a step's effect is.
-    pub fn status(&self, step: &AcceptedEffect) -> StepStatus {
-        if self.model.effects[step.effect].curve().is_some() {
-            return StepStatus::Empirical;
-        }
-        match step.alternatives.is_empty() && self.assured() && step.confirmed() {
-            true => StepStatus::Assured,
-            false => StepStatus::Tentative,
-        }
-    }
-
-    /// Whether what was added leaves at most a small part of the structure on the joints that a step's effect
-    /// touches, so that there is something to its name.
-    pub fn explained(&self, step: &AcceptedEffect) -> bool {
-        let place = self.model.effects[step.effect].place;
-        let mut open = self.structured_joints().filter(|j| place.touches(*j));
-        open.all(|j| self.part_unexplained[j] <= NAMED)
-    }
-
-    /// Covariance of (shape, linear) of one effect, row-major; a shape that was not refined has none.
-    pub fn covariance_of(&self, effect: usize) -> Vec<f64> {
-        covariance::of_effect(&self.unknowns, &self.covariance, &self.model, effect)
+    /// Whether there is data enough for the parts to confirm anything.
+    pub fn long_enough(&self) -> bool {
+        self.parts >= self.parts_needed
     }
 }

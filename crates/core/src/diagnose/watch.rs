@@ -10,8 +10,6 @@ pub enum Heard<'a> {
     Step,
     /// The part that began last ends.
     End,
-    /// What came of it.
-    Said(&'a str),
 }
 
 /// Who is told, from any thread, and who says whether to end.
@@ -32,10 +30,6 @@ impl<'a> Watch<'a> {
     pub(crate) fn part(self, name: &str, steps: usize) -> Part<'a> {
         (self.tell)(Heard::Begin(name, steps as u64));
         Part(self)
-    }
-
-    pub(crate) fn said(self, text: &str) {
-        (self.tell)(Heard::Said(text));
     }
 }
 

@@ -79,14 +79,6 @@ impl Added {
         }
     }
 
-    /// Whether its torque is the same while its joint rests.
-    pub(crate) fn at_rest(&self) -> bool {
-        match self.law.varied {
-            Some(of) => of(&self.shape).1,
-            None => self.law.entry.at_rest,
-        }
-    }
-
     /// Joints whose temperature it takes.
     pub fn temperatures(&self) -> Vec<usize> {
         let formula = self.law.formula.zip(self.place.joint());

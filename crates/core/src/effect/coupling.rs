@@ -5,11 +5,11 @@
 //! joint j too: power is kept, so that both rows have the same three numbers. That place is told by
 //! `both`.
 
-use super::as_code::Site;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::physics::Rule;
 use super::place::{Place, Places};
+use super::site::CodeSite;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 
@@ -94,7 +94,7 @@ pub static LAW: Law = Law {
 };
 
 /// What it adds to generated code.
-fn written(to: &mut Site) {
+fn written(to: &mut CodeSite) {
     let [viscous, coulomb, inertia, r] = [to.x(0), to.x(1), to.x(2), to.s(0)];
     match to.place() {
         Place::Geared { motor, other } => {

@@ -116,19 +116,6 @@ impl JointCover {
         (self.position[1] - self.position[0]).max(0.0)
     }
 
-    /// Whether the travel is wide enough to tell a smooth function of position, which would be carried
-    /// on beyond it: half of the joint's range, where that is known.
-    pub(crate) fn is_wide(&self) -> Result<(), String> {
-        match self.full_range {
-            Some(full) if self.range() < WIDE * full => Err(format!(
-                "the travel covers {:.0} % of the joint's range, and a function of position fitted \
-                 there would be carried on beyond it: move the joint over half of its range",
-                100.0 * self.range() / full
-            )),
-            _ => Ok(()),
-        }
-    }
-
     /// Greatest speed of both directions.
     pub fn fastest(&self) -> f64 {
         self.speed[1].max(-self.speed[0])
@@ -202,9 +189,6 @@ pub fn stationary_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>>
     let small = |t: &Vec<f64>| t.iter().zip(&widest).map(|(t, w)| *t < SMALL * w).collect();
     travels.iter().map(small).collect()
 }
-
-/// Share of a joint's range that a smooth function of position must be seen over.
-const WIDE: f64 = 0.5;
 
 /// Turning points with at least `least` between them.
 fn reversals(q: &[f64], least: f64) -> usize {

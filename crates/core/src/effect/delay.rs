@@ -28,17 +28,18 @@ pub static ENTRY: Entry = Entry {
         format!("torque {ms} ms {way} position on {}", f.at)
     },
     remedy: "log torques and positions with one clock and no filter between them, or shift the torque by this time",
+    measurable: true,
     ..Entry::USUAL
 };
 
 pub static LAW: Law = Law {
     code: Some(|to| to.late()),
     ..Law::linear(&ENTRY, &["d"], |scene, _, _, joint, out| {
-    // tau(t - d) = tau - d dtau/dt + ..
-    let hat = &scene.hat[joint];
-    let step = scene.stretch.dt;
-    for k in 1..hat.len().saturating_sub(1) {
-        out[0][k] = -(hat[k + 1] - hat[k - 1]) / (2.0 * step);
-    }
-})
+        // tau(t - d) = tau - d dtau/dt + ..
+        let hat = &scene.hat[joint];
+        let step = scene.stretch.dt;
+        for k in 1..hat.len().saturating_sub(1) {
+            out[0][k] = -(hat[k + 1] - hat[k - 1]) / (2.0 * step);
+        }
+    })
 };

@@ -46,6 +46,7 @@ pub static ENTRY: Entry = Entry {
     source: "harmonic drives, belts and long shafts (Spong 1987)",
     said: |f| format!("elastic drive of {}, {} stiff", f.at, f.size("stiffness")),
     remedy: "keep `cutoff_hz` and the motion below the resonance, or log positions on both sides of the gear",
+    measurable: true,
     ..Entry::USUAL
 };
 

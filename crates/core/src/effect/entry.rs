@@ -202,6 +202,8 @@ pub struct Entry {
     pub at_rest: bool,
     /// Whether it is friction: with all other friction of its joints it takes power.
     pub friction: bool,
+    /// Whether a person can measure its size: it is known or it is not, and never taken in part.
+    pub measurable: bool,
     /// What its numbers must satisfy to bear its name.
     pub must: &'static [Rule],
     /// The signal over which a curve takes its place where they do not.
@@ -233,6 +235,7 @@ impl Entry {
         search: Search::Linear,
         at_rest: false,
         friction: false,
+        measurable: false,
         must: &[],
         otherwise: None,
         ladder: None,

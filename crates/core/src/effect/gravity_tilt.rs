@@ -2,13 +2,13 @@
 //! know: a base that stands askew. Two numbers explain it on all joints; the columns are those of
 //! [`Tilt`](crate::robot::undeclared::Tilt).
 
-use super::as_code::Property;
-use super::as_code::Site;
-use super::law_text::exact;
 use super::entry::{Entry, Family, Key};
 use super::law::Law;
+use super::law_text::exact;
 use super::place::{Place, Places};
 use super::scene::Scene;
+use super::site::CodeSite;
+use super::site::Property;
 use super::unit::Unit;
 use crate::number;
 use crate::robot::tree::MOST_JOINTS;
@@ -31,6 +31,7 @@ pub static ENTRY: Entry = Entry {
         format!("base that leans by {} deg", number::significant(lean, 2))
     },
     remedy: "level the base, or give `gravity` in the robot file as it is in the frame of the base",
+    measurable: true,
     ..Entry::USUAL
 };
 
@@ -83,7 +84,7 @@ fn along(scene: &Scene, mut take: impl FnMut(usize, &[[f64; 2]])) {
     }
 }
 
-impl Site<'_> {
+impl CodeSite<'_> {
     /// A base that stands askew: the recursion in another gravity, or the first moments of the closed form.
     fn tilted(&mut self) {
         let &[gx, gy] = self.linear() else { return };

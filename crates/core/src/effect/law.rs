@@ -1,12 +1,12 @@
 //! How the estimator sees an effect: columns of torque along a recorded motion, linear in some parameters and
 //! shaped by others.
 
-use super::as_code::{Code, PropertyOf};
 use super::cover::Cover;
 use super::entry::{Entry, Family};
 use super::formula::Formulas;
 use super::place::Place;
 use super::scene::Scene;
+use super::site::{Code, PropertyOf};
 use super::values::{EffectError, Values};
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;

@@ -21,6 +21,7 @@ pub(crate) mod place;
 mod sampled;
 mod scene;
 mod signal;
+mod site;
 pub(crate) mod unit;
 mod values;
 
@@ -33,7 +34,7 @@ pub use entry::{Entry, Family, Key, Ladder, Range, Role, Search};
 pub use facts::Facts;
 pub use law::Law;
 pub use order::is_whole as order_is_whole;
-pub use physics::{Rule, Seen};
+pub use physics::{Limit, Number, Rule, Seen};
 pub use place::{Place, Places};
 pub use sampled::Sampled;
 pub use scene::Scene;

@@ -35,6 +35,7 @@ pub static ENTRY: Entry = Entry {
     at_rest: true,
     said: |f| format!("payload of {}", f.size("mass")),
     remedy: "take the load off, or use the refined model with it",
+    measurable: true,
     ..Entry::USUAL
 };
 

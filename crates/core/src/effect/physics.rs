@@ -124,6 +124,16 @@ impl Rule {
         })
     }
 
+    /// The least that it allows.
+    pub(crate) fn least_of(&self, seen: &Seen) -> Option<f64> {
+        self.least.value(seen)
+    }
+
+    /// The most that it allows.
+    pub(crate) fn most_of(&self, seen: &Seen) -> Option<f64> {
+        self.most.value(seen)
+    }
+
     /// The key that it looks at, where it is one.
     pub fn key(&self) -> Option<&'static str> {
         match self.of {

@@ -1,9 +1,9 @@
 //! `ripple`: torque that repeats with position and does not flip with direction. Each harmonic is an
 //! effect of its own order.
 
-use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::law_text::exact;
 use super::order::{order_limits, orders, wavenumber};
 use super::unit::Unit;
 
@@ -33,6 +33,7 @@ pub static ENTRY: Entry = Entry {
     at_rest: true,
     said: |f| format!("ripple of {}, {}, {}", f.at, f.wave(), f.amplitude()),
     remedy: "compare its period with the parts of the drive that repeat, such as motor poles, gear teeth and bearings; compensate it over position with the refined model",
+    measurable: true,
     ..Entry::USUAL
 };
 

@@ -21,6 +21,7 @@ pub static ENTRY: Entry = Entry {
     at_rest: true,
     said: |f| format!("spring on {}, {}", f.at, f.size("k")),
     remedy: "look for a cable, a hose or a spring that pulls the joint back, and reroute it or keep the refined model",
+    measurable: true,
     ..Entry::USUAL
 };
 
@@ -28,7 +29,6 @@ pub static LAW: Law = Law {
     shape: &["q0"],
     starts: |cover, place| {
         let joint = cover.at(place);
-        joint.is_wide()?;
         if joint.reversals < 2 {
             return Err("fewer than two reversals: a slope over position is not seen".into());
         }

@@ -1,7 +1,7 @@
 //! Which columns a joint's rows have: shared inertial parameters, its own linear terms, the
 //! gradient of its known friction, and the target.
 
-use crate::motion::{FilterSettings, rest};
+use crate::motion::{FilterSettings, MotionSample, rest};
 use crate::robot::Robot;
 use crate::robot::friction::{DoubleTanh, sign};
 
@@ -98,7 +98,10 @@ impl RegressorColumns {
     /// The processing of rows in which joints rest as these columns say.
     pub(super) fn with_rests(&self, settings: &FilterSettings) -> FilterSettings {
         FilterSettings {
-            rest_speed: self.rest_speed.clone(),
+            rest_speed: match settings.weighs_rests {
+                true => self.rest_speed.clone(),
+                false => Vec::new(),
+            },
             ..settings.clone()
         }
     }
@@ -144,7 +147,7 @@ impl RegressorColumns {
     }
 
     /// Channels per sample over all joints: their rows and measured torques; where joints rest, each times the joint's
-    /// weight, then the weights, and rows and torques without a weight.
+    /// weight, then 1 or 0 for each joint that moves or rests, and rows and torques without a weight.
     pub fn channels(&self) -> usize {
         let plain = self.offset(self.joints) + self.joints;
         match self.rest_speed.is_empty() {
@@ -156,8 +159,8 @@ impl RegressorColumns {
     /// Whether joint j rests in a row of filtered channels.
     #[inline]
     pub(crate) fn rests(&self, channels: &[f64], j: usize) -> bool {
-        let weight = self.offset(self.joints) + self.joints + j;
-        !self.rest_speed.is_empty() && rest::rests(channels[weight])
+        let moving = self.offset(self.joints) + self.joints + j;
+        !self.rest_speed.is_empty() && rest::rests(channels[moving])
     }
 
     /// Where rows and torques without a weight begin among the channels.
@@ -228,23 +231,24 @@ impl RegressorColumns {
         }
     }
 
-    /// Gives every joint's row and torque of one sample its weight. Without it they stay beside, of a joint that
-    /// `rests` near the sample.
-    pub fn weigh(&self, weight: &[f64], rests: &[bool], out: &mut [f64]) {
+    /// Gives every joint's row and torque of one sample its weight. Without it they stay beside, of a joint that rests
+    /// near the sample.
+    pub fn weigh(&self, sample: &MotionSample<'_>, out: &mut [f64]) {
         if self.rest_speed.is_empty() {
             return;
         }
         let n = self.joints;
         let torques = self.offset(n);
         let (weighted, rest) = out.split_at_mut(torques + n);
-        let (weights, plain) = rest.split_at_mut(n);
-        weights.copy_from_slice(&weight[..n]);
+        let (moving, plain) = rest.split_at_mut(n);
         let mut from = 0;
         for j in 0..n {
+            let (weight, rests) = (sample.weight[j], sample.rests[j]);
+            moving[j] = rest::movement(sample.v[j], self.rest_speed[j]);
             let to = from + self.row_width(j);
             for place in (from..to).chain([torques + j]) {
-                plain[place] = if rests[j] { weighted[place] } else { 0.0 };
-                weighted[place] *= weight[j];
+                plain[place] = if rests { weighted[place] } else { 0.0 };
+                weighted[place] *= weight;
             }
             from = to;
         }

@@ -129,7 +129,7 @@ const LEAST_SECONDS: f64 = 1.25;
 /// Andrews' automatic bandwidth for Bartlett's kernel, in blocks of `block_seconds`, from first-order autoregressions
 /// of each score, equal weights after normalisation. Sums begin at every block, so that it does not matter
 /// where the first one does.
-pub(super) fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize, block_seconds: f64) -> f64 {
+pub fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize, block_seconds: f64) -> f64 {
     let k = (NEIGHBOUR_SECONDS / block_seconds).round().max(1.0) as usize;
     let n = scores.len() as f64 / k as f64;
     let (mut c0, mut c1) = (DVector::<f64>::zeros(u), DVector::<f64>::zeros(u));

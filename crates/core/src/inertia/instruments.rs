@@ -223,7 +223,7 @@ fn fill(
         let torques = columns.offset(n);
         out[wide.offset(n)..][..n].copy_from_slice(&x[torques..torques + n]);
     });
-    wide.weigh(s.weight, s.rests, out);
+    wide.weigh(s, out);
 }
 
 thread_local! {

@@ -132,3 +132,70 @@ fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<Jump> {
     found.retain(|jump| jump.span[1] - jump.span[0] >= LIMITS.seconds);
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inertia::accumulate::Accumulator;
+    use crate::inertia::columns::{Own, RegressorColumns};
+    use crate::robot::tree::{Coordinate, Link, Tree, space};
+    use crate::robot::{JointKind, Robot};
+
+    /// Two prismatic joints across each other for 20 s, pushed from 8 to 10 s by a force on both or on one.
+    fn pushed(force: [f64; 2]) -> Vec<Jump> {
+        let link = |axis: [f64; 3], joint: usize| Link {
+            name: format!("link_{joint}"),
+            parent: joint.checked_sub(1),
+            rotation: space::UNTURNED,
+            origin: [0.0; 3],
+            axis,
+            kind: JointKind::Prismatic,
+            coordinate: Coordinate::Joint(joint),
+        };
+        let links = vec![link([1.0, 0.0, 0.0], 0), link([0.0, 1.0, 0.0], 1)];
+        let tree = Tree::new(links, 2, [0.0; 3]).unwrap();
+        let robot = Robot::of_tree(tree, vec!["a".into(), "b".into()], false, Vec::new());
+        let columns = RegressorColumns {
+            joints: 2,
+            shared: robot.parameters().len(),
+            own: vec![vec![Own::Viscous, Own::Coulomb]; 2],
+            known: vec![None, None],
+            rest_speed: Vec::new(),
+        };
+        let mut rows = Accumulator::new(columns.clone(), 0.05);
+        let mut out = vec![0.0; columns.channels()];
+        for k in 0..2000 {
+            let t = 0.01 * f64::from(k);
+            let v = [(0.9 * t).sin(), (1.3 * t).cos()];
+            let a = [0.9 * (0.9 * t).cos(), -1.3 * (1.3 * t).sin()];
+            let noise = 0.01 * (f64::from(k * 7919 % 1000) / 500.0 - 1.0);
+            let pushes = (8.0..10.0).contains(&t);
+            let tau: [f64; 2] = std::array::from_fn(|j| {
+                let push = if pushes { force[j] } else { 0.0 };
+                3.0 * a[j] + 2.0 * v[j] + 0.7 * v[j].signum() + noise + push
+            });
+            columns.fill(&robot, &[0.0; 2], &v, &a, &tau, &mut out);
+            rows.at(t);
+            rows.add(0, 0.01, &out);
+        }
+        jumps(&rows.finish()).unwrap()
+    }
+
+    #[test]
+    fn a_push_at_two_joints_is_found_with_its_times() {
+        let found = pushed([2.0, -1.0]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let [from, to] = found[0].span;
+        assert!(
+            (from - 8.0).abs() < 0.1 && (to - 10.0).abs() < 0.1,
+            "{found:?}"
+        );
+        assert_eq!(found[0].joints.len(), 2);
+    }
+
+    #[test]
+    fn what_one_joint_leaves_alone_is_no_push_and_a_quiet_log_has_none() {
+        assert!(pushed([2.0, 0.0]).is_empty());
+        assert!(pushed([0.0, 0.0]).is_empty());
+    }
+}

@@ -11,6 +11,7 @@ pub mod closed_loop;
 pub mod columns;
 mod condense;
 mod covariance;
+pub use covariance::bandwidth;
 pub mod encoder;
 pub mod essential;
 pub mod feasible;
@@ -72,7 +73,7 @@ pub fn accumulate_weighted<E>(
         columns.channels(),
         &|s, out| {
             columns.fill(robot, s.q, s.v, s.a, s.tau, out);
-            columns.weigh(s.weight, s.rests, out);
+            columns.weigh(s, out);
         },
         &mut |row| {
             let channels = match &mut weigher {

@@ -207,9 +207,11 @@ impl OneJoint<'_> {
     /// Whether the joint moves in each row.
     fn moves(&self, design: &Parallel) -> Result<Vec<bool>, MotionError> {
         let [v, _] = self.smoothed(design)?;
-        let of_joint = (self.joint, self.stretch.dt);
-        let weights = design.weights_of(self.inner(&v), of_joint, self.rest_speed);
-        let rows = design.run(&[&weights])?;
+        let speeds = self.inner(&v).iter();
+        let moving: Vec<f64> = speeds
+            .map(|v| rest::movement(*v, self.rest_speed))
+            .collect();
+        let rows = design.run(&[&moving])?;
         Ok(rows[0].iter().map(|m| !rest::rests(*m)).collect())
     }
 

@@ -209,20 +209,10 @@ impl Parallel {
 
     /// What each sample of a joint weighs that rests up to `rest_speed`, as in [`MotionSample`](super::MotionSample).
     pub fn weights(&self, stretch: &Stretch, joint: usize, rest_speed: f64) -> Vec<f64> {
-        self.weights_of(&stretch.v[joint], (joint, stretch.dt), rest_speed)
-    }
-
-    /// The same of the speeds of a joint, `dt` apart.
-    pub(super) fn weights_of(
-        &self,
-        v: &[f64],
-        (joint, dt): (usize, f64),
-        rest_speed: f64,
-    ) -> Vec<f64> {
         let cutoff = self.position.as_ref().map(|f| f.cutoff_hz(joint));
-        let reach = rest::response(cutoff, dt, self.differences.reach());
-        let mut out = vec![0.0; v.len()];
-        rest::weigh(v, (1, 0), rest_speed, reach, &mut out);
+        let reach = rest::response(cutoff, stretch.dt, self.differences.reach());
+        let mut out = vec![0.0; stretch.len()];
+        rest::weigh(&stretch.v[joint], (1, 0), rest_speed, reach, &mut out);
         out
     }
 

@@ -145,10 +145,10 @@ impl Robot {
 
     /// Inertia, viscous and Coulomb part of each coupling by these inertial parameters.
     pub fn coupling_parameters(&self, theta: &[f64]) -> Vec<[f64; 3]> {
-        let coupled = theta.get(self.groupings().len()..).unwrap_or_default();
-        let (numbers, _) = coupled.as_chunks::<3>();
-        let couplings = self.transmission().couplings().len();
-        numbers.iter().copied().take(couplings).collect()
+        match &self.0.form {
+            Form::Recursion(parameters) => parameters.of_couplings(theta),
+            Form::Inertia | Form::Report(_) => Vec::new(),
+        }
     }
 
     /// Writes the regressor of all standard parameters, n x [`Self::standard_parameters`]

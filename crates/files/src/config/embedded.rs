@@ -210,6 +210,7 @@ impl RobotFile {
         robot.notes.0.extend(taken);
         urdf::resolve(&mut robot, &document, folder)?;
         check::check(&robot, &document)?;
+        robot.settle_motors();
         Ok(robot)
     }
 

@@ -149,9 +149,35 @@ pub struct EffectSection {
     /// Joint; absent for what concerns all of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
+    /// Part of the estimated amplitude that the values below are, by the agreement between parts of the data; absent
+    /// where they are all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shrinkage: Option<f64>,
+    /// The user wanted it, whatever the data say.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub accepted_by_user: bool,
     /// Its numbers by key.
     #[serde(default)]
     pub parameters: BTreeMap<String, EffectParameter>,
+}
+
+/// A number as the data estimate it, beside a model that predicts with less of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Estimate {
+    /// Key of a parameter, or name of an effect and key.
+    pub name: String,
+    /// Joint; absent for what concerns all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// Value in `unit`.
+    pub value: f64,
+    /// Standard deviation in `unit`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std: Option<f64>,
+    /// Unit.
+    #[serde(default)]
+    pub unit: String,
 }
 
 /// Mass properties of a physically consistent link: keys as in `inertial` of
@@ -210,6 +236,8 @@ pub struct ModelFile {
     pub candidates: Vec<CandidateSection>,
     /// Effects added to the declared model.
     pub effects: Vec<EffectSection>,
+    /// The physical numbers, where the parameters and effects above predict with less of an effect than was estimated.
+    pub estimates: Vec<Estimate>,
     /// Physically consistent links that give the consistent parameters.
     pub links: Vec<LinkBody>,
     /// Inertia of the drives beside them, by joint [kg m^2 or kg].

@@ -14,7 +14,8 @@ use super::embedded::other_kind;
 use super::held_out::{Excesses, HeldOut};
 use super::limits::Limits;
 use super::model_file::{
-    Covariance, EffectSection, FrictionPrior, LinkBody, ModelFile, ModelProvenance, Parameter,
+    Covariance, EffectSection, Estimate, FrictionPrior, LinkBody, ModelFile, ModelProvenance,
+    Parameter,
 };
 use super::robot_file::{
     ControlSection, FilterSection, FrictionSection, NoiseSection, RobotFile, RobotSection,
@@ -61,6 +62,8 @@ pub(super) struct ModelToml {
     candidate: Vec<CandidateSection>,
     #[serde(default)]
     effect: Vec<EffectSection>,
+    #[serde(default)]
+    estimate: Vec<Estimate>,
     #[serde(default)]
     link: Vec<LinkBody>,
     #[serde(default)]
@@ -121,6 +124,7 @@ impl ModelFile {
             excesses: raw.excesses,
             candidates: raw.candidate,
             effects: raw.effect,
+            estimates: raw.estimate,
             links: raw.link,
             drive_inertia: raw.drive_inertia,
             provenance: raw.provenance.unwrap_or_default(),
@@ -216,6 +220,11 @@ impl ModelFile {
             text.push_str("\n# Effects added to the declared model.\n");
             let effects = BTreeMap::from([("effect", &self.effects)]);
             text.push_str(&toml::to_string(&effects).map_err(unwritable)?);
+        }
+        if !self.estimates.is_empty() {
+            text.push_str("\n# Estimates: the physical numbers. The parameters and effects above predict with a part of some effects, and are none.\n");
+            let estimates = BTreeMap::from([("estimate", &self.estimates)]);
+            text.push_str(&toml::to_string(&estimates).map_err(unwritable)?);
         }
         if !self.links.is_empty() {
             text.push_str("\n# Links that can exist and give the consistent parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");

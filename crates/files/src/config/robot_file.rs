@@ -130,6 +130,10 @@ pub struct FrictionSection {
     /// A constant torque offset per joint is fitted with the inertias.
     #[serde(default)]
     pub offset: bool,
+    /// Motors that turn several joints, by `gears` of [log], have Coulomb friction of their own, which is fitted with the
+    /// inertias; where absent they have where friction is fitted so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motors: Option<bool>,
     /// Starting values by joint.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub joint: BTreeMap<String, FrictionStart>,
@@ -337,12 +341,56 @@ impl RobotFile {
                     _ => Structure::Printed12,
                 },
             ),
-            ModelKind::Serial => self.robot.checked_serial(),
+            ModelKind::Serial => match self.friction.motors {
+                Some(true) => self.with_trains().checked_serial(),
+                _ => self.robot.checked_serial(),
+            },
             ModelKind::SingleJoint => Robot::single_joint(
                 self.robot.joint.as_deref().unwrap_or("q1"),
                 self.robot.kind.unwrap_or(JointKind::Revolute),
             ),
         }
+    }
+
+    /// Says whether motors that turn several joints have friction, where the file does not.
+    pub(super) fn settle_motors(&mut self) {
+        let fitted = self.friction.fitted_with_inertias
+            && self.friction_law() == FrictionLawKind::ViscousCoulomb
+            && self.robot.model == ModelKind::Serial
+            && self.robot.coupling.is_empty();
+        if self.friction.motors.is_none() && fitted && !self.trains().is_empty() {
+            self.friction.motors = Some(true);
+        }
+    }
+
+    /// The section of a robot whose motors turn two joints each by `gears`, as couplings.
+    fn with_trains(&self) -> RobotSection {
+        let mut section = self.robot.clone();
+        section.coupling.extend(self.trains());
+        section
+    }
+
+    /// Motors that turn two joints.
+    fn trains(&self) -> Vec<CouplingSection> {
+        let names = self.robot.chain_joints();
+        let train = |(row, ratios): (usize, &Vec<f64>)| {
+            let mut turned = (0..ratios.len()).filter(|j| ratios[*j] != 0.0);
+            let (Some(a), Some(b), None) = (turned.next(), turned.next(), turned.next()) else {
+                return None;
+            };
+            let (motor, other) = if b == row { (b, a) } else { (a, b) };
+            Some(CouplingSection {
+                motor: names.get(motor)?.clone(),
+                other: names.get(other)?.clone(),
+                ratio: ratios[other] / ratios[motor],
+            })
+        };
+        self.log
+            .gears
+            .iter()
+            .enumerate()
+            .filter_map(train)
+            .collect()
     }
 
     /// Joint names in the order of every vector.

@@ -9,11 +9,15 @@ use super::fault::{Episodes, FaultKind, LogFault};
 use super::judge::{Depth, LogJudge, Track};
 use super::lag;
 use super::words::ChannelRole;
+use cft_ident_core::number;
 
 /// A velocity that lags by more rows is filtered.
 const LAG_ROWS: f64 = 1.5;
 /// What the lag must explain: the part of the velocity left over without it, over that with it.
 const EXPLAINED: f64 = 1.3;
+/// Correlation from which on a velocity follows a position, and the share by which it may be off as filters make it.
+const FOLLOWS: f64 = 0.95;
+const OFF: f64 = 0.1;
 /// Noise over range below which a position is no measurement.
 const NOISELESS: f64 = 1e-8;
 
@@ -150,6 +154,16 @@ fn copies(judge: &LogJudge, draft: &mut FaultList) {
                 let remedy = "check the columns of the recorder; name the right ones in the [log] section of the robot file";
                 (Error, FaultKind::CopiedChannel, second, effect, remedy)
             }
+            (ChannelRole::Position, ChannelRole::Velocity)
+            | (ChannelRole::Velocity, ChannelRole::Position) => {
+                let effect = format!(
+                    "equals `{}`{sign} in every row: one of the two is not what it says, and a fit to it means nothing",
+                    name(first)
+                );
+                let remedy =
+                    "name the column of the position in the [log] section of the robot file";
+                (Error, FaultKind::CopiedChannel, second, effect, remedy)
+            }
             _ => {
                 let effect = format!("equals `{}`{sign} in every row", name(first));
                 let remedy = "check the columns of the recorder";
@@ -182,7 +196,17 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             continue;
         }
         if found.best < 0.7 {
+            other_joint(judge, (index, position), draft);
             continue;
+        }
+        if found.best > FOLLOWS && (found.times - 1.0).abs() > OFF {
+            let effect = format!(
+                "is {} times the derivative of `{of}`: its unit or gear is another, or the clock of the log runs at {} of its rate",
+                number::significant(found.times, 3),
+                number::significant(found.times.recip(), 3)
+            );
+            let remedy = "nothing where the columns are of different units; else give units, gears and `time_unit` in the [log] section of the robot file";
+            draft.whole(Warning, FaultKind::WrongSignOrOrder, track, effect, remedy);
         }
         let left = |correlation: f64| 1.0 - correlation * correlation;
         if found.rows.abs() > LAG_ROWS && left(found.now) > EXPLAINED * left(found.best) {
@@ -199,6 +223,26 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             draft.whole(Warning, FaultKind::Filter, track, effect, remedy);
         }
     }
+}
+
+/// Names the joint whose velocity a channel really is.
+fn other_joint(judge: &LogJudge, (index, own): (usize, usize), draft: &mut FaultList) {
+    let follows = |position: &&usize| {
+        let found = velocity::follows(judge.windows.iter(), **position, index);
+        **position != own && found.is_some_and(|found| found.best.abs() > FOLLOWS)
+    };
+    let Some(other) = judge.positions.iter().find(follows) else {
+        return;
+    };
+    let name = |place: usize| crate::log::escape(&judge.tracks[place].channel.name);
+    let effect = format!(
+        "is no derivative of `{}` but that of `{}`: velocities or positions are exchanged",
+        name(own),
+        name(*other)
+    );
+    let remedy = "name the right columns in the [log] section of the robot file";
+    let track = &judge.tracks[index];
+    draft.whole(Error, FaultKind::WrongSignOrOrder, track, effect, remedy);
 }
 
 /// Positions without any noise or grain are no measurement.

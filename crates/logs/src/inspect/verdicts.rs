@@ -218,7 +218,7 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             rows_text(rows, 1)
         )
     };
-    let remedy = "delete duplicate rows; if the clock is too coarse, log time with more digits";
+    let remedy = "delete duplicate rows; if the clock is too coarse and rows lie evenly, `rate_hz = ..` in [log] of the robot file, in place of `time`";
     draft.stretches(
         FaultKind::RepeatedTime,
         Error,

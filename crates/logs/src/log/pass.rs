@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::columns::{choose, time_of, unit_of};
 use super::content::{Content, RawBytes};
 use super::layout::Layout;
-use super::recording::{JointStates, MessageRows, format_of};
+use super::recording::{JoinedTopics, JointStates, MessageRows, format_of, has_none, of_topics};
 use super::rows::{LogRows, Strictness};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
@@ -368,6 +368,10 @@ pub(super) fn open(
     };
     let mut refused = None;
     // Without a robot there are no channels to look for.
+    if of_topics(layout) {
+        let rows = JoinedTopics::of_robot(files, layout)?;
+        return Ok(recorded(Box::new(rows), layout.clone(), None));
+    }
     if !layout.joints.is_empty() {
         match (MessageRows::open(files, layout), strictness) {
             (Ok((rows, layout)), _) => return Ok(recorded(Box::new(rows), layout, None)),
@@ -379,6 +383,11 @@ pub(super) fn open(
         Ok(states) => {
             let layout = choose(states.names(), layout);
             Ok(recorded(Box::new(states), layout, refused))
+        }
+        // any other messages are read by the paths of their numbers
+        Err(error) if has_none(&error) && layout.joints.is_empty() => {
+            let rows = JoinedTopics::of_all(files, layout.section.topic.as_deref())?;
+            Ok(recorded(Box::new(rows), layout.clone(), None))
         }
         Err(error) => Err(refused.unwrap_or(error)),
     }

@@ -128,6 +128,11 @@ impl RawReader {
         self.pass.rows.names()
     }
 
+    /// What a column is called by the names in the messages of a recording, where its own name is a path.
+    pub fn label(&self, column: usize) -> Option<&str> {
+        self.pass.rows.label(column)
+    }
+
     /// The unit that a column's name states.
     pub fn unit(&self, column: usize) -> Option<&str> {
         self.names().get(column).and_then(|name| unit_of(name))

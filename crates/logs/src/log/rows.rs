@@ -19,6 +19,11 @@ pub(super) trait LogRows: Debug + Send {
     /// Names of the columns.
     fn names(&self) -> &[String];
 
+    /// What a column is called by the names in the messages, where its own name is a path.
+    fn label(&self, _column: usize) -> Option<&str> {
+        None
+    }
+
     /// Goes on to the next row; its time, or `None` at the end.
     fn next(&mut self) -> Result<Option<Stamped>, LogError>;
 

@@ -310,6 +310,19 @@ mod tests {
     }
 
     #[test]
+    fn stretches_that_are_left_out_stand_beside_the_span_and_hide_it_from_nobody() {
+        let mut spec = parse("runs/a.csv@0..70%");
+        assert_eq!(spec.part().as_deref(), Some("0..70%"));
+        spec.leave_out = vec![[8.0, 10.5], [15.0, 16.0]];
+        assert!(!spec.leaves_out(7.99) && spec.leaves_out(8.0) && !spec.leaves_out(10.5));
+        let part = spec.part().unwrap();
+        assert_eq!(part, "0..70% without 8..10.5s, 15..16s");
+        assert_eq!(Span::read(&part), spec.span);
+        spec.span = Span::Whole;
+        assert_eq!(Span::read(&spec.part().unwrap()), Span::Whole);
+    }
+
+    #[test]
     fn a_plain_path_is_the_whole_log() {
         assert_eq!(parse("runs/a.csv"), LogSpec::whole("runs/a.csv"));
         assert_eq!(parse("user@host.csv"), LogSpec::whole("user@host.csv"));

@@ -50,6 +50,9 @@ pub struct JointColumns {
     /// Name of the joint in the messages of a recording, where it is another one.
     #[serde(skip)]
     pub in_messages: Option<String>,
+    /// Columns are named by paths in messages.
+    #[serde(skip)]
+    pub by_path: bool,
 }
 
 /// The joints, each with its columns, and what is to be looked at.
@@ -149,12 +152,17 @@ impl Mapping {
         }
         let [position, velocity, torque] = all;
         // words of a joint's name are no units
+        let short = without_common_head(&names);
         let beside = |columns: &[Option<LogColumn>]| -> Vec<Option<LogColumn>> {
-            let pairs = columns.iter().zip(&names);
+            let pairs = columns.iter().zip(names.iter().zip(&short));
             pairs
-                .map(|(column, joint)| {
+                .map(|(column, (joint, short))| {
                     let mut column = column.clone()?;
-                    column.name = without_joint(&column.name, joint);
+                    let bare = without_joint(&column.name, joint);
+                    column.name = match bare == column.name {
+                        true => without_joint(&bare, short),
+                        false => bare,
+                    };
                     Some(column)
                 })
                 .collect()
@@ -175,7 +183,11 @@ impl Mapping {
         let warm = temperatures(columns, &names);
         for (k, joint) in out.joints.iter_mut().enumerate() {
             joint.temperature = warm.as_ref().map(|columns| columns[k].clone());
-            let name = |column: &Option<LogColumn>| column.as_ref().map(|c| c.name.clone());
+            let name = |column: &Option<LogColumn>| {
+                let column = column.as_ref()?;
+                Some(column.path.as_ref().unwrap_or(&column.name).clone())
+            };
+            joint.by_path = q[k].as_ref().is_some_and(|column| column.path.is_some());
             (joint.position, joint.velocity, joint.torque) =
                 (name(&q[k]), name(&dq[k]), name(&tau[k]));
             joint.wrap = q[k].as_ref().and_then(|c| c.wrap);
@@ -316,6 +328,7 @@ fn plain(known: &Known) -> JointColumns {
         torque_unit: None,
         torque_scale: None,
         in_messages: None,
+        by_path: false,
     }
 }
 
@@ -375,8 +388,49 @@ fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Fitting<'a
     })
 }
 
-/// The family of a role that fits the joints best.
+/// The names of joints without the words that all of them begin with: `left/upper` is `upper`.
+fn without_common_head(joints: &[&str]) -> Vec<String> {
+    let all: Vec<Vec<Word>> = joints.iter().map(|joint| words(joint)).collect();
+    let common = |k: usize| {
+        let first = all.first().and_then(|spoken| spoken.get(k));
+        let same = |spoken: &Vec<Word>| {
+            spoken.len() > k + 1 && first.is_some_and(|first| spoken[k].text == first.text)
+        };
+        all.iter().all(same)
+    };
+    let head = (0..).take_while(|k| joints.len() > 1 && common(*k)).count();
+    let short = |(joint, spoken): (&&str, &Vec<Word>)| {
+        let from = spoken.get(head).map_or(0, |word| word.at.start);
+        joint[from..].to_owned()
+    };
+    // numbers alone are no names
+    let named = |spoken: &Vec<Word>| spoken[head..].iter().any(|word| word.number().is_none());
+    match all.iter().all(named) {
+        true => joints.iter().zip(&all).map(short).collect(),
+        false => joints.iter().map(|joint| (*joint).to_owned()).collect(),
+    }
+}
+
+/// The family of a role that fits the joints best, by their names, else by what is left of those without the words
+/// that all begin with.
 fn best<'a>(
+    columns: &'a [LogColumn],
+    role: ChannelRole,
+    commanded: bool,
+    joints: &[&str],
+    beside: Option<&str>,
+) -> Option<Taken<'a>> {
+    let whole = best_by(columns, role, commanded, joints, beside);
+    let short = without_common_head(joints);
+    let short: Vec<&str> = short.iter().map(String::as_str).collect();
+    if whole.as_ref().is_some_and(|taken| taken.how == How::Fits) || short == joints {
+        return whole;
+    }
+    let by_short = best_by(columns, role, commanded, &short, beside);
+    by_short.filter(|taken| taken.how == How::Fits).or(whole)
+}
+
+fn best_by<'a>(
     columns: &'a [LogColumn],
     role: ChannelRole,
     commanded: bool,

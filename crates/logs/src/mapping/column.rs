@@ -8,6 +8,8 @@ use crate::inspect::{ChannelRole, InspectedChannel};
 pub struct LogColumn {
     /// Its name; `#3` where it has none.
     pub name: String,
+    /// The path by which a robot file names it, where that is another than its name.
+    pub path: Option<String>,
     /// What it holds, commanded or measured.
     pub role: ChannelRole,
     /// It was commanded, or is of a machine that leads.
@@ -35,6 +37,7 @@ impl LogColumn {
         };
         Self {
             name: name.to_owned(),
+            path: None,
             role,
             commanded: is_command(&spoken),
             joint,

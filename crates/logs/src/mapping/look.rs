@@ -103,7 +103,8 @@ pub fn look(
             unit: log.unit(*k).map(str::to_owned),
             whole: is_whole(&sample[*k]),
             wrap: wrap_of(&sample[*k]),
-            ..LogColumn::named(&log.names()[*k])
+            path: log.label(*k).map(|_| log.names()[*k].clone()),
+            ..LogColumn::named(log.label(*k).unwrap_or(&log.names()[*k]))
         })
         .collect();
     if headerless {

@@ -1,6 +1,7 @@
 //! Tests of logs as they are read.
 
 mod log_bad_input;
+mod log_drawn;
 mod log_fixtures;
 mod log_formats;
 mod log_messages;

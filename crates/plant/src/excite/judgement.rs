@@ -39,6 +39,9 @@ pub struct Judgement {
     pub torques: String,
     /// Whether they are foreseen at all; where not, no limit of torque was checked.
     pub torques_foreseen: bool,
+    /// That sentence comes before all others.
+    #[serde(skip)]
+    pub torques_first: bool,
     /// What nobody looked at, in one sentence.
     pub not_checked: String,
     /// Expected deviations, friction known.
@@ -261,6 +264,7 @@ pub fn judge(
         limits: uses.iter().map(LimitUse::of).collect(),
         torques: machine.source.sentence(),
         torques_foreseen: machine.source.known(),
+        torques_first: machine.source.caution().is_some(),
         not_checked: machine.space.not_checked(way.is_some()),
         way: way.map(|way| way.iter().map(LimitUse::of).collect()),
         parameters: foresight.parameters,
@@ -376,6 +380,15 @@ impl LimitUse {
 }
 
 impl Judgement {
+    /// With what torques are foreseen and what nobody looked at, the more urgent first.
+    pub fn first_words(&self) -> [&str; 2] {
+        let (torques, not_checked) = (self.torques.as_str(), self.not_checked.as_str());
+        match self.torques_first {
+            true => [torques, not_checked],
+            false => [not_checked, torques],
+        }
+    }
+
     /// One sentence for each limit that the motion breaks.
     pub fn broken(&self) -> Vec<String> {
         let way = self.way.iter().flatten().map(|limit| (limit, true));

@@ -57,7 +57,7 @@ impl Document {
             })
         };
         let mut fields = Map::new();
-        fields.insert("schema".into(), format!("cft-ident/{command}/1").into());
+        fields.insert("schema".into(), schema_of(command).into());
         fields.insert("version".into(), env!("CARGO_PKG_VERSION").into());
         fields.insert("inputs".into(), value(serde_json::to_value(inputs))?);
         fields.insert("warnings".into(), warnings.into());
@@ -124,7 +124,7 @@ pub fn schema<T: JsonSchema>(command: &str) -> Value {
     let mut found = Value::from(generator.into_root_schema_for::<T>());
     found["title"] = format!("JSON document of `cft-ident {command}`").into();
     let mut properties = Map::new();
-    let version = format!("cft-ident/{command}/1");
+    let version = schema_of(command);
     properties.insert("schema".into(), json!({ "const": version }));
     properties.insert("version".into(), json!({"type": "string"}));
     properties.insert("inputs".into(), inputs.into());
@@ -155,6 +155,12 @@ fn with_null(schema: &mut Value) {
         Value::Array(items) => items.iter_mut().for_each(with_null),
         _ => {}
     }
+}
+
+/// Name and version of a command's document.
+fn schema_of(command: &str) -> String {
+    let version = if command == "diagnose" { 2 } else { 1 };
+    format!("cft-ident/{command}/{version}")
 }
 
 #[cfg(test)]

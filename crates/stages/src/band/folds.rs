@@ -281,12 +281,18 @@ fn add(
                 let offset = of.offset.then_some(1.0);
                 let added = of.added.iter().map(|column| column[k]);
                 let weight = weights[j][k];
-                let last = [residual[j][k], 1.0];
+                let last = [residual[j][k]];
                 let all = theta.chain(friction).chain(offset).chain(added).chain(last);
                 channels
                     .iter_mut()
                     .zip(all)
                     .for_each(|(channel, x)| channel.push(weight * x));
+                if let Some(moving) = channels.last_mut() {
+                    moving.push(match model.model.friction[j].jumps() {
+                        true => rest::movement(v[j], rest_speed[j]),
+                        false => 1.0,
+                    });
+                }
             }
         }
         for (j, (of, channels)) in joints.iter().zip(&channels).enumerate() {

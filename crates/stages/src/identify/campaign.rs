@@ -136,7 +136,7 @@ pub fn identify<E: From<IdentifyError>>(
     let given = ("model.toml", &model);
     let diagnosed = diagnose(machine, given, &roles, &settings.diagnose, control);
     let refined = match &diagnosed {
-        Ok(DiagnoseEnd::Diagnosed(found)) if !found.diagnosis.steps.is_empty() => {
+        Ok(DiagnoseEnd::Diagnosed(found)) if found.diagnosis.written().next().is_some() => {
             let refined = found.model(machine, &model);
             ended(StageEnd::Refined(&refined))?;
             Some(refined)

@@ -8,7 +8,7 @@ use super::contact::contacts;
 use super::control::{Control, Progress};
 use super::error::IdentifyError;
 use super::hold_out::{Held, hold_out, or_warning};
-use super::in_memory::{InMemory, read_each, read_wider};
+use super::in_memory::{InMemory, read_each};
 use super::known_friction::before_these;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
@@ -19,18 +19,19 @@ use super::repeated::each_row_once;
 use super::temperatures;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, Heard, LogRole, ParameterPrior, SelectionLimits,
-    Suspicion, Unknown, WIDE_TIMES, Watch, WideMotion,
+    self, Case, DiagnoseError, Diagnosis, FoundEffect, Heard, LogRole, ParameterPrior, Unknown,
+    Watch, Wishes,
 };
 use cft_ident_core::effect::{self, AugmentedModel, EffectNumber};
-use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch};
+use cft_ident_core::judge::NUMBERS;
+use cft_ident_core::motion::ParallelFilters;
 use cft_ident_core::robot::drive::JointDrive;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::candidates::CandidateSection;
-use cft_ident_files::config::model_file::{FrictionPrior, Parameter};
+use cft_ident_files::config::model_file::{Estimate, FrictionPrior, Parameter};
 use cft_ident_logs::log::DataRole;
 
 /// Logs by what they are for.
@@ -38,7 +39,7 @@ use cft_ident_logs::log::DataRole;
 pub struct DiagnoseLogs<'a> {
     /// Fitted.
     pub train: &'a [Log],
-    /// May veto a step; without any, blocks of the others are set aside for it.
+    /// Judge what is added, and are never fitted.
     pub veto: &'a [Log],
     /// Evaluated once, after everything is decided; without any, blocks are set aside.
     pub holdout: &'a [Log],
@@ -47,10 +48,10 @@ pub struct DiagnoseLogs<'a> {
 /// How effects are looked for.
 #[derive(Debug, Clone, Default)]
 pub struct DiagnoseSettings {
-    /// The given model stays within its covariance: finds payload, gain and tilt.
+    /// The inertial parameters of the given model stay: finds payload, gain and tilt.
     pub keep: bool,
-    /// What an effect must keep to be accepted.
-    pub limits: SelectionLimits,
+    /// What the user asks for besides.
+    pub wishes: Wishes,
     /// Effects of the user's own, tried beside those that are known.
     pub candidates: Vec<CandidateSection>,
     /// The friction of the given model stays as it is; its covariance is in the deviations of the others.
@@ -189,24 +190,19 @@ pub fn diagnose(
             _ => DataRole::HeldOut,
         });
     }
-    let wider = (each.as_slice(), WIDE_TIMES);
-    let wide = read_wider(machine, wider, &all, &in_memory.stretches, control)?;
-    let mut case = case(
+    let case = case(
         machine,
         (name, file, &before),
         given,
         &mut in_memory,
         (roles, settings),
     )?;
-    case.wide = wide_motion(machine, &case.stretches, wide)
-        .map_err(|error| IdentifyError::motion(name, error))?;
     let work = control.begin("search for effects", None);
     let tell = |heard: Heard| {
         control.tell(match heard {
             Heard::Begin(part, steps) => Progress::Begin(part, Some(steps)),
             Heard::Step => Progress::Advance(1),
             Heard::End => Progress::End,
-            Heard::Said(text) => Progress::Note(text),
         });
     };
     let watch = Watch {
@@ -217,9 +213,6 @@ pub fn diagnose(
     drop(work);
     let diagnosis = match found {
         Ok(diagnosis) => diagnosis,
-        Err(DiagnoseError::Channels(found)) => {
-            return Ok(DiagnoseEnd::DataFault(wrong_channel(machine, found)));
-        }
         Err(DiagnoseError::Interrupted) => return Err(IdentifyError::Interrupted),
         Err(error) => return Err(IdentifyError::Diagnose(error)),
     };
@@ -247,29 +240,17 @@ pub fn diagnose(
         filters: case.filters,
         cutoff_hz: case.cutoff_hz,
     };
-    let refined = found.model(machine, file);
-    let tried = hold_out(
-        machine,
-        (&refined, &found.diagnosis.model),
-        (train, &found.in_memory.inputs),
-        control,
-    );
-    found.held = or_warning(tried, &mut found.in_memory.warnings)?;
+    if found.diagnosis.written().next().is_some() {
+        let refined = found.model(machine, file);
+        let tried = hold_out(
+            machine,
+            (&refined, &found.diagnosis.model),
+            (train, &found.in_memory.inputs),
+            control,
+        );
+        found.held = or_warning(tried, &mut found.in_memory.warnings)?;
+    }
     Ok(DiagnoseEnd::Diagnosed(Box::new(found)))
-}
-
-/// The logs through a wider position filter, beside the stretches of a case; none where no log gives one.
-fn wide_motion(
-    machine: &LoggedRobot,
-    stretches: &[Stretch],
-    wide: Vec<Stretch>,
-) -> Result<Option<WideMotion>, MotionError> {
-    // the slowest log carries the lowest cut-off
-    let Some(dt) = wide.iter().map(|s| s.dt).max_by(f64::total_cmp) else {
-        return Ok(None);
-    };
-    let settings = machine.settings().widened(WIDE_TIMES, 1.0 / dt);
-    WideMotion::beside(stretches, wide, &settings).map(Some)
 }
 
 /// Channels that are no torques, as a fault: gains that differ look like friction and loads.
@@ -322,11 +303,10 @@ fn case(
     let open = open(machine, file, &given, hold);
     let rate = filters.row_rate_hz();
     let alone = moved_alone(&given, &in_memory.stretches, &roles);
-    // what is held is known so many times better than these data can say; its own spread, which placebos draw and
-    // deviations hold, stays that of its covariance
+    // what is held is known so many times better than these data can say; its own spread stays that of its covariance
     let firm = if hold { HELD } else { 1.0 };
     let prior = ParameterPrior {
-        information: information(before, &given, &open, (settings.keep, hold), &alone),
+        information: information(before, &given, &open, hold, &alone),
         centre: refined(before, name)?,
         rows_per_independent: firm * (rate / (2.0 * processing.cutoff_hz)).max(1.0),
     };
@@ -336,7 +316,6 @@ fn case(
         open,
         stretches: std::mem::take(&mut in_memory.stretches),
         roles,
-        wide: None,
         filters,
         cutoff_hz: processing.cutoff_hz,
         rest_speed: in_memory.rest_speed.clone(),
@@ -348,7 +327,8 @@ fn case(
         keep: settings.keep,
         without: Vec::new(),
         own: own_laws(&settings.candidates, &machine.robot)?,
-        limits: settings.limits,
+        wishes: settings.wishes.clone(),
+        numbers: NUMBERS,
     })
 }
 
@@ -359,73 +339,60 @@ fn drives(machine: &LoggedRobot) -> Vec<JointDrive> {
     declared.map(Option::unwrap_or_default).collect()
 }
 
-/// A torque channel that the model knows otherwise, as a fault.
-fn wrong_channel(machine: &LoggedRobot, found: Suspicion) -> DataFault {
-    let names = machine.robot.joint_names();
-    let (joint, effect, remedy) = match found {
-        Suspicion::Turned { joint } => (
-            joint,
-            format!(
-                "the torque of {} has the other sign than the model's",
-                names[joint]
-            ),
-            "set `torque_scale` of the joint to its negative in [log], or correct the log",
-        ),
-        Suspicion::Exchanged { joint, with } => (
-            joint,
-            format!(
-                "the torques of {} and {} have changed places",
-                names[joint], names[with]
-            ),
-            "exchange the two torque columns in [log]",
-        ),
-    };
-    DataFault {
-        kind: effect::wrong_sign_or_order::ENTRY.name.to_owned(),
-        channel: Some(names[joint].clone()),
-        effect,
-        remedy: remedy.to_owned(),
-    }
-}
-
 impl Diagnosed {
-    /// Parameters of an accepted effect with their standard deviations.
-    pub fn told(&self, machine: &LoggedRobot, effect: usize) -> Vec<EffectNumber> {
-        let added = &self.diagnosis.model.effects[effect];
-        let joint = added.place.joint().unwrap_or(0);
-        let covariance = self.diagnosis.covariance_of(effect);
-        added.numbers(
-            &machine.robot,
-            machine.file.torque_unit(joint),
-            Some(&covariance),
-        )
+    /// Estimated parameters of an effect with their standard deviations.
+    pub fn told(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
+        let effect = &step.estimate;
+        let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+        let mut numbers = effect.numbers(&machine.robot, unit, Some(&step.covariance));
+        // a shape stands on a grid
+        let on_grid = |n: &&mut EffectNumber| effect.law.shape.contains(&n.key.as_str());
+        numbers
+            .iter_mut()
+            .filter(on_grid)
+            .for_each(|n| n.std = None);
+        numbers
     }
 
     /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
     pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
         let diagnosis = &self.diagnosis;
-        if diagnosis.steps.is_empty() {
+        if diagnosis.written().next().is_none() {
             return file.clone();
         }
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
         model.forget_consistent();
         model.friction_prior.clone_from(&self.friction_prior);
+        // beside a part of an effect the declared numbers take up the rest, and are no estimates
+        let whole = self.is_whole();
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
         let mut undetermined = Vec::new();
         for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
             if self.hold_friction && matches!(unknown, Unknown::Friction { .. }) {
                 continue;
             }
-            let Some((name, joint, value)) = self.fitted(*unknown) else {
+            let Some((name, joint, value)) = fitted(&diagnosis.model, *unknown) else {
                 continue;
             };
             let there = |p: &&mut Parameter| p.name == name && p.joint == joint;
             let Some(p) = model.parameters.iter_mut().find(there) else {
                 continue;
             };
-            let variance = diagnosis.covariance[(i, i)];
-            let found = if variance < 0.0 { 0.0 } else { variance.sqrt() };
+            let found = diagnosis.covariance[(i, i)].max(0.0).sqrt();
+            if !whole {
+                let estimate = fitted(&diagnosis.estimates, *unknown).map_or(value, |f| f.2);
+                model.estimates.push(Estimate {
+                    name,
+                    joint,
+                    value: estimate,
+                    std: Some(found),
+                    unit: p.unit.clone(),
+                });
+                (p.value, p.std) = (value, None);
+                undetermined.push(p.key());
+                continue;
+            }
             match put(p, value, found) {
                 Some(factor) => {
                     widened.push(factor);
@@ -443,10 +410,7 @@ impl Diagnosed {
         for (joint, std) in joints.zip(&diagnosis.residual_std) {
             model.residual_std.insert(joint.clone(), *std);
         }
-        let effects = diagnosis.model.effects.iter().enumerate();
-        model.effects = effects
-            .map(|(i, added)| in_file(added, machine, &self.told(machine, i)))
-            .collect();
+        self.put_effects(machine, file, &mut model);
         let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
         let known = file.candidates.iter().chain(&self.candidates);
         for candidate in known.filter(of_model) {
@@ -461,34 +425,78 @@ impl Diagnosed {
         model
     }
 
-    /// Name, joint and value of an unknown that model files hold; none for those of effects.
-    fn fitted(&self, unknown: Unknown) -> Option<(String, Option<String>, f64)> {
-        let fitted = &self.diagnosis.model.model;
-        let robot = &fitted.robot;
-        let (name, joint, value) = match unknown {
-            Unknown::Theta(k) => (
-                robot.parameters()[k].name.to_string(),
-                None,
-                fitted.theta[k],
-            ),
-            Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
-            Unknown::Friction { joint, k } => match &fitted.friction[joint] {
-                JointFriction::None => return None,
-                JointFriction::DoubleTanh(law) => (
-                    DoubleTanh::NAMES[k].to_owned(),
-                    Some(joint),
-                    law.parameters()[k],
-                ),
-                JointFriction::ViscousCoulomb(law) => (
-                    ViscousCoulomb::NAMES[k].to_owned(),
-                    Some(joint),
-                    [law.viscous, law.coulomb][k],
-                ),
-            },
-            Unknown::Linear { .. } | Unknown::Shape { .. } => return None,
-        };
-        Some((name, joint.map(|j| robot.joint_names()[j].clone()), value))
+    /// Whether every effect is written as it was estimated.
+    fn is_whole(&self) -> bool {
+        let model = &self.diagnosis.model;
+        let mut written = self.diagnosis.written();
+        written.all(|s| {
+            s.written
+                .is_some_and(|at| model.effects[at].linear == s.estimate.linear)
+        })
     }
+
+    /// Effects that the given model had, and those that were found.
+    fn put_effects(&self, machine: &LoggedRobot, file: &ModelFile, model: &mut ModelFile) {
+        model.effects.clone_from(&file.effects);
+        model.estimates.extend(file.estimates.iter().cloned());
+        for step in self.diagnosis.written() {
+            let Some(effect) = step
+                .written
+                .and_then(|at| self.diagnosis.model.effects.get(at))
+            else {
+                continue;
+            };
+            let estimated = self.told(machine, step);
+            let whole = effect.linear == step.estimate.linear;
+            let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+            let numbers = match whole {
+                true => estimated.clone(),
+                false => effect.numbers(&machine.robot, unit, None),
+            };
+            let mut section = in_file(effect, machine, &numbers);
+            section.accepted_by_user = step.accepted_by_user;
+            if !whole {
+                section.shrinkage = Some(step.shrinkage);
+                let own = estimated.into_iter().filter(|n| n.std.is_some());
+                model.estimates.extend(own.map(|n| Estimate {
+                    name: format!("{} {}", section.name, n.key),
+                    joint: section.joint.clone(),
+                    value: n.value,
+                    std: n.std,
+                    unit: n.unit,
+                }));
+            }
+            model.effects.push(section);
+        }
+    }
+}
+
+/// Name, joint and value of an unknown that model files hold.
+fn fitted(model: &AugmentedModel, unknown: Unknown) -> Option<(String, Option<String>, f64)> {
+    let fitted = &model.model;
+    let robot = &fitted.robot;
+    let (name, joint, value) = match unknown {
+        Unknown::Theta(k) => (
+            robot.parameters()[k].name.to_string(),
+            None,
+            fitted.theta[k],
+        ),
+        Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
+        Unknown::Friction { joint, k } => match &fitted.friction[joint] {
+            JointFriction::None => return None,
+            JointFriction::DoubleTanh(law) => (
+                DoubleTanh::NAMES[k].to_owned(),
+                Some(joint),
+                law.parameters()[k],
+            ),
+            JointFriction::ViscousCoulomb(law) => (
+                ViscousCoulomb::NAMES[k].to_owned(),
+                Some(joint),
+                [law.viscous, law.coulomb][k],
+            ),
+        },
+    };
+    Some((name, joint.map(|j| robot.joint_names()[j].clone()), value))
 }
 
 /// Gives a parameter the value and the standard deviation that were found, and says by how much the

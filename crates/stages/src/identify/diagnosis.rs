@@ -10,24 +10,29 @@ use super::logged_robot::LoggedRobot;
 use super::separate::separating_command;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
-    AcceptedEffect, Candidate, Dependence, Errors, JointChange, LogRole, Signal, SplitErrors,
-    StepStatus, Turn,
+    Dependence, Errors, FoundEffect, FrictionChange, JointChange, LeftCandidate, LogRole, Signal,
+    SplitErrors, StepStatus,
 };
-use cft_ident_core::effect::disturbance;
 use cft_ident_core::motion::Summary;
 
 /// A diagnosis, or the fault of the data that comes before any physics.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DiagnosisResult {
     pub verdict: DiagnosisVerdict,
-    /// Effects in the order in which they were added.
+    /// Effects that gain on blocks left out, in the order in which they were found.
     pub steps: Vec<DiagnosisStep>,
-    /// How the search came to them, turn by turn: what was added, dropped, or put in the place of others.
-    pub path: Vec<SearchTurn>,
     /// Errors of the model as it was given.
     pub before: Option<ErrorsBySide>,
-    /// Errors of the refined model.
+    /// Errors of the judge's model, before held-out data had a say: the figure without bias.
     pub after: Option<ErrorsBySide>,
+    /// Errors of the model that is written, where held-out data took an effect out of it: selected, and so optimistic.
+    pub written: Option<ErrorsBySide>,
+    /// Whether held-out data took an effect out of what is written.
+    pub holdout_had_a_say: bool,
+    /// What the parts of the data are.
+    pub blocks: Option<BlocksResult>,
+    /// Friction that changes from a time on.
+    pub changes: Vec<ChangeResult>,
     pub unexplained: Vec<UnexplainedResult>,
     /// Signals that the residual of a joint with structure depends on, the strongest of each joint first.
     pub dependence: Vec<ResidualDependence>,
@@ -36,9 +41,6 @@ pub struct DiagnosisResult {
     /// Blocks of the logs that were not fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub set_aside: Option<Vec<BlockAside>>,
-    /// Disturbances that were cut out of the logs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub episodes: Option<Vec<EpisodeResult>>,
     pub processing: Option<Summary>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<DataFault>,
@@ -70,27 +72,32 @@ pub struct DiagnosisStep {
     /// Candidates that these data do not separate from it, best first.
     #[schemars(length(max = 3))]
     pub alternatives: Vec<&'static str>,
-    /// How firm its name is.
+    /// How firm it is.
     pub status: StepStatus,
-    /// Whether the status is `assured`.
-    pub assured: bool,
+    /// Whether it stands in the model that is written.
+    pub written: bool,
+    /// Factor of its amplitude that the agreement between parts of the data gives, 0..1.
+    pub shrinkage: f64,
+    /// Amplitude by part of the data: of its largest coefficient.
+    pub parts: Vec<f64>,
+    /// Gain on blocks left out, joint by joint: squared error in units of the joint's residual variance.
+    pub gain: Vec<JointGain>,
+    pub accepted_by_user: bool,
     /// A command whose motion would separate it from its alternatives.
     pub separate_command: Option<String>,
     /// What would separate it, in words.
     pub separate_by: Option<&'static str>,
-    /// Share of its torque that no declared term can take.
+    /// Always null since diagnose/2.
     pub unique_share: Option<f64>,
-    /// Positive is an improvement.
+    /// Always null since diagnose/2.
     pub delta_bic: Option<f64>,
-    /// Fraction of the cross-validated squared error that it removes.
+    /// Fraction of the squared error of blocks left out that it removes.
     pub cv_gain: Option<f64>,
-    pub effective_samples: Option<f64>,
-    /// Chance that a model which lacks nothing, measured and processed as these logs were, shows a candidate as good
-    /// as this one or better, among all candidates: by placebos.
+    /// Always null since diagnose/2.
     pub p_value: Option<f64>,
-    /// Mean relative error on held-out data, before the step.
+    /// Mean relative error on held-out data without it, the others kept and refitted.
     pub holdout_before: Option<f64>,
-    /// The same after it.
+    /// The same with it.
     pub holdout_after: Option<f64>,
     /// The mean over the joints rises, or the error of a joint by its whole interval.
     pub holdout_worsened: bool,
@@ -98,36 +105,35 @@ pub struct DiagnosisStep {
     pub joints: Vec<JointChange>,
 }
 
-/// One turn of the search.
+/// What a joint gains.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct SearchTurn {
-    pub action: TurnAction,
-    /// Effects that came, each with its place.
-    pub come: Vec<String>,
-    /// Effects that went.
-    pub gone: Vec<String>,
+pub struct JointGain {
+    pub joint: String,
+    pub value: f64,
+    pub se: f64,
 }
 
-/// What a turn of the search does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum TurnAction {
-    Added,
-    /// It does not stand beside the others, or its numbers do not hold with them.
-    Dropped,
-    /// Others say the same with fewer numbers, or say more.
-    Replaced,
+/// How the data were divided.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct BlocksResult {
+    pub parts: usize,
+    /// With fewer, nothing can be confirmed.
+    pub parts_needed: usize,
+    /// Least length of a block \[s\].
+    pub block_s: f64,
 }
 
-impl From<&Turn> for SearchTurn {
-    fn from(turn: &Turn) -> Self {
-        let (action, come, gone) = match turn.clone() {
-            Turn::Added(effect) => (TurnAction::Added, vec![effect], Vec::new()),
-            Turn::Dropped(effect) => (TurnAction::Dropped, Vec::new(), vec![effect]),
-            Turn::Replaced { gone, come } => (TurnAction::Replaced, come, gone),
-        };
-        SearchTurn { action, come, gone }
-    }
+/// Friction of a joint that changes from a time on.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ChangeResult {
+    pub joint: String,
+    pub log: String,
+    /// By the log's own clock \[s\].
+    pub at_s: f64,
+    /// Change at the joint's rms speed, in the unit of its torque.
+    pub by: f64,
+    /// Gain on blocks left out over its standard error.
+    pub certainty: f64,
 }
 
 /// One number of an effect.
@@ -176,14 +182,12 @@ pub struct CandidateResult {
     pub effect: &'static str,
     pub joint: Option<String>,
     pub family: &'static str,
-    /// Fraction of the cross-validated squared error that it would remove.
+    /// Fraction of the squared error of blocks left out that it would remove.
     pub score: Option<f64>,
+    /// Always null since diagnose/2.
     pub unique_share: Option<f64>,
-    pub delta_bic: Option<f64>,
-    pub p_value: Option<f64>,
+    /// Whether it stands in the model that is written.
     pub accepted: bool,
-    /// Whether the data tell it from chance.
-    pub significant: bool,
     /// Why not; empty where accepted.
     pub reason: String,
 }
@@ -198,21 +202,6 @@ pub struct BlockAside {
     /// By the log's own clock \[s\].
     pub from_s: f64,
     pub to_s: f64,
-}
-
-/// A disturbance that was cut out.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct EpisodeResult {
-    pub effect: &'static str,
-    pub family: &'static str,
-    /// The joint on which it stands out most.
-    pub joint: String,
-    pub log: String,
-    /// By the log's own clock \[s\].
-    pub from_s: f64,
-    pub to_s: f64,
-    /// Squared residual over the usual one.
-    pub over: f64,
 }
 
 /// A list of keys and values as a map, in its order.
@@ -238,14 +227,16 @@ impl DataFault {
         DiagnosisResult {
             verdict: DiagnosisVerdict::DataFault,
             steps: Vec::new(),
-            path: Vec::new(),
             before: None,
             after: None,
+            written: None,
+            holdout_had_a_say: false,
+            blocks: None,
+            changes: Vec::new(),
             unexplained: Vec::new(),
             dependence: Vec::new(),
             candidates: Vec::new(),
             set_aside: None,
-            episodes: None,
             processing: None,
             faults: vec![self.clone()],
             setup: Vec::new(),
@@ -257,10 +248,9 @@ impl Diagnosed {
     /// Whether there is a verdict of effects, of nothing, or of structure without a name.
     pub fn verdict(&self) -> DiagnosisVerdict {
         let diagnosis = &self.diagnosis;
-        let named = |step| diagnosis.explained(step);
-        if diagnosis.steps.iter().any(named) {
+        if diagnosis.written().next().is_some() {
             DiagnosisVerdict::EffectsFound
-        } else if diagnosis.structured() {
+        } else if diagnosis.structured() || !diagnosis.determined || !diagnosis.long_enough() {
             DiagnosisVerdict::UnexplainedResidual
         } else {
             DiagnosisVerdict::NothingMissing
@@ -271,8 +261,6 @@ impl Diagnosed {
     pub fn result(&self, machine: &LoggedRobot) -> DiagnosisResult {
         let d = &self.diagnosis;
         let names = machine.robot.joint_names();
-        let added = d.steps.iter().map(|s| &s.candidate);
-        let candidates = added.chain(&d.candidates);
         let left = d
             .unexplained
             .iter()
@@ -291,35 +279,41 @@ impl Diagnosed {
             from_s: a.from_s,
             to_s: a.to_s,
         });
-        let episodes = d.disturbances.iter().map(|e| EpisodeResult {
-            effect: disturbance::ENTRY.name,
-            family: disturbance::ENTRY.family().name(),
-            joint: names[e.joint].clone(),
-            log: self.logs[e.log].clone(),
-            from_s: e.from_s,
-            to_s: e.to_s,
-            over: e.over,
-        });
+        let change = |c: &FrictionChange| ChangeResult {
+            joint: names[c.joint].clone(),
+            log: self.logs[c.log].clone(),
+            at_s: c.at_s,
+            by: c.by,
+            certainty: c.certainty,
+        };
+        let found = d.steps.iter().map(|s| found_candidate(machine, s));
+        let others = d.candidates.iter().map(|c| candidate(machine, c));
         DiagnosisResult {
             verdict: self.verdict(),
             steps: d.steps.iter().map(|s| self.step(machine, s)).collect(),
-            path: d.path.iter().map(SearchTurn::from).collect(),
             before: Some((&d.before).into()),
             after: Some((&d.after).into()),
+            written: d.selected.as_ref().map(ErrorsBySide::from),
+            holdout_had_a_say: d.holdout_had_a_say(),
+            blocks: Some(BlocksResult {
+                parts: d.parts,
+                parts_needed: d.parts_needed,
+                block_s: d.block_s,
+            }),
+            changes: d.changes.iter().map(change).collect(),
             unexplained: left.collect(),
             dependence: d.dependence.iter().map(|d| dependence(names, d)).collect(),
-            candidates: candidates.map(|c| candidate(machine, c)).collect(),
+            candidates: found.chain(others).collect(),
             set_aside: Some(aside.collect()),
-            episodes: Some(episodes.collect()),
             processing: Some(self.in_memory.summary.clone()),
             faults: Vec::new(),
             setup: Vec::new(),
         }
     }
 
-    fn step(&self, machine: &LoggedRobot, step: &AcceptedEffect) -> DiagnosisStep {
-        let (d, robot) = (&self.diagnosis, &machine.robot);
-        let effect = &d.model.effects[step.effect];
+    fn step(&self, machine: &LoggedRobot, step: &FoundEffect) -> DiagnosisStep {
+        let robot = &machine.robot;
+        let effect = &step.estimate;
         let number = |t: cft_ident_core::effect::EffectNumber| {
             let found = EffectValueFound {
                 value: t.value,
@@ -329,28 +323,40 @@ impl Diagnosed {
             };
             (t.key, found)
         };
-        let parameters = self.told(machine, step.effect).into_iter().map(number);
-        let alternatives: Vec<&str> = step.alternatives.iter().map(|c| c.effect.name()).collect();
+        let alternatives: Vec<&str> = step.alternatives.iter().map(|c| c.name()).collect();
         let alike = !alternatives.is_empty();
-        let score = step.candidate.score.as_ref();
+        // the coefficient that says most
+        let size = |k: &usize| effect.linear[*k].abs();
+        let largest = (0..effect.linear.len()).max_by(|a, b| size(a).total_cmp(&size(b)));
+        let part = |p: &Vec<f64>| p.get(largest?).copied();
+        let gains = robot.joint_names().iter().zip(&step.gain.joints);
         DiagnosisStep {
             effect: effect.name(),
             family: effect.family().name(),
             joint: effect.place.name(robot),
-            parameters: parameters.collect(),
+            parameters: self.told(machine, step).into_iter().map(number).collect(),
             alternatives,
-            status: d.status(step),
-            assured: d.status(step) == StepStatus::Assured,
+            status: step.status,
+            written: step.written.is_some(),
+            shrinkage: step.shrinkage,
+            parts: step.parts.iter().filter_map(part).collect(),
+            gain: gains
+                .map(|(joint, [value, se])| JointGain {
+                    joint: joint.clone(),
+                    value: *value,
+                    se: *se,
+                })
+                .collect(),
+            accepted_by_user: step.accepted_by_user,
             separate_command: alike.then(|| separating_command(effect, robot)).flatten(),
             separate_by: alike.then_some(effect.law.entry.separate_by),
-            unique_share: score.map(|s| s.unique_share),
-            delta_bic: score.map(|s| s.delta_bic),
-            cv_gain: score.map(|s| s.cv_gain),
-            effective_samples: score.map(|s| s.effective_rows),
-            p_value: step.candidate.placebo_p_value,
+            unique_share: None,
+            delta_bic: None,
+            cv_gain: Some(step.share),
+            p_value: None,
             holdout_before: step.holdout.map(|h| h[0]),
             holdout_after: step.holdout.map(|h| h[1]),
-            holdout_worsened: step.worsens(),
+            holdout_worsened: step.joints.iter().any(|j| j.worsened),
             joints: step.joints.clone(),
         }
     }
@@ -386,18 +392,36 @@ pub fn signal_words(names: &[String], own: usize, signal: Signal) -> String {
     }
 }
 
-fn candidate(machine: &LoggedRobot, c: &Candidate) -> CandidateResult {
-    let score = c.score.as_ref();
+fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult {
+    let reason = match (step.written, step.status) {
+        (Some(_), _) => "",
+        (None, StepStatus::Seen) => "the parts of the data do not agree on its amplitude",
+        (None, _) if step.vetoed() => "it makes a joint worse on held-out data",
+        (None, _) => "it can be measured, and the parts of the data do not agree enough",
+    };
     CandidateResult {
-        effect: c.effect.name(),
-        joint: c.effect.place.name(&machine.robot),
-        family: c.effect.family().name(),
-        score: score.map(|s| s.cv_gain),
-        unique_share: score.map(|s| s.unique_share),
-        delta_bic: score.map(|s| s.delta_bic),
-        p_value: score.map(|s| s.p_value),
-        accepted: c.accepted,
-        significant: c.significant,
+        effect: step.estimate.name(),
+        joint: step.estimate.place.name(&machine.robot),
+        family: step.estimate.family().name(),
+        score: Some(step.share),
+        unique_share: None,
+        accepted: step.written.is_some(),
+        reason: reason.to_owned(),
+    }
+}
+
+fn candidate(machine: &LoggedRobot, c: &LeftCandidate) -> CandidateResult {
+    let family = c
+        .effect
+        .as_ref()
+        .map_or(c.law.entry.family(), |e| e.family());
+    CandidateResult {
+        effect: c.law.entry.name,
+        joint: c.place.name(&machine.robot),
+        family: family.name(),
+        score: c.score,
+        unique_share: None,
+        accepted: false,
         reason: c.reason.clone(),
     }
 }

@@ -45,6 +45,11 @@ pub enum IdentifyError {
     /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
     #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
     Refused { log: String, fault: Box<LogFault> },
+    /// A robot whose last link has no place for a body.
+    #[error(
+        "{model}: a body on this robot shows in too few numbers to be told by itself; look for it with `cft-ident diagnose --keep`"
+    )]
+    NoPayload { model: String },
     /// Positions where a joint of the robot cannot stand.
     #[error(
         "positions of {joint} run over {positions} {unit}, and its limits are {limits}: this is a log of another robot, or in another unit or with another zero; give the log of this robot, or correct [log.joint] or [limits] of its file"
@@ -199,6 +204,7 @@ impl IdentifyError {
             | Self::Impossible { .. }
             | Self::Refused { .. }
             | Self::OtherRobotLog { .. }
+            | Self::NoPayload { .. }
             | Self::SameRows { .. }
             | Self::Motion { .. }
             | Self::TooManyRows { .. }

@@ -41,36 +41,6 @@ pub fn read_whole(
     )
 }
 
-/// The motion of logs that were read before, again with `settings`, each position cut-off so many `times` as high; nothing of logs
-/// whose positions are not filtered.
-///
-/// # Errors
-/// A log that cannot be read.
-pub(super) fn read_wider(
-    machine: &LoggedRobot,
-    (settings, times): (&[FilterSettings], f64),
-    logs: &[Log],
-    before: &[Stretch],
-    control: &Control,
-) -> Result<Vec<Stretch>, IdentifyError> {
-    let n = machine.robot.joints();
-    let mut all = Vec::new();
-    for (index, (log, settings)) in logs.iter().zip(settings).enumerate() {
-        let of_log = before.iter().find(|s| s.log == index);
-        let Some(dt) = of_log.map(|s| s.dt).filter(|_| settings.q_order > 0) else {
-            continue;
-        };
-        let wide = settings.widened(times, 1.0 / dt);
-        let mut open = machine.open(log, control)?;
-        let (mut found, _) = stretches(index, n, &wide, &mut |block| open.read(block))
-            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
-        open.count_run_time(&mut found);
-        machine.put_temperatures(log, open.origin(), &mut found)?;
-        all.extend(found);
-    }
-    Ok(all)
-}
-
 /// The same as [`read_whole`], each log with the settings in its place.
 pub(super) fn read_each(
     machine: &LoggedRobot,

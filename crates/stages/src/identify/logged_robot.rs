@@ -461,6 +461,7 @@ impl LoggedRobot {
             trim_s: f.trim_s,
             // each log says when its joints rest
             rest_speed: Vec::new(),
+            weighs_rests: true,
         }
     }
 

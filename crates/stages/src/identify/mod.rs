@@ -50,6 +50,7 @@ mod open_log;
 mod open_loop;
 mod own_settings;
 mod passes;
+mod payload;
 mod position_cutoff;
 mod prior;
 mod reduce;
@@ -104,6 +105,7 @@ pub use motion_fit::MotionFit;
 pub use open_log::OpenLog;
 pub use open_loop::open_loop;
 pub use passes::SimulatedLoop;
+pub use payload::{GainOff, LeftOfJoint, Number95, Payload, PayloadReading, payload};
 pub use position_cutoff::PositionCutoff;
 pub use reduce::reduce;
 pub use reduced::{

@@ -94,6 +94,8 @@ pub(super) fn in_file(
     EffectSection {
         name: effect.name().to_owned(),
         joint: effect.place.name(&machine.robot),
+        shrinkage: None,
+        accepted_by_user: false,
         parameters: told
             .iter()
             .map(|t| {
@@ -121,6 +123,7 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
         excesses: None,
         candidates: Vec::new(),
         effects: Vec::new(),
+        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         provenance: ModelProvenance {

@@ -109,14 +109,13 @@ pub(super) fn moved_alone(
 /// what is looked for here, too.
 const FRICTION_DOUBT: f64 = 3.0;
 
-/// Inverse covariance of what is known before: the friction stage's, and with `keep` all of it. The
-/// friction of a joint that is `alone` in a log of its own, the others stationary, is fitted from that log:
+/// Inverse covariance of what is known before: the friction stage's. The friction of a joint that is `alone` in a log of its own, the others stationary, is fitted from that log:
 /// what the friction stage made of it would count twice, and without the effect that is looked for.
 pub(super) fn information(
     file: &ModelFile,
     given: &AugmentedModel,
     open: &FreeParameters,
-    (keep, hold_friction): (bool, bool),
+    hold_friction: bool,
     alone: &[bool],
 ) -> DMatrix<f64> {
     let model = &given.model;
@@ -125,22 +124,18 @@ pub(super) fn information(
     if hold_friction {
         with_deviations(file, model, &mut covariance);
     }
-    let mut wanted = vec![keep; size];
+    let mut wanted = vec![false; size];
     let mut at = model.theta.len();
     for ((law, open), alone) in model.friction.iter().zip(&open.friction).zip(alone) {
         for (k, open) in open.iter().enumerate() {
-            let of_stage = matches!(law, JointFriction::DoubleTanh(_)) && (keep || !alone);
+            let of_stage = matches!(law, JointFriction::DoubleTanh(_)) && !alone;
             if of_stage || hold_friction {
                 wanted[at + k] = *open;
             }
         }
         at += law.parameters();
     }
-    let doubt = if keep || hold_friction {
-        1.0
-    } else {
-        FRICTION_DOUBT
-    };
+    let doubt = if hold_friction { 1.0 } else { FRICTION_DOUBT };
     let index: Vec<usize> = (0..size)
         .filter(|i| wanted[*i] && covariance[i * size + i] > 0.0)
         .collect();
@@ -164,29 +159,5 @@ pub(super) fn information(
             out[(index[a], index[b])] = inverse[(a, b)] / (scale[a] * scale[b] * doubt * doubt);
         }
     }
-    if keep {
-        // what has no standard deviation is fixed
-        let values = values(model);
-        for i in 0..size {
-            if covariance[i * size + i] <= 0.0 {
-                let scale = 1e-3 * values[i].abs().max(1e-6);
-                out[(i, i)] = 1.0 / (scale * scale);
-            }
-        }
-    }
-    out
-}
-
-/// Values in the order of the model's gradient.
-fn values(model: &Model) -> Vec<f64> {
-    let mut out = model.theta.clone();
-    for law in &model.friction {
-        match law {
-            JointFriction::None => {}
-            JointFriction::DoubleTanh(law) => out.extend(law.parameters()),
-            JointFriction::ViscousCoulomb(law) => out.extend([law.viscous, law.coulomb]),
-        }
-    }
-    out.extend(&model.offset);
     out
 }

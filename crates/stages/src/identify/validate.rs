@@ -264,7 +264,7 @@ pub fn not_a_validation(errors: &TorqueErrors) -> Option<String> {
     let worst = errors.joints.iter().filter(moving);
     let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))?;
     Some(format!(
-        "this is no validation: the torque of {} is off by {} of itself; the log is of another robot, unit, sign or order of joints, or the set-up changed (`cft-ident inspect` with the robot file looks for it)",
+        "this is no validation of {}, whose torque is off by {} of itself: a log of another robot, unit, sign or order of joints, or a joint whose torque the model does not have (`cft-ident inspect` with the robot file looks for the former, `diagnose` for the latter)",
         worst.joint,
         number::percent(worst.relative_error)
     ))

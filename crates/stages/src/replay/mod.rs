@@ -129,7 +129,7 @@ pub struct ReplayedDiagnosis {
     pub held_out: bool,
     /// Of the given model, and of the one that was found where anything was added.
     pub torque: Vec<TorqueSeries>,
-    /// Of the effects in the order in which they were added.
+    /// Of the effects that are written, in the order in which they were found.
     pub effects: Vec<EffectRows>,
     /// Of the model that was found, along all logs.
     pub friction: Vec<FrictionRows>,
@@ -153,9 +153,9 @@ impl ReplayedDiagnosis {
         let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
         let shown = if others.is_empty() { fitted } else { others };
         // without an effect the given model stands
-        let after = (!d.steps.is_empty()).then_some(&d.model);
+        let after = d.written().next().map(|_| &d.model);
         let models: Vec<&AugmentedModel> = [&found.given].into_iter().chain(after).collect();
-        let added = d.steps.iter().map(|step| step.effect);
+        let added = d.written().filter_map(|step| step.written);
         let rows = |at| effect::effect(&replay, &d.model, at, shown);
         Ok(ReplayedDiagnosis {
             logs: shown.iter().map(|log| replay.names[*log].clone()).collect(),

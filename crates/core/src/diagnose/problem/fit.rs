@@ -1,205 +1,109 @@
-//! The joint fit of everything: Gauss-Newton on the filtered rows, linear parameters exactly in one
-//! step, with the friction stage's covariance as a prior.
+//! The fit of the declared model, its effects held: a few linear steps, each from one pass over the rows.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::data_split::{DataSplit, RowRole};
-use super::fit_problem::FitProblem;
-use super::normal_equations::{Base, PieceSums};
-use super::unknowns::{Unknown, Unknowns, step};
+use super::pass::{Data, Layout, pass};
+use super::prior::ParameterPrior;
+use super::unknowns::{FreeParameters, Unknowns, step};
 use crate::effect::AugmentedModel;
-use crate::math::descent::{StepControl, Trial, descend};
-use crate::math::rank_revealing::RankRevealingInverse;
+use crate::judge::{Block, BlockSums, Terms};
 use crate::motion::MotionError;
 
-/// A fitted model with the linear system at its solution.
-pub struct FittedModel {
+/// What is open and known of a declared model.
+#[derive(Clone, Copy)]
+pub struct Declared<'a> {
+    pub open: &'a FreeParameters,
+    pub prior: &'a ParameterPrior,
+    /// The inertial parameters are kept.
+    pub keep: bool,
+    /// Part of the diagonal that holds what the data do not determine.
+    pub ridge: f64,
+}
+
+/// A fitted model with the weights of its joints.
+#[derive(Debug, Clone)]
+pub struct Fitted {
     pub model: AugmentedModel,
-    pub base: Base,
-    /// 1 / residual rms of each joint.
+    /// 1 / variance of each joint's residual.
     pub weights: Vec<f64>,
-    /// Weighted normal matrix of the fitted rows, prior included.
-    pub normal: DMatrix<f64>,
-    /// Prior information over the unknowns.
-    pub information: DMatrix<f64>,
-    /// Pull of data and prior together; none at the solution.
-    pub pull: DVector<f64>,
-    /// Weighted squared residual of the fitted rows.
-    pub square: f64,
 }
 
-/// Most Gauss-Newton steps; nearly linear problems take two or three.
-const STEPS: usize = 12;
-/// First steps, in which the shapes of effects are fixed and the weights follow the residual.
-const EARLY: usize = 2;
-/// Lengths that a step is tried with.
-const LENGTHS: u32 = 6;
-/// A step that promises less than this share of the squares is the last.
-const SETTLED: f64 = 1e-9;
+/// Most passes: a law that bends takes some.
+const PASSES: usize = 4;
+/// A step that promises less than this part of the squares is not worth another pass.
+const SETTLED: f64 = 1e-6;
+/// Times that the weights follow the residual.
+const REWEIGHTED: usize = 3;
 
-/// Fits all unknowns of a model from where it stands.
+/// Fits the declared model to blocks, in weights where they are given. What the data do not determine stays.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn fit(start: &AugmentedModel, problem: &FitProblem) -> Result<FittedModel, MotionError> {
-    gauss_newton(evaluate(start.clone(), problem, None)?, problem, None)
-}
-
-/// Fits a fitted model to another problem in the weights that it has; what these data did not determine stays.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
-pub(crate) fn refit(at: &FittedModel, problem: &FitProblem) -> Result<FittedModel, MotionError> {
-    let begun = at.with(at.model.clone(), problem)?;
-    let known = RankRevealingInverse::of(&at.normal);
-    gauss_newton(begun, problem, Some(&known))
-}
-
-/// Gauss-Newton steps to the least square; `known` says what stays where it is, and that the weights do.
-fn gauss_newton(
-    begun: FittedModel,
-    problem: &FitProblem,
-    known: Option<&RankRevealingInverse>,
-) -> Result<FittedModel, MotionError> {
-    let control = StepControl::halving(LENGTHS);
-    let most = STEPS * LENGTHS as usize;
-    let ((at, _), ..) = descend((begun, 0), &control, most, &mut |(at, k), length| {
-        // an effect that has just come meets parameters fitted without it: its coefficients first
-        let list = &at.base.unknowns.list;
-        let early = |i: usize| *k < EARLY && matches!(list[i], Unknown::Shape { .. });
-        let redundant = |i: usize| known.is_some_and(|inverse| inverse.redundant(i));
-        let (delta, gain) = at.newton(&|i| early(i) || redundant(i));
-        let scaled: Vec<f64> = delta.iter().map(|d| length * d).collect();
-        let mut model = at.model.clone();
-        step(&mut model, &at.base.unknowns, &scaled, &problem.cover);
-        let tried = at.with(model, problem)?;
-        let highest = at.objective(problem) * (1.0 + 1e-12);
-        let lower = tried.objective(problem) <= highest;
-        let last = gain <= SETTLED * at.square.max(f64::MIN_POSITIVE) || k + 1 == STEPS;
-        Ok::<_, MotionError>(match (lower, *k < EARLY) {
-            (false, _) => Trial::Rejected,
-            (true, true) if known.is_none() => Trial::Accepted((tried.reweighted(problem), k + 1)),
-            (true, false) if last => Trial::Last((tried, k + 1)),
-            (true, _) => Trial::Accepted((tried, k + 1)),
-        })
-    })?;
-    Ok(at)
-}
-
-/// The rows and sums of a model as it stands.
-fn evaluate(
-    model: AugmentedModel,
-    problem: &FitProblem,
+pub fn fit(
+    start: &AugmentedModel,
+    declared: Declared,
+    (data, blocks): (&Data, &[Block]),
     weights: Option<&[f64]>,
-) -> Result<FittedModel, MotionError> {
-    let unknowns = Unknowns::of(&model, problem.open, &problem.cover);
-    let base = Base::of(
-        &model,
-        unknowns,
-        (problem.stretches, &problem.inertial),
-        (problem.filters, &problem.rest_weight),
-        (&problem.split, &problem.inertial_sums),
-    )?;
-    let weights = match weights {
-        Some(w) => w.to_vec(),
-        None => weights_of(&base, problem),
-    };
-    Ok(FittedModel::of_sums(model, base, weights, problem))
-}
-
-fn weights_of(base: &Base, problem: &FitProblem) -> Vec<f64> {
-    let rms = base.residual_rms(&problem.split).into_iter();
-    rms.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect()
-}
-
-impl FittedModel {
-    /// A model whose rows are summed.
-    pub(crate) fn of_sums(
-        model: AugmentedModel,
-        base: Base,
-        weights: Vec<f64>,
-        problem: &FitProblem,
-    ) -> Self {
-        let total = base.total(&problem.split, &weights, &RowRole::fitted);
-        let (information, pull) = problem.prior.over(&base.unknowns, &model);
-        FittedModel {
-            normal: total.normal + &information,
-            pull: pull + total.score,
-            information,
-            square: total.square,
-            weights,
-            model,
-            base,
+) -> Result<Fitted, MotionError> {
+    let unknowns = Unknowns::of(start, declared.open, declared.keep);
+    let layout = Layout::of(&unknowns, &[]);
+    let mut model = start.clone();
+    let mut found: Option<Fitted> = None;
+    for _ in 0..PASSES {
+        let sums = pass(&model, (&unknowns, &[]), &layout, data, blocks)?;
+        let total = sums.over(0..blocks.len());
+        let rows: Vec<f64> = (0..total.len()).map(|j| sums.rows_of(j)).collect();
+        let mut terms = declared.terms(&unknowns, &layout, &model);
+        let here = terms.squares(&total, &DVector::zeros(unknowns.len()));
+        let mut next = here.clone();
+        let mut delta = DVector::zeros(unknowns.len());
+        for _ in 0..REWEIGHTED {
+            terms.weights = weights.map_or_else(|| weights_of(&next, &rows), <[f64]>::to_vec);
+            let fit = terms.fit(&total, &[]);
+            (next, delta) = (fit.squares, fit.values);
         }
-    }
-
-    /// Another model in the weights of this one.
-    ///
-    /// # Errors
-    /// [`MotionError`] of the filter.
-    pub fn with(
-        &self,
-        model: AugmentedModel,
-        problem: &FitProblem,
-    ) -> Result<FittedModel, MotionError> {
-        evaluate(model, problem, Some(&self.weights))
-    }
-
-    fn reweighted(self, problem: &FitProblem) -> Self {
-        let weights = weights_of(&self.base, problem);
-        FittedModel::of_sums(self.model, self.base, weights, problem)
-    }
-
-    /// Weighted squares and the prior's share.
-    fn objective(&self, problem: &FitProblem) -> f64 {
-        let off = problem.prior.off(&self.base.unknowns, &self.model);
-        self.square + (off.transpose() * &self.information * &off)[(0, 0)]
-    }
-
-    /// The step to the minimum of the linearised problem, and the squares that it promises to remove. What is
-    /// declared comes first among the unknowns, so that an effect is redundant, and not the declared model.
-    fn newton(&self, fixed: &dyn Fn(usize) -> bool) -> (DVector<f64>, f64) {
-        let (mut normal, mut pull) = (self.normal.clone(), self.pull.clone());
-        for i in (0..pull.len()).filter(|i| fixed(*i)) {
-            normal.row_mut(i).fill(0.0);
-            normal.column_mut(i).fill(0.0);
-            pull[i] = 0.0;
-        }
-        let delta = RankRevealingInverse::of(&normal).solve(&pull);
-        let gain = delta.dot(&pull);
-        (delta, gain)
-    }
-
-    /// The least that the objective comes to from here by a linear step, with one unknown fixed.
-    pub(crate) fn least_with_fixed(&self, problem: &FitProblem, fixed: Option<usize>) -> f64 {
-        self.objective(problem) - self.newton(&|i| Some(i) == fixed).1
-    }
-
-    /// Squared residual of the fitted rows in given weights.
-    pub(crate) fn square_with(&self, weights: &[f64], split: &DataSplit) -> f64 {
-        self.squares_of(weights, split, &RowRole::fitted)
-            .iter()
-            .sum()
-    }
-
-    /// Squared residual of each veto piece in given weights.
-    pub(crate) fn veto_squares(&self, weights: &[f64], split: &DataSplit) -> Vec<f64> {
-        self.squares_of(weights, split, &|role| role == RowRole::Veto)
-    }
-
-    /// Squared residual of each wanted piece in given weights.
-    fn squares_of(
-        &self,
-        weights: &[f64],
-        split: &DataSplit,
-        wanted: &dyn Fn(RowRole) -> bool,
-    ) -> Vec<f64> {
-        let square = |sums: &Vec<PieceSums>| -> f64 {
-            let joints = sums.iter().zip(weights);
-            joints.map(|(s, w)| w * w * s.square).sum()
+        let weighted = |squares: &[f64]| -> f64 {
+            let known = squares.iter().zip(&terms.weights);
+            known.map(|(s, w)| s * w).sum()
         };
-        let pieces = split.pieces.iter().zip(&self.base.sums);
-        let wanted = pieces.filter(|(p, _)| wanted(p.role));
-        wanted.map(|(_, sums)| square(sums)).collect()
+        let promised = weighted(&here) - weighted(&next);
+        let settled = found.is_some() && promised <= SETTLED * weighted(&here);
+        found = Some(Fitted {
+            model: model.clone(),
+            weights: weights.map_or_else(|| weights_of(&here, &rows), <[f64]>::to_vec),
+        });
+        if settled {
+            break;
+        }
+        step(&mut model, &unknowns, delta.as_slice());
     }
+    found.ok_or(MotionError::TooFewSamples { samples: 0 })
+}
+
+/// 1 / variance of each joint's residual; nothing of a joint without rows.
+fn weights_of(squares: &[f64], rows: &[f64]) -> Vec<f64> {
+    let of = |(square, rows): (&f64, &f64)| match *square > 0.0 {
+        true => rows / square,
+        false => 0.0,
+    };
+    squares.iter().zip(rows).map(of).collect()
+}
+
+impl Declared<'_> {
+    /// The terms of the declared unknowns about a model, with no weights yet.
+    pub fn terms(&self, unknowns: &Unknowns, layout: &Layout, model: &AugmentedModel) -> Terms {
+        Terms {
+            list: layout.declared.clone(),
+            weights: vec![0.0; layout.columns.len()],
+            prior: self.prior.over(unknowns, model),
+            ridge: self.ridge,
+        }
+    }
+}
+
+/// Whether blocks determine any unknown: its column is not the same nothing everywhere.
+pub fn determines_some(sums: &BlockSums, terms: &Terms) -> bool {
+    let total: Vec<DMatrix<f64>> = sums.over(0..sums.blocks.len());
+    let some = |(j, column): &(usize, usize)| total[*j][(*column, *column)] > 0.0;
+    terms.list.iter().any(|t| t.columns.iter().any(some))
 }

@@ -1,13 +1,10 @@
-//! What is fitted: which rows do what, the unknowns, their filtered columns, what is known of them, and the joint fit.
+//! What a diagnosis works on: data and their use, the unknowns, the columns of all rows, and the fit of the declared
+//! model.
 
 pub mod case;
-pub mod cross_products;
 pub mod data_split;
 pub mod fit;
-pub mod fit_problem;
-pub mod normal_equations;
+pub mod pass;
 pub mod prior;
-pub mod rests;
-pub mod rows;
+pub(crate) mod rests;
 pub mod unknowns;
-pub mod wide_motion;

@@ -2,13 +2,14 @@
 //! signal, or over cells of two, take up, beside what they take up of the same residual with random signs from block
 //! to block.
 
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::map::ResidualMap;
 use super::signal::{Signal, values};
-use crate::diagnose::placebo::blocks::Signs;
-use crate::diagnose::problem::fit::FittedModel;
-use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::problem::data_split::{LogRole, Piece};
+use crate::diagnose::problem::pass::Data;
 use crate::effect::Torques;
 
 /// A dependence of one joint's residual.
@@ -17,7 +18,7 @@ pub struct Dependence {
     pub joint: usize,
     /// One signal, or two together.
     pub signals: Vec<Signal>,
-    /// Share of the residual's square that it takes up, beyond what it takes up of placebos.
+    /// Share of the residual's square that it takes up, beyond what it takes up of random signs.
     pub share: f64,
     /// Chance of a dependence as large among all signals where the residual depends on none.
     pub p_value: f64,
@@ -46,34 +47,69 @@ struct Rows {
     at: Vec<(usize, usize)>,
 }
 
-/// Dependences of the residuals of `joints`, the strongest of each joint first.
-pub fn dependences(
-    at: &FittedModel,
-    problem: &FitProblem,
-    torques: &[Torques],
-    joints: &[usize],
-) -> Vec<Dependence> {
-    let signs = Signs::of(&problem.split.pieces);
-    let of_joint = |j: &usize| of_joint(at, problem, torques, &signs, *j);
+/// What a model leaves of stretches, and what it makes of them.
+pub struct Left<'a> {
+    pub data: &'a Data<'a>,
+    /// Filtered residual, `[stretch][joint][row]`.
+    pub residual: &'a [Vec<Vec<f64>>],
+    pub torques: &'a [Torques],
+}
+
+/// Draws of random signs.
+const DRAWS: usize = 199;
+/// Seed of the signs.
+const SEED: u64 = 19_931_983;
+
+/// Blocks of fitted rows, and the signs that each draw gives them.
+struct Signs {
+    /// Block of each piece; none where it is not fitted.
+    of_piece: Vec<Option<usize>>,
+    blocks: usize,
+    /// `[draw][block]`.
+    of_draws: Vec<Vec<f64>>,
+}
+
+impl Signs {
+    /// `together` neighbouring pieces are a block.
+    fn of(pieces: &[Piece], together: usize) -> Self {
+        let mut fitted = 0..;
+        let mut block = |p: &Piece| {
+            let train = p.role == LogRole::Train;
+            train.then(|| fitted.next().unwrap_or(0) / together.max(1))
+        };
+        let of_piece: Vec<Option<usize>> = pieces.iter().map(&mut block).collect();
+        let blocks = of_piece.iter().flatten().max().map_or(0, |last| last + 1);
+        let mut chance = ChaCha8Rng::seed_from_u64(SEED);
+        let mut sign = || if chance.random::<bool>() { 1.0 } else { -1.0 };
+        let mut draw = |_| (0..blocks).map(|_| sign()).collect();
+        Signs {
+            of_piece,
+            blocks,
+            of_draws: (0..DRAWS).map(&mut draw).collect(),
+        }
+    }
+}
+
+/// Dependences of the residuals of `joints`, the strongest of each joint first; `together` pieces have no memory of
+/// one another.
+pub fn dependences(left: &Left, joints: &[usize], together: usize) -> Vec<Dependence> {
+    let signs = Signs::of(&left.data.split.pieces, together);
+    let of_joint = |j: &usize| of_joint(left, &signs, *j);
     let found: Vec<Vec<Dependence>> = joints.par_iter().map(of_joint).collect();
     found.into_iter().flatten().collect()
 }
 
-fn of_joint(
-    at: &FittedModel,
-    problem: &FitProblem,
-    torques: &[Torques],
-    signs: &Signs,
-    j: usize,
-) -> Vec<Dependence> {
-    let rows = rows(at, problem, signs, j);
+fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
+    let (stretches, torques) = (left.data.stretches, left.torques);
+    let rows = rows(left, signs, j);
     let square: f64 = rows.residual.iter().map(|e| e * e).sum();
     if rows.residual.is_empty() || square <= 0.0 {
         return Vec::new();
     }
-    let joints = at.weights.len();
-    let moving = |i: &usize| !problem.cover.joints[*i].stationary;
-    let warm = |i: &usize| problem.stretches.iter().all(|s| s.has_temperature(*i));
+    let joints = left.residual.first().map_or(0, Vec::len);
+    let stationary = &left.data.split.stationary;
+    let moving = |i: &usize| stationary.iter().any(|still| !still[*i]);
+    let warm = |i: &usize| stretches.iter().all(|s| s.has_temperature(*i));
     let mut signals = vec![
         Signal::Acceleration,
         Signal::Load,
@@ -88,7 +124,7 @@ fn of_joint(
     }
     let values: Vec<Vec<f64>> = signals
         .iter()
-        .map(|s| values(*s, j, &rows.at, problem.stretches, torques))
+        .map(|s| values(*s, j, &rows.at, stretches, torques))
         .collect();
     let mut tried: Vec<(Vec<usize>, Taken)> = Vec::new();
     for (i, x) in values.iter().enumerate() {
@@ -162,21 +198,21 @@ fn of_joint(
     found
 }
 
-fn rows(at: &FittedModel, problem: &FitProblem, signs: &Signs, j: usize) -> Rows {
+fn rows(left: &Left, signs: &Signs, j: usize) -> Rows {
     let mut rows = Rows {
         residual: Vec::new(),
         block: Vec::new(),
         at: Vec::new(),
     };
-    for (piece, block) in problem.split.pieces.iter().zip(&signs.of_piece) {
+    let data = left.data;
+    for (piece, block) in data.split.pieces.iter().zip(&signs.of_piece) {
         let Some(block) = block else { continue };
-        if problem.split.ignores(piece.stretch, j) {
+        if data.split.is_stationary(piece.stretch, j) {
             continue;
         }
-        let parallel = problem.filters.of(&problem.stretches[piece.stretch]);
+        let parallel = data.filters.of(&data.stretches[piece.stretch]);
         for row in piece.rows.clone() {
-            rows.residual
-                .push(at.base.stretches[piece.stretch].residual[j][row]);
+            rows.residual.push(left.residual[piece.stretch][j][row]);
             rows.block.push(*block);
             rows.at.push((piece.stretch, parallel.sample_of(row)));
         }
@@ -248,9 +284,6 @@ impl Taken {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::problem::data_split::{Piece, RowRole};
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn what_a_residual_depends_on_takes_up_its_share_and_what_it_does_not_takes_up_nothing() {
@@ -259,10 +292,10 @@ mod tests {
             .map(|k| Piece {
                 stretch: 0,
                 rows: 100 * k..100 * (k + 1),
-                role: RowRole::Fold(k % 10),
+                role: LogRole::Train,
             })
             .collect();
-        let signs = Signs::of(&pieces);
+        let signs = Signs::of(&pieces, 1);
         let mut chance = ChaCha8Rng::seed_from_u64(3);
         let mut noise = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
         let signal: Vec<f64> = (0..n).map(|k| (0.0137 * k as f64).sin()).collect();

@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::diagnose::problem::data_split::{DataSplit, RowRole};
+use crate::diagnose::problem::data_split::{DataSplit, LogRole};
 use crate::diagnose::problem::rests::{resting, standing};
 use crate::effect::AugmentedModel;
 use crate::math::bootstrap::intervals_95;
@@ -108,7 +108,7 @@ pub enum Counted {
     Moving,
 }
 
-/// Errors of a model over the pieces whose role is wanted.
+/// Errors of a model over the pieces of a role.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
@@ -117,7 +117,7 @@ pub fn pieces(
     stretches: &[Stretch],
     (filters, rest_speed): (&ParallelFilters, &[f64]),
     split: &DataSplit,
-    (wanted, counted): (&dyn Fn(RowRole) -> bool, Counted),
+    (wanted, counted): (LogRole, Counted),
 ) -> Result<Pieces, MotionError> {
     let n = model.model.robot.joints();
     let mut pieces = Pieces::new();
@@ -125,7 +125,7 @@ pub fn pieces(
         let own = split
             .pieces
             .iter()
-            .filter(|p| p.stretch == index && wanted(p.role));
+            .filter(|p| p.stretch == index && p.role == wanted);
         let own: Vec<_> = own.collect();
         if own.is_empty() {
             continue;
@@ -202,14 +202,14 @@ pub fn mean_relative_error(pieces: &Pieces) -> Option<f64> {
     (!all.is_empty()).then(|| mean(&relative(pieces, &all)))
 }
 
-/// Pieces that a bootstrap draws together, of so many: the residual's slow part reaches over some.
-fn block_of(pieces: usize) -> usize {
-    (pieces / 20).clamp(1, 4)
-}
-
 /// What a change of the model does to the errors over the same pieces, joint by joint; nothing of joints that have
 /// no error there.
-pub fn changes(joints: &[String], before: &Pieces, after: &Pieces) -> Vec<JointChange> {
+/// The bootstrap draws `block` neighbouring pieces at a time, which the residual's memory does not reach over.
+pub fn changes(
+    joints: &[String],
+    (before, after): (&Pieces, &Pieces),
+    block: usize,
+) -> Vec<JointChange> {
     let count = before.len();
     if count == 0 {
         return Vec::new();
@@ -217,7 +217,7 @@ pub fn changes(joints: &[String], before: &Pieces, after: &Pieces) -> Vec<JointC
     let of = |picked: &[usize]| [relative(before, picked), relative(after, picked)];
     let all: Vec<usize> = (0..count).collect();
     let [had, has] = of(&all);
-    let intervals = intervals_95(count, block_of(count), SEED, &mut |picked| {
+    let intervals = intervals_95(count, block, SEED, &mut |picked| {
         let [before, after] = of(picked);
         after.iter().zip(before).map(|(a, b)| a - b).collect()
     });
@@ -236,7 +236,7 @@ pub fn changes(joints: &[String], before: &Pieces, after: &Pieces) -> Vec<JointC
 pub fn summed(
     model: &AugmentedModel,
     units: &[String],
-    pieces: &[Vec<PieceErrors>],
+    (pieces, block): (&[Vec<PieceErrors>], usize),
 ) -> Option<Errors> {
     let n = units.len();
     if pieces.is_empty() {
@@ -244,7 +244,7 @@ pub fn summed(
     }
     let all: Vec<usize> = (0..pieces.len()).collect();
     let found = relative(pieces, &all);
-    let intervals = intervals_95(pieces.len(), block_of(pieces.len()), SEED, &mut |picked| {
+    let intervals = intervals_95(pieces.len(), block, SEED, &mut |picked| {
         let mut errors = relative(pieces, picked);
         errors.push(mean(&errors));
         errors

@@ -13,7 +13,7 @@ use crate::robot::joint::{JointKind, ParameterInfo};
 use crate::robot::standard::{STANDARD, STANDARD_NAMES};
 
 /// Two joints whose gear trains are coupled: the motor of joint `motor` turns by
-/// q_motor + ratio q_other. Its inertia a, viscous v and Coulomb s act as
+/// q_motor + ratio q_other, as in a wrist, a differential or an H-bot. Its inertia a, viscous v and Coulomb s act as
 /// tau_motor += a ratio a_other + v ratio v_other + s sgn(v_motor + ratio v_other) and
 /// tau_other += ratio (a a_motor + v v_motor + s sgn(v_motor + ratio v_other)); what either joint
 /// does to itself is in its own drive inertia and friction. The wrist of the TX40 is so, with ratio 1.
@@ -27,8 +27,17 @@ pub struct Coupling {
     pub ratio: f64,
 }
 
-/// Parameters of a coupling.
+/// Parameters of a coupling; of a second one of the same two joints the last alone, for what the others do is in those
+/// of the first.
 const OF_COUPLING: [&str; 3] = ["inertia", "viscous", "coulomb"];
+
+/// A coupling, where its parameters begin, and which of [`OF_COUPLING`] is the first of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Train {
+    coupling: Coupling,
+    at: usize,
+    from: usize,
+}
 
 /// Base parameters of links and drives, then those of the couplings.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +45,7 @@ pub struct Parameters {
     /// Names, units and meanings, in the order of the regressor's columns.
     infos: Vec<ParameterInfo>,
     groupings: Vec<Grouping>,
-    couplings: Vec<Coupling>,
+    trains: Vec<Train>,
     /// Per link, which of its ten columns are kept and where they stand.
     kept: Vec<Vec<(usize, usize)>>,
     /// Kept drive inertias: joint, and where the column stands.
@@ -63,10 +72,19 @@ impl Parameters {
                 meaning: in_words(links, grouping).into(),
             });
         }
+        let mut trains: Vec<Train> = Vec::new();
         for c in couplings {
+            let pair = |c: &Coupling| (c.motor.min(c.other), c.motor.max(c.other));
+            let second = trains.iter().any(|t| pair(&t.coupling) == pair(c));
+            let from = if second { 2 } else { 0 };
+            trains.push(Train {
+                coupling: *c,
+                at: infos.len(),
+                from,
+            });
             let of = |joint: usize| names.get(joint).map_or("", String::as_str);
             let (motor, other) = (of(c.motor), of(c.other));
-            for name in OF_COUPLING {
+            for name in &OF_COUPLING[from..] {
                 infos.push(ParameterInfo {
                     name: format!("{name}_{motor}_{other}").into(),
                     theta: None,
@@ -79,7 +97,7 @@ impl Parameters {
         Self {
             infos,
             groupings,
-            couplings: couplings.to_vec(),
+            trains,
             kept,
             drives,
         }
@@ -93,6 +111,18 @@ impl Parameters {
     /// How the base parameters are grouped.
     pub fn groupings(&self) -> &[Grouping] {
         &self.groupings
+    }
+
+    /// Inertia, viscous and Coulomb of every coupling; 0 where another has it.
+    pub fn of_couplings(&self, theta: &[f64]) -> Vec<[f64; 3]> {
+        let of = |train: &Train| {
+            let mut numbers = [0.0; 3];
+            for (k, x) in numbers[train.from..].iter_mut().enumerate() {
+                *x = theta.get(train.at + k).copied().unwrap_or_default();
+            }
+            numbers
+        };
+        self.trains.iter().map(of).collect()
     }
 
     /// Writes Y(q, v, a), n x p row-major.
@@ -131,8 +161,12 @@ impl Parameters {
         for &(joint, at) in &self.drives {
             set(joint, at, a[joint]);
         }
-        for (k, c) in self.couplings.iter().enumerate() {
-            let at = self.groupings.len() + OF_COUPLING.len() * k;
+        for Train {
+            coupling: c,
+            at,
+            from,
+        } in &self.trains
+        {
             let (m, o) = (c.motor, c.other);
             let turning = v[m] + c.ratio * v[o];
             let sign = sign(turning);
@@ -140,7 +174,8 @@ impl Parameters {
                 (m, c.ratio * a[o], c.ratio * v[o], sign),
                 (o, c.ratio * a[m], c.ratio * v[m], c.ratio * sign),
             ] {
-                for (k, x) in [inertia, viscous, coulomb].into_iter().enumerate() {
+                let entries = [inertia, viscous, coulomb];
+                for (k, x) in entries[*from..].iter().copied().enumerate() {
                     set(row, at + k, x);
                 }
             }

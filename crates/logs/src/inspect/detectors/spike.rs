@@ -25,8 +25,10 @@ const CHANGE: usize = 9;
 const MOST: usize = 4096;
 /// A difference may be a spike from so many usual ones on.
 const SUSPECT: f64 = 10.0;
-/// A speed changes where it does by so many usual changes.
+/// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
+/// smooth motion it does in the next rows too.
 const MOVES: f64 = 6.0;
+const ALONE: f64 = 3.0;
 
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,10 +162,15 @@ impl Spikes {
     /// Whether the joint's speed changes at a row.
     fn moves(&self, row: usize) -> bool {
         let usual = self.changes_seen.quantile_not_zero(0.5);
-        row >= CHANGE
-            && row + CHANGE < self.count
-            && usual > 0.0
-            && self.change(row).abs() > MOVES * usual
+        if row < CHANGE || row + CHANGE >= self.count || usual <= 0.0 {
+            return false;
+        }
+        let reach = CHANGE + HALF + 1;
+        let from = row.saturating_sub(AROUND).max(CHANGE);
+        let to = (row + AROUND).min(self.count - 1 - CHANGE);
+        let beside = (from..=to).filter(|k| k.abs_diff(row) >= reach);
+        let largest = beside.map(|k| self.change(k).abs()).fold(0.0, f64::max);
+        self.change(row).abs() > (MOVES * usual).max(ALONE * largest)
     }
 
     /// Looks whether a row stands alone among those up to `last`.
@@ -317,6 +324,34 @@ mod tests {
             );
         }
         assert_eq!(high[0].bridge(&|_| true), None);
+    }
+
+    #[test]
+    fn a_peak_of_a_torque_is_none_where_the_speed_of_its_joint_changes_and_one_where_it_only_turns()
+    {
+        let found = |peak: usize| -> usize {
+            let mut spikes = Spikes::default();
+            for k in 0..3000 {
+                if k % 256 == 0 {
+                    spikes.settle();
+                }
+                let t = k as f64 * 1e-3;
+                // a wave in counts, and a step of the speed at row 1000
+                let step = 0.8 * (t - 1.0).max(0.0);
+                let position = (((5.0 * t).sin() + step) * 1e5).round() * 1e-5;
+                let noise = f64::from((k as u32 * 7919) % 1000) * 1e-5;
+                let torque = (5.0 * t).cos() + noise + if k == peak { 20.0 } else { 0.0 };
+                spikes.take(t, torque, position);
+            }
+            spikes.part();
+            spikes
+                .found()
+                .iter()
+                .filter(|s| s.height.abs() > 10.0)
+                .count()
+        };
+        assert_eq!(found(1000), 0);
+        assert_eq!(found(314), 1);
     }
 
     #[test]

@@ -13,6 +13,8 @@ pub(in crate::inspect) struct Follows {
     /// Correlation with the derivative at that lag, and without a lag.
     pub(in crate::inspect) best: f64,
     pub(in crate::inspect) now: f64,
+    /// How many times the derivative it is at that lag.
+    pub(in crate::inspect) times: f64,
 }
 
 /// LagSums of one lag.
@@ -27,6 +29,11 @@ struct LagSums {
 }
 
 impl LagSums {
+    /// Slope of the velocity over the derivative.
+    fn times(&self) -> f64 {
+        (self.vd - self.v * self.d / self.n) / (self.dd - self.d * self.d / self.n)
+    }
+
     fn correlation(&self) -> f64 {
         let spread = (self.vv - self.v * self.v / self.n) * (self.dd - self.d * self.d / self.n);
         (self.vd - self.v * self.d / self.n) / spread.sqrt()
@@ -90,6 +97,7 @@ pub(in crate::inspect) fn follows<'w>(
         rows,
         best: correlations[peak],
         now,
+        times: sums[peak].times(),
     })
 }
 
@@ -121,6 +129,7 @@ mod tests {
             let found = follows(log.iter(), 0, 1).unwrap();
             assert!((found.rows * 0.001 - delay).abs() < 2e-4, "{found:?}");
             assert!(sign * found.best > 0.9999, "{found:?}");
+            assert!((sign * found.times - 1.0).abs() < 0.01, "{found:?}");
         }
     }
 

@@ -18,6 +18,14 @@ use crate::log::rows::LogRows;
 use crate::log::time::{Instant, Stamped};
 use crate::log::{LogError, source};
 
+/// What is wrong with a recording without joint states.
+const NO_STATES: &str = "no topic holds sensor_msgs/msg/JointState";
+
+/// Whether a recording was refused because it has no joint states at all.
+pub(in crate::log) fn has_none(error: &LogError) -> bool {
+    matches!(error, LogError::Topic { problem, .. } if problem == NO_STATES)
+}
+
 /// One topic and the columns that it fills.
 struct StateTopic {
     topic: String,
@@ -98,7 +106,7 @@ impl JointStates {
             }
             return Err(LogError::Topic {
                 file: source::shown_all(paths),
-                problem: "no topic holds sensor_msgs/msg/JointState".to_owned(),
+                problem: NO_STATES.to_owned(),
                 remedy: format!(
                     "say with a robot file (-r) which fields are the channels; the topics are {}",
                     list(other_topics.iter().map(String::as_str))

@@ -7,6 +7,7 @@ mod delay;
 mod encoding;
 mod fields;
 mod format;
+mod joined;
 mod joint_states;
 mod listing;
 mod message;
@@ -21,7 +22,8 @@ mod survey;
 mod value;
 
 pub(super) use format::{FORMATS, format_of};
-pub(super) use joint_states::JointStates;
+pub(super) use joined::{JoinedTopics, of_topics};
+pub(super) use joint_states::{JointStates, has_none};
 pub(super) use listing::listing;
 pub(super) use rows::MessageRows;
 pub(super) use state_topics::state_groups;

@@ -85,7 +85,7 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
             .position(|f| f.topic == *topic && f.schema == *schema);
         let at = match known {
             Some(at) => at,
-            None if schema.name.ends_with("JointState") && found.len() < TOPICS => {
+            None if is_joint_state(schema) && found.len() < TOPICS => {
                 let probe = match reader_of(schema, &probes()) {
                     Ok(probe) => probe,
                     Err(reason) => {
@@ -155,7 +155,7 @@ fn cause(
         });
     }
     let mut declared = recording.seen.iter();
-    let declared = declared.find(|topic| topic.schema.name.ends_with("JointState"));
+    let declared = declared.find(|topic| is_joint_state(&topic.schema));
     let of = declared.map(|topic| format!(" of {}", escape(&topic.name)));
     if found.is_empty()
         && let Some((_, broken)) = recording.broken.first()
@@ -180,6 +180,12 @@ fn cause(
             remedy: "record again with names, positions and efforts filled in",
         },
     })
+}
+
+/// Whether messages are joint states by their type, and no other type whose name ends so.
+fn is_joint_state(schema: &Schema) -> bool {
+    let last = schema.name.rsplit(['/', '.']).next();
+    last == Some("JointState")
 }
 
 /// What is asked of a message to see what it holds; the last makes the decoder look at the names.

@@ -1,6 +1,6 @@
 //! The report of `diagnose`.
 
-use super::step_words::{chance, in_words, tentative, titled, worsened};
+use super::step_words::{alternatives, grade, in_words, titled, worsened};
 use super::{first_screen, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
@@ -8,7 +8,7 @@ use crate::report::sections::{fit, friction, parameters, provenance, residual, s
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer};
 use cft_ident_core::diagnose::{
-    AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, StepStatus, Turn,
+    Diagnosis, Errors, FoundEffect, LeftCandidate, SplitErrors, StepStatus,
 };
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
@@ -83,14 +83,13 @@ pub(crate) fn fault_told(terminal: &mut Writer, fault: &DataFault) {
 }
 
 /// The same in a sentence.
-pub(crate) fn at_fault(fault: &DataFault) -> String {
+pub fn at_fault(fault: &DataFault) -> String {
     format!("The data are at fault ({}): {}.", fault.kind, fault.effect)
 }
 
 /// The errors and the effects for a terminal.
 pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
-    let robot = &machine.robot;
     terminal.line("");
     terminal.table(before_and_after(machine, d));
     if !d.steps.is_empty() {
@@ -99,79 +98,66 @@ pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     for (i, step) in d.steps.iter().enumerate() {
         step_told(terminal, machine, found, (i + 1, step));
     }
-    if let Some(path) = path(found) {
-        terminal.note("  ", &path, 4);
-    }
     terminal.list(doubts(machine, found));
+    terminal.list(changes(machine, found));
     terminal.note("  ", &first_screen::next(machine, found), 4);
-    for e in &d.disturbances {
-        let told = format!(
-            "cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
-             residual)",
-            e.from_s,
-            e.to_s,
-            found.logs[e.log],
-            robot.joint_names()[e.joint],
-            e.over
-        );
-        terminal.note("  ", &told, 4);
-    }
 }
 
-/// One effect that was added, for a terminal.
+/// Friction that changes from a time on.
+fn changes(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
+    let d = &found.diagnosis;
+    let told = d.changes.iter().map(|c| {
+        format!(
+            "friction of {} changes by {} {} from {:.2} s of {} on ({} standard errors): a change in time, and no law \
+             of the motion",
+            machine.robot.joint_names()[c.joint],
+            number::significant(c.by, 2),
+            machine.file.torque_unit(c.joint),
+            c.at_s,
+            found.logs[c.log],
+            number::significant(c.certainty, 2)
+        )
+    });
+    told.collect()
+}
+
+/// One effect that was found, for a terminal.
 fn step_told(
     terminal: &mut Writer,
     machine: &LoggedRobot,
     found: &Diagnosed,
-    (number, step): (usize, &AcceptedEffect),
+    (number, step): (usize, &FoundEffect),
 ) {
-    let effect = &found.diagnosis.model.effects[step.effect];
-    let what = match effect.curve() {
-        Some((signal, _)) => format!("{}; {}", titled(machine, effect), signal.words()[1]),
-        None => format!(
-            "{} ({}): {}",
-            effect.title(&machine.robot),
-            effect.family().name(),
-            in_words(machine, found, step.effect)
-        ),
-    };
-    terminal.note(&format!("{number:>3}. "), &what, 7);
-    if let Some(s) = &step.candidate.score {
-        let told = format!(
-            "removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows{}",
-            number::percent(s.cv_gain),
-            s.delta_bic,
-            s.effective_rows,
-            (step.candidate.placebo_p_value).map_or(String::new(), |p| format!("; {}", chance(p)))
-        );
-        terminal.note(MARGIN, &told, 7);
-    }
+    let effect = &step.estimate;
+    let name = format!(
+        "{} ({}): {}",
+        effect.title(&machine.robot),
+        effect.family().name(),
+        in_words(machine, found, step)
+    );
+    terminal.note(&format!("{number:>3}. "), &name, 7);
+    terminal.note(MARGIN, &grade(step, effect), 7);
+    let told = format!(
+        "takes {} off the squared error of blocks left out ({} standard errors)",
+        number::percent(step.share),
+        number::significant(step.gain.value / step.gain.se.max(f64::MIN_POSITIVE), 2)
+    );
+    terminal.note(MARGIN, &told, 7);
     if let Some([before, after]) = step.holdout {
         let told = format!(
-            "held-out data, refitted: {} without it, {} with it{}",
+            "held-out data, the others kept and refitted: {} without it, {} with it{}",
             number::percent(before),
             number::percent(after),
             worsened(step)
         );
         terminal.note(MARGIN, &told, 7);
     }
-    if let Some(why) = tentative(&found.diagnosis, step) {
-        terminal.note(MARGIN, &format!("tentative: {why}"), 7);
-    }
-    if step.alternatives.is_empty() {
-        return;
-    }
-    let names = step.alternatives.iter();
-    let names: Vec<String> = names.map(|c| c.effect.title(&machine.robot)).collect();
-    let told = format!(
-        "these data do not separate it from {}; to tell them apart, {}",
-        names.join(", "),
-        effect.law.entry.separate_by
-    );
-    terminal.note(MARGIN, &told, 7);
-    if let Some(command) = separating_command(effect, &machine.robot) {
-        terminal.line(&format!("{MARGIN}such a motion:"));
-        terminal.code(&command);
+    if let Some(told) = alternatives(machine, step) {
+        terminal.note(MARGIN, &told, 7);
+        if let Some(command) = separating_command(effect, &machine.robot) {
+            terminal.line(&format!("{MARGIN}such a motion:"));
+            terminal.code(&command);
+        }
     }
 }
 
@@ -186,7 +172,10 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
         ("95 % CI", Align::Right),
         ("above noise", Align::Decimal),
     ])
-    .caption("relative torque error [%] on fitted and held-out data, as given and after");
+    .caption(
+        "relative torque error [%] on fitted and held-out data, as given and after; above noise: residual power beyond \
+         the noise, over the torque's [%]",
+    );
     let hundred = number::hundredths;
     let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
     for (j, joint) in machine.robot.joint_names().iter().enumerate() {
@@ -209,19 +198,7 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
     table
 }
 
-/// Nothing is missing, or nothing that matters.
-fn nothing_missing(d: &Diagnosis) -> String {
-    match d.remainder().next() {
-        None => "Nothing is missing: the remaining residual is noise.".to_owned(),
-        Some(_) => "Nothing that matters is missing.".to_owned(),
-    }
-}
-
-/// Most candidates of a remainder that are named.
-const NAMED: usize = 3;
-
-/// Why what was found is an approximation, and what else is significant; nothing where only noise
-/// is left.
+/// Why what was found is an approximation; nothing where only noise is left.
 fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
     let robot = &machine.robot;
@@ -239,7 +216,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
         })
         .collect();
     let mut out = Vec::new();
-    if !open.is_empty() && !d.steps.is_empty() {
+    if !open.is_empty() && d.written().next().is_some() {
         out.push(format!(
             "the residual of {} is not noise yet: treat the effects found as approximations, for the cause may be \
              one that no known effect describes",
@@ -247,155 +224,91 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
         ));
     }
     out.extend(what_is_left::sentences(machine, found));
-    let mut remainder: Vec<&Candidate> = d.remainder().collect();
-    let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
-    remainder.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-    let mut names: Vec<String> = remainder
-        .iter()
-        .take(NAMED)
-        .map(|c| c.effect.title(robot))
-        .collect();
-    if remainder.len() > NAMED {
-        names.push(format!("and {} more", remainder.len() - NAMED));
-    }
-    if !names.is_empty() {
-        let doubt = match d.steps.is_empty() {
-            true => "",
-            false => "; treat the effects found as approximations",
-        };
-        out.push(format!(
-            "significant, too small to add: {}{doubt}",
-            names.join(", ")
-        ));
-    }
     out
 }
 
-/// How the search came to what it found, where it changed its mind.
-fn path(found: &Diagnosed) -> Option<String> {
-    let path = &found.diagnosis.path;
-    if path.iter().all(|turn| matches!(turn, Turn::Added(_))) {
-        return None;
-    }
-    let turns = path.iter().map(|turn| match turn {
-        Turn::Added(effect) => format!("{effect} added"),
-        Turn::Dropped(effect) => format!("{effect} dropped again"),
-        Turn::Replaced { gone, come } => {
-            format!("{} in place of {}", come.join(" and "), gone.join(" and "))
-        }
-    });
-    Some(format!(
-        "how the search went: {}",
-        turns.collect::<Vec<_>>().join("; ")
-    ))
+/// Errors of two models in words, of held-out data where there are any.
+fn from_to(before: &SplitErrors, after: &SplitErrors) -> String {
+    let (data, errors) = match (&before.holdout, &after.holdout) {
+        (Some(before), Some(after)) => ("held-out error", [before, after]),
+        _ => ("error of the fitted data", [&before.train, &after.train]),
+    };
+    let [before, after] = errors.map(|e| number::percent(e.overall.mean_relative_error));
+    format!("{data} goes from {before} as given to {after}, as the rms over the joints")
 }
 
-/// How many of the names are tentative, as a sentence.
-fn tentative_names(d: &Diagnosis) -> String {
-    let tentative = |s: &&AcceptedEffect| d.status(s) == StepStatus::Tentative;
-    match (d.steps.iter().filter(tentative).count(), d.steps.len()) {
-        (0, _) => String::new(),
-        (1, 1) => " The name is tentative.".to_owned(),
-        (some, all) if some == all => " Their names are tentative.".to_owned(),
-        (some, all) => format!(" Of the {all} names {some} are tentative."),
-    }
-}
-
-/// Share of an error by which a joint must be worse to be named where chance makes as much.
-const TENTH: f64 = 0.1;
-
-/// Joints whose held-out error is larger than that of the model as given by a tenth or beyond its interval, and numbers
-/// that stand at a bound of their search, as sentences.
-fn reservations(machine: &LoggedRobot, found: &Diagnosed) -> String {
-    let d = &found.diagnosis;
-    let mut text = String::new();
-    if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
-        let joints = machine.robot.joint_names().iter().enumerate();
-        let worse = joints.filter_map(|(j, joint)| {
-            let [from, to] = [before, after].map(|e| e.joints[j].relative_error);
-            let interval = after.joints[j].interval_95;
-            let [low, high] = interval.map(number::hundredths);
-            (to > (1.0 + TENTH) * from || from < interval[0]).then(|| {
-                let [from, to] = [from, to].map(number::percent);
-                format!("{joint} from {from} to {to} (95 % CI {low}..{high} %)")
-            })
-        });
-        let worse: Vec<String> = worse.collect();
-        if !worse.is_empty() {
-            text += &format!(" Held-out data are worse on {}.", worse.join(", "));
-        }
-    }
-    let at_bound = d.steps.iter().flat_map(|step| {
-        let of = d.model.effects[step.effect].title(&machine.robot);
-        let told = found.told(machine, step.effect).into_iter();
-        let bound = told.filter(|number| number.bound);
-        bound.map(move |n| {
-            let value = format!("{} = {} {}", n.key, number::significant(n.value, 3), n.unit);
-            format!("{} of {of}", value.trim_end())
-        })
+/// Part of the residual power above the noise that is explained, of all joints together.
+fn explained(d: &Diagnosis) -> Option<f64> {
+    let parts = d.unexplained.iter().zip(&d.part_unexplained);
+    let known = parts.filter(|(left, part)| left.share > 0.0 && **part > 0.0 && part.is_finite());
+    let (left, all) = known.fold((0.0, 0.0), |(left, all), (u, part)| {
+        (left + u.share, all + u.share / part)
     });
-    let at_bound: Vec<String> = at_bound.collect();
-    if !at_bound.is_empty() {
-        text += &format!(
-            " At a bound of the search, so not found by the data: {}.",
-            at_bound.join(", ")
-        );
-    }
-    text
+    (all > 0.0)
+        .then(|| 1.0 - left / all)
+        .filter(|share| *share > 0.0)
 }
 
 /// The verdict in words, and whether nothing calls for attention.
 pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     let d = &found.diagnosis;
-    let titles: Vec<String> = d
-        .steps
-        .iter()
-        .map(|s| titled(machine, &d.model.effects[s.effect]))
-        .collect();
-    match found.verdict() {
+    let graded = |s: &FoundEffect| {
+        let grade = match (s.accepted_by_user, s.status) {
+            (true, _) => "accepted by you",
+            (_, StepStatus::Confirmed) => "confirmed",
+            (_, StepStatus::Indicated) => "indicated",
+            (_, StepStatus::Seen) => "seen",
+        };
+        format!("{} ({grade})", titled(machine, &s.estimate))
+    };
+    let written: Vec<String> = d.written().map(graded).collect();
+    let unconfirmed = d.steps.iter().filter(|s| s.judged.is_none());
+    let seen: Vec<String> = unconfirmed.map(|s| titled(machine, &s.estimate)).collect();
+    let mut text = match found.verdict() {
         DiagnosisVerdict::EffectsFound => {
-            let mut text = format!("The model lacks: {}.", titles.join("; "));
-            if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
+            let mut text = format!("The model lacks: {}.", written.join("; "));
+            text += &format!(" With this the {}.", from_to(&d.before, &d.after));
+            if let Some(share) = explained(d) {
                 text += &format!(
-                    " {} the held-out error goes from {} as given to {}, as the rms over \
-                     the joints.",
-                    match titles.as_slice() {
-                        [_] => "With it",
-                        _ => "With them",
-                    },
-                    number::percent(before.overall.mean_relative_error),
-                    number::percent(after.overall.mean_relative_error)
+                    " It explains {} of the residual power above the noise.",
+                    number::percent(share)
                 );
             }
-            text += &tentative_names(d);
-            text += &reservations(machine, found);
-            (text, true)
+            text
         }
-        DiagnosisVerdict::NothingMissing => (nothing_missing(d), true),
-        _ => {
-            let mut text =
-                "A residual above the noise is left that no known effect explains.".to_owned();
-            if !titles.is_empty() {
-                let errors = match (&d.before.holdout, &d.after.holdout) {
-                    (Some(before), Some(after)) => ("held-out error", [before, after]),
-                    _ => (
-                        "error of the fitted data",
-                        [&d.before.train, &d.after.train],
-                    ),
-                };
-                let [before, after] = errors
-                    .1
-                    .map(|e| number::percent(e.overall.mean_relative_error));
-                text += &format!(
-                    " What comes near to it was added, and takes the {} from {before} as given to {after}: {}.",
-                    errors.0,
-                    titles.join("; ")
-                );
-                text += &reservations(machine, found);
-            }
-            (text, false)
+        _ if !d.determined => {
+            "These data determine nothing: the noise is as large as the torque that the model explains.".to_owned()
         }
+        _ if !d.long_enough() => format!(
+            "These logs are too short to confirm any effect: they give {} parts that are independent of each other, of \
+             {} s, and {} are needed. The model is as it was.",
+            d.parts,
+            number::significant(d.block_s, 2),
+            d.parts_needed
+        ),
+        DiagnosisVerdict::NothingMissing if seen.is_empty() => {
+            "Nothing is missing: the remaining residual is noise.".to_owned()
+        }
+        DiagnosisVerdict::NothingMissing => "Nothing that matters is missing.".to_owned(),
+        _ => "A residual above the noise is left that no effect explains in all parts of the data. The model is as it \
+              was."
+            .to_owned(),
+    };
+    if let Some(selected) = &d.selected {
+        let vetoed = d.steps.iter().filter(|s| s.vetoed());
+        let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
+        text += &format!(
+            " Held-out data are worse on a joint with {}, which is not written: with the written model, selected on \
+             these data, the {} (optimistic).",
+            names.join("; "),
+            from_to(&d.before, selected)
+        );
     }
+    if !seen.is_empty() {
+        text += &format!(" Seen and not confirmed: {}.", seen.join("; "));
+    }
+    let good = d.determined && !matches!(found.verdict(), DiagnosisVerdict::UnexplainedResidual);
+    (text, good)
 }
 
 /// What was added, the torque and the residual before and after, and what was not added.
@@ -414,9 +327,7 @@ pub fn sections(
     }
     page.list(doubts(machine, found));
     found_effects::show(page, machine, found, replayed);
-    if let Some(path) = path(found) {
-        page.paragraph(&path);
-    }
+    page.list(changes(machine, found));
     sketch::section(page, machine, replayed.poses.as_ref(), &errors);
     let after = Drawn {
         names: ["after", "residual after"],
@@ -426,9 +337,9 @@ pub fn sections(
         names: ["as given", "residual as given"],
         styles: [TraceStyle::Before, TraceStyle::Before],
     };
-    let models = match d.steps.is_empty() {
-        true => vec![torque::ONLY],
-        false => vec![before, after],
+    let models = match d.written().next() {
+        None => vec![torque::ONLY],
+        Some(_) => vec![before, after],
     };
     let title = replayed.logs.join(", ");
     torque::section(page, machine, &replayed.torque, &models, &title);
@@ -438,36 +349,29 @@ pub fn sections(
 }
 
 fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
-    let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
     let all = found.diagnosis.candidates.iter();
-    let mut rest: Vec<_> = all.filter(|c| c.score.is_some()).collect();
-    rest.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-    let rows: Vec<Vec<String>> = rest
-        .iter()
-        .take(MOST)
-        .map(|c| {
-            vec![
-                c.effect.title(&machine.robot),
-                c.effect.family().name().to_owned(),
-                number::percent(gain(c)),
-                number::percent(c.score.as_ref().map_or(0.0, |s| s.unique_share)),
-                c.reason.clone(),
-            ]
-        })
-        .collect();
+    let mut rest: Vec<(&LeftCandidate, f64)> = all.filter_map(|c| Some((c, c.score?))).collect();
+    rest.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let row = |(c, score): &(&LeftCandidate, f64)| {
+        let effect = c.effect.as_ref();
+        vec![
+            effect.map_or(c.law.entry.name.to_owned(), |e| e.title(&machine.robot)),
+            effect
+                .map_or(c.law.entry.family(), |e| e.family())
+                .name()
+                .to_owned(),
+            number::percent(*score),
+            c.reason.clone(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = rest.iter().take(MOST).map(row).collect();
     if rows.is_empty() {
         return;
     }
-    page.heading("Candidates that were not added");
+    page.heading("Candidates that were not chosen");
     page.rows(
-        "the best of them, of the last round",
-        &[
-            "effect",
-            "family",
-            "cross-validated gain",
-            "independent of the model",
-            "why not",
-        ],
+        "the best of them beside those that were",
+        &["effect", "family", "gain on blocks left out", "why not"],
         rows,
     );
 }

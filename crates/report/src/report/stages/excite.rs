@@ -19,12 +19,19 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
     let (text, good) = words(judged);
-    report.everywhere().paragraph(&judged.torques);
-    report.terminal().paragraph(&judged.not_checked);
-    report.brief().verdict(&judged.not_checked, false);
+    for told in judged.first_words() {
+        report.terminal().paragraph(told);
+        report.brief().verdict(told, false);
+    }
+    if judged.torques_first {
+        report.page().paragraph(&judged.torques);
+    }
     report.brief().verdict(&text, good);
     report.page().verdict(&text, good);
     report.page().paragraph(&judged.not_checked);
+    if !judged.torques_first {
+        report.page().paragraph(&judged.torques);
+    }
     report.terminal().table(limits(judged, path));
     report.page().table(limits(judged, &name));
     report.page().list(judged.broken());

@@ -3,6 +3,7 @@
 use crate::report::Writer;
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
 use cft_ident_core::diagnose::Errors;
+use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
 
 /// Errors per joint as bars, and the next thing to do.
@@ -25,7 +26,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
     let joints = machine.robot.joint_names().iter().enumerate();
     let joints = joints.map(|(j, joint)| JointBars {
         joint: joint.clone(),
-        before: (!d.steps.is_empty()).then(|| bar(errors[0], j)),
+        before: d.written().next().map(|_| bar(errors[0], j)),
         after: bar(errors[1], j),
     });
     ErrorFigure {
@@ -39,14 +40,25 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
 /// What to do next.
 pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
     let d = &found.diagnosis;
-    let open = d.steps.iter().find(|step| !step.alternatives.is_empty());
-    if let Some(step) = open {
-        let effect = &d.model.effects[step.effect];
+    if !d.determined {
+        return "Next: move the joints faster and farther, or log a torque with less noise."
+            .to_owned();
+    }
+    if !d.long_enough() {
+        return format!(
+            "Next: log for longer: {} s at least, {} parts of {} s each.",
+            number::significant(d.block_s * d.parts_needed as f64, 2),
+            d.parts_needed,
+            number::significant(d.block_s, 2)
+        );
+    }
+    if let Some(step) = d.steps.iter().find(|step| !step.alternatives.is_empty()) {
+        let effect = &step.estimate;
         return format!(
             "Next: {}. That separates {} from {}.",
             effect.law.entry.separate_by,
             effect.title(&machine.robot),
-            step.alternatives[0].effect.title(&machine.robot)
+            step.alternatives[0].title(&machine.robot)
         );
     }
     let share = |j: &usize| d.unexplained[*j].share;
@@ -59,7 +71,7 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
              log it at other speeds and loads.",
             machine.robot.joint_names()[j]
         ),
-        None if d.steps.is_empty() => {
+        None if d.written().next().is_none() => {
             "Next: use the model (`cft-ident torque`, `cft-ident export`).".to_owned()
         }
         None => "Next: try the refined model on a log of another motion (`cft-ident validate`)."

@@ -1,9 +1,9 @@
-//! The effects that a diagnosis added, on a page: a table of their numbers, and a card for each.
+//! The effects that a diagnosis found, on a page: a table of their numbers, and a card for each that is written.
 
-use super::step_words::{chance, in_words, tentative, worsened};
+use super::step_words::{alternatives, grade, in_words, worsened};
 use crate::report::Writer;
 use crate::report::sections::effects;
-use cft_ident_core::diagnose::AcceptedEffect;
+use cft_ident_core::diagnose::FoundEffect;
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
 use cft_ident_stages::replay::ReplayedDiagnosis;
@@ -20,8 +20,8 @@ pub(super) fn show(
         true => "held-out data",
         false => "the fitted data",
     };
-    for (step, rows) in d.steps.iter().zip(&replayed.effects) {
-        let said = words(machine, found, step);
+    for (step, rows) in d.written().zip(&replayed.effects) {
+        let said = words(machine, step);
         effects::card(page, (machine, &d.model), rows, said, data);
     }
     if !d.steps.is_empty() {
@@ -30,53 +30,33 @@ pub(super) fn show(
 }
 
 /// What is said of one effect besides its picture.
-fn words(machine: &LoggedRobot, found: &Diagnosed, step: &AcceptedEffect) -> Vec<String> {
-    let d = &found.diagnosis;
-    let effect = &d.model.effects[step.effect];
-    let mut words = Vec::new();
+fn words(machine: &LoggedRobot, step: &FoundEffect) -> Vec<String> {
+    let mut words = vec![format!("{}.", grade(step, &step.estimate))];
     if let Some([before, after]) = step.holdout {
         words.push(format!(
-            "Held-out error, as the rms over the joints, parameters refitted: {} without it, {} with it{}.",
+            "Held-out error, as the rms over the joints, the others kept and refitted: {} without it, {} with it{}.",
             number::percent(before),
             number::percent(after),
             worsened(step)
         ));
     }
-    if let Some(why) = tentative(d, step) {
-        words.push(format!("Its name is tentative: {why}."));
-    }
-    if !step.alternatives.is_empty() {
-        let names = step.alternatives.iter();
-        let names: Vec<String> = names.map(|c| c.effect.title(&machine.robot)).collect();
-        words.push(format!(
-            "These data do not separate it from {}. To tell them apart, {}.",
-            names.join(", "),
-            effect.law.entry.separate_by
-        ));
-    }
+    words.extend(alternatives(machine, step));
     words
 }
 
 fn table(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
-    let row = |step: &AcceptedEffect| {
-        let effect = &d.model.effects[step.effect];
-        let score = step.candidate.score.as_ref();
+    let row = |step: &FoundEffect| {
         vec![
-            effect.title(&machine.robot),
-            in_words(machine, found, step.effect),
-            score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
-            (step.candidate.placebo_p_value).map_or("-".to_owned(), chance),
+            step.estimate.title(&machine.robot),
+            in_words(machine, found, step),
+            number::percent(step.share),
+            grade(step, &step.estimate),
         ]
     };
     page.rows(
-        "numbers of the last fit, in the order in which the effects were added",
-        &[
-            "effect",
-            "parameters",
-            "cross-validated gain",
-            "corrected for all candidates",
-        ],
+        "estimates, in the order in which the effects were found",
+        &["effect", "parameters", "gain on blocks left out", "grade"],
         d.steps.iter().map(row).collect(),
     );
 }

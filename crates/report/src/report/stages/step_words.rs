@@ -1,49 +1,61 @@
-//! What is said of one effect that was added.
+//! What is said of one effect that was found.
 
-use cft_ident_core::diagnose::{AcceptedEffect, Diagnosis, PLACEBOS, StepStatus};
+use cft_ident_core::diagnose::{FoundEffect, StepStatus};
 use cft_ident_core::effect::Added;
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
 
-/// The joints that a step makes noticeably worse on held-out data, with the change of their errors; nothing where there
-/// is none.
-pub(super) fn worsened(step: &AcceptedEffect) -> String {
-    let joints = (step.joints.iter())
-        .filter(|j| j.noticeably_worse())
-        .map(|j| {
-            let [low, high] = j.interval_95.map(|x| format!("{:+.2}", 100.0 * x));
-            let [before, after] = [j.before, j.after].map(number::percent);
-            format!(
-                "{} from {before} to {after} (95 % CI of the change {low}..{high} points)",
-                j.joint,
-            )
-        });
+/// The joints that an effect makes worse on held-out data, with the change of their errors; nothing where there is
+/// none.
+pub(super) fn worsened(step: &FoundEffect) -> String {
+    let joints = step.joints.iter().filter(|j| j.worsened).map(|j| {
+        let [low, high] = j.interval_95.map(|x| format!("{:+.2}", 100.0 * x));
+        let [before, after] = [j.before, j.after].map(number::percent);
+        format!(
+            "{} from {before} to {after} (95 % CI of the change {low}..{high} points)",
+            j.joint,
+        )
+    });
     let joints: Vec<String> = joints.collect();
     match joints.is_empty() {
-        true if step.worse_over_joints() => ": worse".to_owned(),
         true => String::new(),
         false => format!("; worse on {}", joints.join(", ")),
     }
 }
 
-/// Why the name of a step's effect is tentative; none where it is not.
-pub(super) fn tentative(d: &Diagnosis, step: &AcceptedEffect) -> Option<String> {
-    if d.status(step) != StepStatus::Tentative {
-        return None;
+/// How firm an effect is, and how much of it is written.
+pub(super) fn grade(step: &FoundEffect, effect: &Added) -> String {
+    let parts = step.parts.len();
+    let s = number::significant(step.shrinkage, 2);
+    let percent = number::percent(step.shrinkage);
+    if step.accepted_by_user {
+        return format!("accepted by you; {parts} parts of the data give s = {s}");
     }
-    let mut why = Vec::new();
-    if !step.alternatives.is_empty() {
-        why.push("these data do not separate it from others");
+    match (step.status, step.written) {
+        (StepStatus::Confirmed, Some(_)) if effect.law.entry.measurable => {
+            format!("confirmed by {parts} parts of the data (s = {s}), written as estimated")
+        }
+        (StepStatus::Confirmed, _) => {
+            format!("confirmed by {parts} parts of the data, written with {percent} of it")
+        }
+        (StepStatus::Indicated, Some(_)) if effect.law.entry.measurable => {
+            format!("indicated by {parts} parts of the data (s = {s}), written as estimated")
+        }
+        (StepStatus::Indicated, Some(_)) => {
+            format!("indicated by {parts} parts of the data, written with {percent} of it")
+        }
+        (StepStatus::Indicated, None) if step.vetoed() => {
+            format!("indicated (s = {s}), not written: held-out data are worse with it")
+        }
+        (StepStatus::Indicated, None) => format!(
+            "indicated (s = {s}), not written: it can be measured, and is written from s = 0.8 on"
+        ),
+        (StepStatus::Seen, _) => {
+            "seen, not confirmed: the parts of the data do not agree on its size. It is not written, and nothing \
+             weaker in its place"
+                .to_owned()
+        }
     }
-    if step.joints.is_empty() {
-        why.push("there are no held-out data");
-    } else if !step.confirmed() {
-        why.push("held-out data do not confirm it");
-    }
-    if !d.assured() {
-        why.push("the remaining residual is more than noise");
-    }
-    Some(why.join("; "))
 }
 
 /// What an effect is called where it was found.
@@ -52,18 +64,14 @@ pub(super) fn titled(machine: &LoggedRobot, effect: &Added) -> String {
     effect.said_and_named(&machine.robot, unit)
 }
 
-/// A p-value by placebos in words: the least that they can show is an upper bound.
+/// A p-value in words.
 pub(super) fn chance(p: f64) -> String {
-    let least = 1.0 / (1 + PLACEBOS) as f64;
-    match p <= least * (1.0 + 1e-9) {
-        true => format!("p <= {least:.3}, the least that {PLACEBOS} placebos can show"),
-        false => format!("p = {p:.3}"),
-    }
+    format!("p = {p:.3}")
 }
 
-/// Parameters of an accepted effect in words: `order = 14.0 +- 0.1 1/m, ..`.
-pub(super) fn in_words(machine: &LoggedRobot, found: &Diagnosed, effect: usize) -> String {
-    let words = found.told(machine, effect).into_iter().map(|t| {
+/// Estimated parameters of an effect in words: `order = 14.0 1/m, ..`.
+pub(super) fn in_words(machine: &LoggedRobot, found: &Diagnosed, step: &FoundEffect) -> String {
+    let words = found.told(machine, step).into_iter().map(|t| {
         let (scale, unit) = match t.unit == "m" && t.value.abs() < number::MILLIMETRES {
             true => (1e3, "mm"),
             false => (1.0, t.unit.as_ref()),
@@ -73,10 +81,20 @@ pub(super) fn in_words(machine: &LoggedRobot, found: &Diagnosed, effect: usize) 
             _ => number::significant(scale * t.value, 4),
         };
         let told = format!("{} = {value} {unit}", t.key);
-        match t.bound {
-            true => format!("{} (held at a bound)", told.trim_end()),
-            false => told.trim_end().to_owned(),
-        }
+        told.trim_end().to_owned()
     });
     words.collect::<Vec<_>>().join(", ")
+}
+
+/// Names of the effects that these data do not separate from it, and what would; nothing where there are none.
+pub(super) fn alternatives(machine: &LoggedRobot, step: &FoundEffect) -> Option<String> {
+    let names = step.alternatives.iter().map(|c| c.title(&machine.robot));
+    let names: Vec<String> = names.collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "these data do not separate it from {}; to tell them apart, {}",
+            names.join(", "),
+            step.estimate.law.entry.separate_by
+        )
+    })
 }

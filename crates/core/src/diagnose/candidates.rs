@@ -1,0 +1,169 @@
+//! Everything that a model may lack, each shape of it a candidate with columns of its own.
+
+use super::problem::case::Case;
+use crate::effect::{
+    Added, AugmentedModel, Cover, Family, LAWS, Law, Number, Place, Role, Search, Seen,
+};
+use crate::judge::Bound;
+
+/// An effect at a place in one shape, with bounds of its coefficients.
+pub type Candidate = (Added, Vec<Bound>);
+
+/// Whether two effects may not both be added: one shape per family and place, and one wave per order.
+pub fn exclude(a: &Added, b: &Added) -> bool {
+    let waves = |e: &Added| e.law.entry.search == Search::Orders;
+    match a.place == b.place && a.family() == b.family() {
+        true if waves(a) && waves(b) => a.name() == b.name() && close(&a.shape, &b.shape),
+        same => same,
+    }
+}
+
+/// Part by which two orders differ at least.
+const APART: f64 = 0.02;
+
+fn close(a: &[f64], b: &[f64]) -> bool {
+    let mut pairs = a.iter().zip(b);
+    pairs.all(|(a, b)| (a - b).abs() < APART * b.abs())
+}
+
+/// Whether an effect is the shape of a joint's declared friction law, which is fitted before all else.
+pub fn is_friction_law(effect: &Added) -> bool {
+    let joint = matches!(effect.place, Place::Joint(_));
+    joint && matches!(effect.family(), Family::Velocity | Family::Offset)
+}
+
+/// A law that these data cannot show at a place, with what they lack.
+#[derive(Debug, Clone)]
+pub struct NotTried {
+    pub law: &'static Law,
+    pub place: Place,
+    pub lacking: String,
+}
+
+/// All candidates beside a model, and what these data cannot show.
+pub fn candidates(
+    model: &AugmentedModel,
+    case: &Case,
+    cover: &Cover,
+) -> (Vec<Candidate>, Vec<NotTried>) {
+    let robot = &model.model.robot;
+    let laws = LAWS.iter().copied().chain(case.own.iter().copied());
+    let wanted = |law: &&Law| {
+        let role = law.entry.role;
+        role != Role::StandIn
+            && (case.keep || role != Role::Kept)
+            && !case.without.iter().any(|name| name == law.entry.name)
+    };
+    let (mut out, mut not_tried) = (Vec::new(), Vec::new());
+    for law in laws.filter(wanted) {
+        for place in law.places(robot, &model.model.friction) {
+            if !beside(place) || known(model, law, place) {
+                continue;
+            }
+            let touched = (0..robot.joints()).filter(|j| place.touches(*j));
+            if touched.clone().all(|j| cover.joints[j].stationary) {
+                let lacking =
+                    "the joint is held in these logs: move it to see what it does".to_owned();
+                not_tried.push(NotTried {
+                    law,
+                    place,
+                    lacking,
+                });
+                continue;
+            }
+            match law.starts_on(cover, place) {
+                Ok(shapes) => {
+                    let seen = seen(model, cover, case, place);
+                    let own = shapes
+                        .into_iter()
+                        .filter_map(|shape| candidate(law, place, shape, &seen));
+                    out.extend(own);
+                }
+                Err(lacking) => not_tried.push(NotTried {
+                    law,
+                    place,
+                    lacking,
+                }),
+            }
+        }
+    }
+    (out, not_tried)
+}
+
+/// Two joints couple where they are neighbours.
+fn beside(place: Place) -> bool {
+    match place {
+        Place::Pair { on, of } => on.abs_diff(of) == 1,
+        Place::Geared { motor, other } => motor.abs_diff(other) == 1,
+        _ => true,
+    }
+}
+
+/// Whether the model has the effect already; only waves come more than once.
+fn known(model: &AugmentedModel, law: &Law, place: Place) -> bool {
+    let mut effects = model.effects.iter();
+    law.entry.search != Search::Orders
+        && effects.any(|e| e.name() == law.entry.name && e.place == place)
+}
+
+fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> Option<Candidate> {
+    let effect = Added::new(law, place, shape, vec![1.0; law.linear.len()]);
+    // what hangs on coefficients is a bound of the fit, what hangs on the shape alone a limit of the grid
+    let coefficient = |key: &str| law.linear.contains(&key);
+    let of_coefficients = |number: &Number| match number {
+        Number::Key(key) | Number::Size(key) => coefficient(key),
+        Number::Amplitude(..) => true,
+        // of coefficients that are all one they are the shape's
+        Number::Ratio(..) | Number::Weight => false,
+    };
+    if effect
+        .broken(seen, &|rule| of_coefficients(&rule.of))
+        .is_some()
+    {
+        return None;
+    }
+    let bounds = law
+        .linear
+        .iter()
+        .map(|key| bound(&effect, key, seen))
+        .collect();
+    let linear = vec![0.0; law.linear.len()];
+    Some((Added { linear, ..effect }, bounds))
+}
+
+/// Values that a coefficient can have.
+fn bound(effect: &Added, key: &str, seen: &Seen) -> Bound {
+    let mut bound = Bound::NONE;
+    for rule in effect.law.entry.must {
+        match rule.of {
+            Number::Key(of) if of == key => {
+                bound.least = rule.least_of(seen).unwrap_or(bound.least);
+                bound.most = rule.most_of(seen).unwrap_or(bound.most);
+            }
+            Number::Size(of) if of == key => {
+                if let Some(most) = rule.most_of(seen) {
+                    (bound.least, bound.most) = (-most, most);
+                }
+            }
+            _ => {}
+        }
+    }
+    // one clock may be late or early; the torque of one joint is not ahead of its position
+    if effect.law.entry.role == Role::Shift && effect.place != Place::All {
+        bound.least = 0.0;
+    }
+    bound
+}
+
+/// What limits refer to at a place; the first joint's for all of them.
+fn seen<'a>(model: &'a AugmentedModel, cover: &'a Cover, case: &'a Case, place: Place) -> Seen<'a> {
+    let j = place.joint().unwrap_or(0);
+    Seen {
+        cover: cover.at(place),
+        duration_s: cover.duration_s,
+        kind: place.kind(&model.model.robot),
+        friction: &model.model.friction[j],
+        drive: &case.drives[j],
+        weight: cover.joints[j].weight,
+    }
+}

@@ -1,0 +1,56 @@
+//! Friction that changes from a time on: the columns of a joint's friction law again, in the blocks from there on.
+
+use rayon::prelude::*;
+
+use super::outcome::FrictionChange;
+use super::problem::unknowns::Unknown;
+use super::run::{Prepared, Searched};
+use super::watch::UNWATCHED;
+use crate::judge::LeftOut;
+
+/// Standard errors from which on a change is told: there are as many places as blocks and joints.
+const TOLD: f64 = 3.0;
+
+/// The greatest change of each joint, where it is beyond doubt. It is told as a change, and no law of it is fitted.
+pub fn friction_changes(prepared: &Prepared, searched: &Searched) -> Vec<FrictionChange> {
+    let parts = (&searched.candidates[..], &searched.layout);
+    let field = prepared.field(parts, &searched.sums, UNWATCHED);
+    let declared = prepared.terms(&searched.layout);
+    let terms = declared.with(&field.terms_of(&searched.chosen));
+    let Some(left_out) = LeftOut::new(field.sums, field.judging, &terms) else {
+        return Vec::new();
+    };
+    let joints = 0..prepared.case.given.model.robot.joints();
+    let of_joint = |j: usize| {
+        let own: Vec<usize> = (0..prepared.unknowns.len())
+            .filter(|i| matches!(prepared.unknowns.list[*i], Unknown::Friction { joint, k } if joint == j && k < 2))
+            .collect();
+        let columns: Vec<_> = own.iter().map(|i| declared.list[*i].clone()).collect();
+        let blocks = &prepared.blocks.list;
+        let begins = (1..blocks.len()).filter(|b| blocks[*b].log == blocks[b - 1].log);
+        let gains = begins.map(|b| {
+            // until the log's end: another log is another day
+            let end = blocks[b..].iter().position(|x| x.log != blocks[b].log);
+            let until = end.map_or(blocks.len(), |e| b + e);
+            (b, left_out.gain_within(&columns, b..until), until)
+        });
+        let (b, gain, until) = gains.max_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
+        if columns.is_empty() || !gain.is_beyond(TOLD, Some(j)) {
+            return None;
+        }
+        let amplitude = left_out.amplitude_within(&columns, b..until);
+        let v = prepared.cover.joints[j].speed_rms;
+        let gradient = [v, 1.0];
+        let by = amplitude.iter().zip(gradient).map(|(x, g)| x * g).sum();
+        let (stretch, rows) = blocks[b].pieces.first()?;
+        let s = &prepared.case.stretches[*stretch];
+        Some(FrictionChange {
+            joint: j,
+            log: blocks[b].log,
+            at_s: s.own_time(prepared.case.filters.of(s).sample_of(rows.start)),
+            by,
+            certainty: gain.value / gain.se.max(f64::MIN_POSITIVE),
+        })
+    };
+    joints.into_par_iter().filter_map(of_joint).collect()
+}

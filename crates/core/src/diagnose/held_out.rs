@@ -1,0 +1,73 @@
+//! What data that nothing was fitted to say of every effect.
+
+use super::problem::case::Case;
+use super::problem::data_split::{DataSplit, LogRole};
+use super::unexplained::errors::{self, Counted, Errors, JointChange, Pieces};
+use crate::effect::AugmentedModel;
+use crate::motion::MotionError;
+
+/// Rows of one use on which models are compared.
+#[derive(Clone, Copy)]
+pub struct HeldOut<'a> {
+    pub case: &'a Case,
+    pub split: &'a DataSplit,
+    pub role: LogRole,
+    /// Neighbouring pieces that a bootstrap draws together.
+    pub together: usize,
+}
+
+/// What an effect does to data that it was not fitted to.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// Mean relative error without and with it.
+    pub mean: [f64; 2],
+    pub joints: Vec<JointChange>,
+}
+
+impl Change {
+    /// The joint that it makes worse by the most, beyond its interval.
+    pub fn worst(&self) -> Option<f64> {
+        let worse = self.joints.iter().filter(|j| j.worsened);
+        let by = worse.map(|j| (j.after - j.before) / j.before);
+        by.max_by(f64::total_cmp)
+    }
+
+    /// Whether a joint gains beyond its interval.
+    pub fn confirms(&self) -> bool {
+        self.joints.iter().any(JointChange::improved)
+    }
+}
+
+impl HeldOut<'_> {
+    fn pieces(&self, model: &AugmentedModel) -> Result<Pieces, MotionError> {
+        let case = self.case;
+        errors::pieces(
+            model,
+            &case.stretches,
+            (&case.filters, &case.rest_speed),
+            self.split,
+            (self.role, Counted::All),
+        )
+    }
+
+    /// Errors of a model; none where there are no such rows.
+    pub fn errors(&self, model: &AugmentedModel) -> Result<Option<Errors>, MotionError> {
+        let pieces = self.pieces(model)?;
+        let units = &self.case.units;
+        Ok(errors::summed(model, units, (&pieces, self.together)))
+    }
+
+    /// What the second model changes; none where there are no such rows.
+    pub fn change(&self, models: [&AugmentedModel; 2]) -> Result<Option<Change>, MotionError> {
+        let [before, after] = [self.pieces(models[0])?, self.pieces(models[1])?];
+        let means = [&before, &after].map(errors::mean_relative_error);
+        let names = models[0].model.robot.joint_names();
+        let [Some(without), Some(with)] = means else {
+            return Ok(None);
+        };
+        Ok(Some(Change {
+            mean: [without, with],
+            joints: errors::changes(names, (&before, &after), self.together),
+        }))
+    }
+}

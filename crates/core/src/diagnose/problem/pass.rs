@@ -1,0 +1,316 @@
+//! The one pass over all rows: columns of the declared unknowns and of candidates, with the measured torque and the
+//! residual, weighed where a joint stands or turns, through the parallel filter, folded into sums per block and joint.
+//!
+//! Long stretches are walked in windows, so that memory does not grow with them. A window begins a lead early, in which
+//! what remembers finds its state. Of very long logs every m-th row is summed: neighbours in the kept band repeat
+//! each other.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::data_split::DataSplit;
+use super::unknowns::{Unknown, Unknowns};
+use crate::effect::{Added, AugmentedModel, Scene, Torques, shifted};
+use crate::judge::{Block, BlockSums, Bound, Term};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
+use crate::robot::model::JointFriction;
+
+/// Samples of a window besides its lead.
+const WINDOW: usize = 16_384;
+/// Samples before a window from which memory runs, and behind it.
+const LEAD: usize = 2048;
+/// Windows whose sums are held at a time.
+const TOGETHER: usize = 4;
+/// Rows that are summed of all logs, about.
+const MOST_ROWS: usize = 40_000;
+
+/// Rows and what each of them counts.
+pub struct Data<'a> {
+    pub stretches: &'a [Stretch],
+    pub filters: &'a ParallelFilters,
+    pub split: &'a DataSplit,
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub rest_speed: &'a [f64],
+}
+
+/// Where the columns of unknowns and candidates stand in the rows of each joint.
+pub struct Layout {
+    /// Terms of the declared unknowns.
+    pub declared: Vec<Term>,
+    /// Terms of each candidate, as many as it has coefficients.
+    pub candidates: Vec<Vec<Term>>,
+    /// Columns of each joint: unknowns, candidates, then the measured torque; the residual stands last.
+    pub columns: Vec<usize>,
+}
+
+impl Layout {
+    /// Of unknowns and candidates with bounds of their coefficients.
+    pub fn of(unknowns: &Unknowns, candidates: &[(Added, Vec<Bound>)]) -> Self {
+        let joints = unknowns.columns.len();
+        let term = |bound| Term {
+            columns: Vec::new(),
+            bound,
+        };
+        let mut declared = vec![term(Bound::NONE); unknowns.len()];
+        for (j, own) in unknowns.columns.iter().enumerate() {
+            for (column, i) in own.iter().enumerate() {
+                declared[*i].columns.push((j, column));
+            }
+        }
+        let mut columns: Vec<usize> = unknowns.columns.iter().map(Vec::len).collect();
+        let candidates = candidates.iter().map(|(effect, bounds)| {
+            let mut terms: Vec<Term> = bounds.iter().map(|b| term(*b)).collect();
+            for j in (0..joints).filter(|j| effect.place.touches(*j)) {
+                for term in &mut terms {
+                    term.columns.push((j, columns[j]));
+                    columns[j] += 1;
+                }
+            }
+            terms
+        });
+        let candidates = candidates.collect();
+        columns.iter_mut().for_each(|c| *c += 1);
+        Layout {
+            declared,
+            candidates,
+            columns,
+        }
+    }
+
+    /// Column of the measured torque of a joint.
+    pub fn torque(&self, joint: usize) -> usize {
+        self.columns[joint] - 1
+    }
+}
+
+/// Sums over blocks of the columns of a model's unknowns and of candidates beside it.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn pass(
+    model: &AugmentedModel,
+    (unknowns, candidates): (&Unknowns, &[(Added, Vec<Bound>)]),
+    layout: &Layout,
+    data: &Data,
+    blocks: &[Block],
+) -> Result<BlockSums, MotionError> {
+    let mut sums = BlockSums::zeros(blocks.len(), &layout.columns);
+    let pieces = blocks.iter().flat_map(|b| &b.pieces);
+    let rows: usize = pieces.map(|(_, rows)| rows.len()).sum();
+    let every = rows.div_ceil(MOST_ROWS).max(1);
+    let windows = windows(data, blocks);
+    for some in windows.chunks(TOGETHER) {
+        let found: Vec<Vec<DMatrix<f64>>> = some
+            .par_iter()
+            .map(|(stretch, rows)| {
+                let window = Window::of(model, data, *stretch, rows);
+                window.rows(unknowns, candidates, layout)
+            })
+            .collect::<Result<_, _>>()?;
+        for ((stretch, range), rows) in some.iter().zip(found) {
+            fold(&mut sums, blocks, (*stretch, range), (&rows, every));
+        }
+    }
+    Ok(sums)
+}
+
+/// Windows over the rows that blocks need.
+fn windows(data: &Data, blocks: &[Block]) -> Vec<(usize, Range<usize>)> {
+    let mut out = Vec::new();
+    for (index, stretch) in data.stretches.iter().enumerate() {
+        let pieces = blocks.iter().flat_map(|b| &b.pieces);
+        let own = || pieces.clone().filter(|(s, _)| *s == index).map(|(_, r)| r);
+        let (Some(first), Some(last)) = (own().map(|r| r.start).min(), own().map(|r| r.end).max())
+        else {
+            continue;
+        };
+        let step = (WINDOW / data.filters.of(stretch).decimation).max(1);
+        let begins = (first..last).step_by(step);
+        out.extend(begins.map(|begin| (index, begin..(begin + step).min(last))));
+    }
+    out
+}
+
+/// Adds the rows of a window to the blocks that they lie in.
+fn fold(
+    sums: &mut BlockSums,
+    blocks: &[Block],
+    (stretch, window): (usize, &Range<usize>),
+    (rows, every): (&[DMatrix<f64>], usize),
+) {
+    for (b, block) in blocks.iter().enumerate() {
+        for (_, piece) in block.pieces.iter().filter(|(s, _)| *s == stretch) {
+            let (from, to) = (piece.start.max(window.start), piece.end.min(window.end));
+            if from >= to {
+                continue;
+            }
+            let (of_block, counts) = (&mut sums.blocks[b], &mut sums.rows[b]);
+            let joints = rows.iter().zip(of_block.iter_mut()).zip(counts);
+            for ((rows, total), count) in joints {
+                if rows.nrows() == 0 {
+                    continue;
+                }
+                let first = from.next_multiple_of(every);
+                if first >= to {
+                    continue;
+                }
+                let (begin, kept) = (first - window.start, (to - first).div_ceil(every));
+                let part = rows.rows_with_step(begin, kept, every - 1).into_owned();
+                total.gemm(1.0, &part.transpose(), &part, 1.0);
+                *count += part.nrows() as f64;
+            }
+        }
+    }
+}
+
+/// A piece of one stretch with what a model makes of it.
+struct Window<'a> {
+    model: &'a AugmentedModel,
+    data: &'a Data<'a>,
+    stretch: usize,
+    /// Samples, from the begin of the lead on.
+    part: Stretch,
+    torques: Torques,
+    /// Rows of the stretch that are wanted, and the row that the part begins with.
+    range: Range<usize>,
+    begin: usize,
+}
+
+impl<'a> Window<'a> {
+    fn of(model: &'a AugmentedModel, data: &'a Data, index: usize, range: &Range<usize>) -> Self {
+        let stretch = &data.stretches[index];
+        let parallel = data.filters.of(stretch);
+        let begin = range.start.saturating_sub(LEAD / parallel.decimation);
+        let last = parallel.sample_of(range.end - 1);
+        let end = (last + parallel.trim + 1 + LEAD).min(stretch.len());
+        let part = stretch.part(begin * parallel.decimation, end);
+        Window {
+            torques: model.torques(&part),
+            model,
+            data,
+            stretch: index,
+            part,
+            range: range.clone(),
+            begin,
+        }
+    }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene {
+            robot: &self.model.model.robot,
+            theta: &self.model.model.theta,
+            laws: &self.model.model.friction,
+            stretch: &self.part,
+            hat: &self.torques.hat,
+            load: &self.torques.load,
+            direction: &self.torques.direction,
+            tilt: Some(&self.torques.tilt),
+        }
+    }
+
+    /// Rows of every joint, one column each; none of joints that are stationary.
+    fn rows(
+        &self,
+        unknowns: &Unknowns,
+        candidates: &[(Added, Vec<Bound>)],
+        layout: &Layout,
+    ) -> Result<Vec<DMatrix<f64>>, MotionError> {
+        let n = self.model.model.robot.joints();
+        let mut regressor = regressor(self.model, unknowns, &self.part);
+        let of_joint = |(j, regressor): (usize, &mut Vec<Vec<f64>>)| {
+            if self.data.split.is_stationary(self.stretch, j) {
+                return Ok(DMatrix::zeros(0, layout.columns[j] + 1));
+            }
+            self.rows_of(j, unknowns, candidates, regressor)
+        };
+        (0..n).zip(regressor.iter_mut()).map(of_joint).collect()
+    }
+
+    fn rows_of(
+        &self,
+        j: usize,
+        unknowns: &Unknowns,
+        candidates: &[(Added, Vec<Bound>)],
+        regressor: &mut [Vec<f64>],
+    ) -> Result<DMatrix<f64>, MotionError> {
+        let (model, part) = (self.model, &self.part);
+        let scene = self.scene();
+        let late = model.shift(j) / part.dt;
+        let mut friction = friction_columns(&model.model.friction[j], &part.v[j]);
+        let mut raw: Vec<Vec<f64>> = Vec::new();
+        for i in &unknowns.columns[j] {
+            raw.push(match unknowns.list[*i] {
+                Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
+                Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
+                Unknown::Offset(_) => vec![1.0; part.len()],
+            });
+        }
+        for (effect, _) in candidates.iter().filter(|(e, _)| e.place.touches(j)) {
+            raw.extend(effect.columns(&scene, j));
+        }
+        let mut hat = self.torques.hat[j].clone();
+        raw.iter_mut().for_each(|column| shifted(column, late));
+        shifted(&mut hat, late);
+        let tau = &part.tau[j];
+        raw.push(tau.clone());
+        raw.push(tau.iter().zip(&hat).map(|(tau, hat)| tau - hat).collect());
+        let parallel = self.data.filters.of(&self.data.stretches[self.stretch]);
+        if model.model.friction[j] != JointFriction::None {
+            // both sides of the model, where the joint stands or turns, weigh nothing before any filter
+            let weights = parallel.weights(part, j, self.data.rest_speed[j]);
+            for column in &mut raw {
+                column.iter_mut().zip(&weights).for_each(|(x, w)| *x *= w);
+            }
+        }
+        let (skip, count) = (self.range.start - self.begin, self.range.len());
+        let mut out = DMatrix::zeros(count, raw.len());
+        for (first, group) in raw.chunks(8).enumerate().map(|(g, group)| (8 * g, group)) {
+            let channels: Vec<&[f64]> = group.iter().map(Vec::as_slice).collect();
+            for (l, rows) in parallel.run(&channels)?.into_iter().enumerate() {
+                let kept = rows.iter().skip(skip).take(count);
+                let column = out.column_mut(first + l);
+                column.into_iter().zip(kept).for_each(|(out, x)| *out = *x);
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Regressor of the inertial parameters along a stretch, `[joint][parameter][sample]`; nothing where these are kept.
+fn regressor(model: &AugmentedModel, unknowns: &Unknowns, stretch: &Stretch) -> Vec<Vec<Vec<f64>>> {
+    let robot = &model.model.robot;
+    let (n, p) = (robot.joints(), robot.parameters().len());
+    let theta = |u: &Unknown| matches!(u, Unknown::Theta(_));
+    if !unknowns.list.iter().any(theta) {
+        return vec![Vec::new(); n];
+    }
+    let samples = stretch.len();
+    let mut out = vec![vec![vec![0.0; samples]; p]; n];
+    let mut y = vec![0.0; n * p];
+    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for k in 0..samples {
+        stretch.at(k, &mut q, &mut v, &mut a);
+        robot.regressor(&q, &v, &a, &mut y);
+        for (columns, row) in out.iter_mut().zip(y.chunks_exact(p)) {
+            for (column, y) in columns.iter_mut().zip(row) {
+                column[k] = *y;
+            }
+        }
+    }
+    out
+}
+
+/// Gradient of a friction law along a motion, `[parameter][sample]`.
+fn friction_columns(law: &JointFriction, v: &[f64]) -> Vec<Vec<f64>> {
+    let mut columns = vec![vec![0.0; v.len()]; law.parameters()];
+    let mut gradient = [0.0; 5];
+    for (i, v) in v.iter().enumerate() {
+        law.gradient(*v, &mut gradient);
+        for (column, g) in columns.iter_mut().zip(&gradient) {
+            column[i] = *g;
+        }
+    }
+    columns
+}

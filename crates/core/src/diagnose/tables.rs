@@ -1,0 +1,111 @@
+//! From what was chosen to two tables: estimates, and a model that predicts.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::problem::unknowns::{Unknowns, step};
+use super::search::{Chosen, Field};
+use crate::effect::{Added, AugmentedModel};
+use crate::judge::{Agreement, Blocks, LeftOut, Terms, agreement};
+
+/// An effect that was chosen, with what its parts say.
+#[derive(Debug, Clone)]
+pub struct Verified {
+    pub chosen: Chosen,
+    pub agreement: Agreement,
+    /// Amplitude of the joint fit with all that was chosen.
+    pub amplitude: Vec<f64>,
+}
+
+/// The joint fit of declared terms and effects.
+pub struct Estimates {
+    /// Values of the declared unknowns, about the fitted model, then of every effect's coefficients.
+    pub values: DVector<f64>,
+    /// By the block jackknife.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Places of the coefficients of each effect behind `declared` unknowns.
+fn places(field: &Field, declared: usize, effects: &[Chosen]) -> Vec<Vec<usize>> {
+    let mut next = declared;
+    let place = |c: &Chosen| {
+        let first = next;
+        next += field.terms[c.candidate].len();
+        (first..next).collect()
+    };
+    effects.iter().map(place).collect()
+}
+
+/// Asks the parts of the data for every effect that was chosen.
+pub fn verified(
+    field: &Field,
+    declared: &Terms,
+    chosen: &[Chosen],
+    blocks: &Blocks,
+) -> Vec<Verified> {
+    let terms = declared.with(&field.terms_of(chosen));
+    let fitted = field.sums.blocks.len() - field.judging;
+    let values = terms.fit(&field.sums.over(0..fitted), &[]).values;
+    let places = places(field, declared.len(), chosen);
+    let of = |(chosen, own): (&Chosen, Vec<usize>)| Verified {
+        agreement: agreement(field.sums, blocks, &terms, (&own, &values), field.numbers),
+        amplitude: own.iter().map(|i| values[*i]).collect(),
+        chosen: chosen.clone(),
+    };
+    chosen.iter().zip(places).map(of).collect()
+}
+
+impl Estimates {
+    /// The joint fit with some effects; none where these data determine nothing.
+    pub fn of(field: &Field, declared: &Terms, effects: &[Chosen]) -> Option<Self> {
+        let terms = declared.with(&field.terms_of(effects));
+        let fitted = field.sums.blocks.len() - field.judging;
+        let values = terms.fit(&field.sums.over(0..fitted), &[]).values;
+        let left_out = LeftOut::new(field.sums, field.judging, &terms)?;
+        let without: Vec<&DVector<f64>> = left_out.values().collect();
+        let count = without.len() as f64;
+        let zero = DVector::zeros(terms.len());
+        let mean = without.iter().fold(zero, |sum, x| sum + *x) / count;
+        let mut covariance = DMatrix::zeros(terms.len(), terms.len());
+        for x in without {
+            let off = x - &mean;
+            covariance.ger((count - 1.0) / count, &off, &off, 1.0);
+        }
+        Some(Estimates { values, covariance })
+    }
+}
+
+/// Values of the declared unknowns beside effects of given amplitudes.
+pub fn beside(field: &Field, declared: &Terms, effects: &[(&Chosen, Vec<f64>)]) -> Vec<f64> {
+    let chosen: Vec<Chosen> = effects.iter().map(|(c, _)| (*c).clone()).collect();
+    let terms = declared.with(&field.terms_of(&chosen));
+    let places = places(field, declared.len(), &chosen);
+    let held = places.into_iter().flatten();
+    let amplitudes = effects.iter().flat_map(|(_, a)| a.iter().copied());
+    let held: Vec<(usize, f64)> = held.zip(amplitudes).collect();
+    let fitted = field.sums.blocks.len() - field.judging;
+    let values = terms.fit(&field.sums.over(0..fitted), &held).values;
+    values.iter().take(declared.len()).copied().collect()
+}
+
+/// A model with effects of given amplitudes, its declared unknowns moved.
+pub fn model(
+    field: &Field,
+    (fitted, unknowns): (&AugmentedModel, &Unknowns),
+    values: &[f64],
+    effects: &[(&Chosen, Vec<f64>)],
+) -> AugmentedModel {
+    let mut model = fitted.clone();
+    step(&mut model, unknowns, values);
+    let added = effects.iter().map(|(c, linear)| effect(field, c, linear));
+    model.effects.extend(added);
+    model
+}
+
+/// An effect with its amplitudes.
+pub fn effect(field: &Field, chosen: &Chosen, linear: &[f64]) -> Added {
+    let (shape, _) = &field.candidates[chosen.candidate];
+    Added {
+        linear: linear.to_vec(),
+        ..shape.clone()
+    }
+}

@@ -1,0 +1,67 @@
+//! Least squares with bounds, from normal equations.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::sums::Bound;
+
+/// Minimises x' A x - 2 x' b within bounds; terms with nothing on the diagonal stay at zero. Terms that leave their
+/// bounds are held there, the farthest first.
+pub fn solve(a: &DMatrix<f64>, b: &DVector<f64>, bounds: &[Bound]) -> DVector<f64> {
+    let n = b.len();
+    let mut held: Vec<Option<f64>> = (0..n)
+        .map(|i| (a[(i, i)].is_nan() || a[(i, i)] <= 0.0).then_some(0.0))
+        .collect();
+    loop {
+        let x = with_held(a, b, &held);
+        let off = |i: &usize| bounds[*i].excess(x[*i]) * a[(*i, *i)].max(0.0).sqrt();
+        let free = (0..n).filter(|i| held[*i].is_none());
+        let worst = free
+            .max_by(|i, j| off(i).total_cmp(&off(j)))
+            .filter(|i| off(i) > 0.0);
+        match worst {
+            Some(i) => held[i] = Some(bounds[i].nearest(x[i])),
+            None => return x,
+        }
+    }
+}
+
+/// The minimum with some terms held.
+pub fn with_held(a: &DMatrix<f64>, b: &DVector<f64>, held: &[Option<f64>]) -> DVector<f64> {
+    let free: Vec<usize> = (0..b.len()).filter(|i| held[*i].is_none()).collect();
+    let mut x = DVector::from_iterator(b.len(), held.iter().map(|h| h.unwrap_or(0.0)));
+    let pulled = b - a * &x;
+    let own = DMatrix::from_fn(free.len(), free.len(), |i, j| a[(free[i], free[j])]);
+    let right = DVector::from_iterator(free.len(), free.iter().map(|i| pulled[*i]));
+    // without a factor the matrix says nothing, and all stays where it is
+    if let Some(factor) = own.cholesky() {
+        for (i, value) in free.iter().zip(factor.solve(&right).iter()) {
+            x[*i] = *value;
+        }
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_leaves_its_bound_is_held_there_and_the_others_follow() {
+        let a = DMatrix::from_row_slice(3, 3, &[2.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 0.0]);
+        let b = DVector::from_vec(vec![3.0, -1.0, 5.0]);
+        let free = [Bound::NONE; 3];
+        let x = solve(&a, &b, &free);
+        assert!((x[0] - 7.0 / 3.0).abs() < 1e-12 && (x[1] + 5.0 / 3.0).abs() < 1e-12);
+        assert_eq!(x[2], 0.0);
+        let above = [
+            Bound::NONE,
+            Bound {
+                least: 0.0,
+                most: 9.0,
+            },
+            Bound::NONE,
+        ];
+        let x = solve(&a, &b, &above);
+        assert_eq!((x[0], x[1]), (1.5, 0.0));
+    }
+}

@@ -1,0 +1,290 @@
+//! Errors of each block by the fit of all others, for the terms in use and for more.
+
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::bounded;
+use super::sums::{BlockSums, Bound, Term, Terms};
+
+/// What a hypothesis takes off the squared errors of blocks that were left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gain {
+    /// Sum over joints and blocks, each joint in its weight.
+    pub value: f64,
+    /// Its standard error.
+    pub se: f64,
+    /// The same of each joint by itself.
+    pub joints: Vec<[f64; 2]>,
+    /// Of each block, over the joints.
+    pub blocks: Vec<f64>,
+}
+
+/// Gain of the second hypothesis over the first: errors `[block][joint]` of blocks that neither was fitted to.
+pub fn compare(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64]) -> Gain {
+    let of_block = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+        let pairs = a.iter().zip(b).zip(weights);
+        pairs.map(|((a, b), w)| w * (a - b)).collect()
+    };
+    let gains: Vec<Vec<f64>> = before.iter().zip(after).map(of_block).collect();
+    Gain::of(&gains)
+}
+
+impl Gain {
+    /// Of weighted gains `[block][joint]`.
+    pub(super) fn of(gains: &[Vec<f64>]) -> Self {
+        let blocks: Vec<f64> = gains.iter().map(|g| g.iter().sum()).collect();
+        let joints = gains.first().map_or(0, Vec::len);
+        let of_joint = |j: usize| sum_and_error(gains.iter().map(|g| g[j]));
+        let [value, se] = sum_and_error(blocks.iter().copied());
+        Gain {
+            value,
+            se,
+            joints: (0..joints).map(of_joint).collect(),
+            blocks,
+        }
+    }
+
+    /// Whether the whole gain and that of each of these joints is above so many standard errors.
+    pub fn is_beyond(&self, errors: f64, own: Option<usize>) -> bool {
+        let beyond = |[value, se]: [f64; 2]| value > 0.0 && value > errors * se;
+        beyond([self.value, self.se]) && own.is_none_or(|j| beyond(self.joints[j]))
+    }
+
+    /// Whether it is that of another within so many standard errors of their difference.
+    pub fn is_near(&self, other: &Gain, errors: f64) -> bool {
+        let pairs = self.blocks.iter().zip(&other.blocks);
+        let [value, se] = sum_and_error(pairs.map(|(a, b)| a - b));
+        value.abs() <= errors * se
+    }
+}
+
+/// A sum over blocks, and its standard error from their scatter.
+fn sum_and_error(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+    let count = values.clone().count() as f64;
+    let sum: f64 = values.clone().sum();
+    let mean = sum / count.max(1.0);
+    let scatter: f64 = values.map(|x| (x - mean) * (x - mean)).sum();
+    [sum, (scatter / (count - 1.0).max(1.0) * count).sqrt()]
+}
+
+/// The fit of the terms in use without one block.
+struct Without {
+    /// None for a block that is never fitted.
+    block: Option<usize>,
+    factor: Cholesky<f64, Dyn>,
+    values: DVector<f64>,
+    /// What pulls each term still, in the rows of the block itself, by joint.
+    pull: Vec<DVector<f64>>,
+}
+
+/// Fits of terms with each block left out.
+pub struct LeftOut<'a> {
+    pub terms: &'a Terms,
+    sums: &'a BlockSums,
+    /// Of all fitted blocks, by joint.
+    total: Vec<DMatrix<f64>>,
+    own: Vec<Vec<(usize, usize)>>,
+    without: Vec<Without>,
+}
+
+impl<'a> LeftOut<'a> {
+    /// Of all blocks; the last `judging` of them are never fitted. None where these data determine nothing.
+    pub fn new(sums: &'a BlockSums, judging: usize, terms: &'a Terms) -> Option<Self> {
+        let fitted = sums.blocks.len() - judging;
+        let total = sums.over(0..fitted);
+        let (all, right) = terms.normal(&total);
+        let diagonal: Vec<f64> = all.diagonal().iter().map(|x| x.max(1e-300)).collect();
+        let own: Vec<_> = (0..total.len()).map(|j| terms.own(j)).collect();
+        let mut without = Vec::new();
+        for (b, block) in sums.blocks.iter().enumerate() {
+            let (mut normal, mut side) = (all.clone(), right.clone());
+            if b < fitted {
+                let (of_block, right) = terms.normal(block);
+                normal -= of_block;
+                side -= right;
+            }
+            terms.firm(&mut normal, &mut side, &diagonal);
+            let factor = normal.cholesky()?;
+            let values = factor.solve(&side);
+            let pull = (0..total.len())
+                .map(|j| pull(&block[j], &own[j], &values))
+                .collect();
+            without.push(Without {
+                block: (b < fitted).then_some(b),
+                factor,
+                values,
+                pull,
+            });
+        }
+        Some(LeftOut {
+            terms,
+            sums,
+            total,
+            own,
+            without,
+        })
+    }
+
+    /// Errors of every block by the terms in use, `[block][joint]`.
+    pub fn errors(&self) -> Vec<Vec<f64>> {
+        let blocks = self.without.iter().zip(&self.sums.blocks);
+        let of_block =
+            |(w, block): (&Without, &Vec<DMatrix<f64>>)| self.terms.squares(block, &w.values);
+        blocks.map(of_block).collect()
+    }
+
+    /// Values of the terms without each fitted block.
+    pub fn values(&self) -> impl Iterator<Item = &DVector<f64>> {
+        let fitted = self.without.iter().filter(|w| w.block.is_some());
+        fitted.map(|w| &w.values)
+    }
+
+    /// Gain of more terms beside those in use, all refitted without each block.
+    pub fn gain(&self, more: &[Term]) -> Gain {
+        self.gain_of(more, Beside::of(self, more, &self.total), &|_| true)
+    }
+
+    /// The same of terms that are there in some blocks alone.
+    pub fn gain_within(&self, more: &[Term], there: Range<usize>) -> Gain {
+        self.gain_of(more, self.within(more, &there), &|b| there.contains(&b))
+    }
+
+    fn within(&self, more: &[Term], there: &Range<usize>) -> Beside {
+        Beside::of(self, more, &self.sums.over(there.clone()))
+    }
+
+    fn gain_of(&self, more: &[Term], all: Beside, there: &dyn Fn(usize) -> bool) -> Gain {
+        let joints = self.total.len();
+        let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
+        let diagonal: Vec<f64> = all.own.diagonal().iter().copied().collect();
+        let mut gains = Vec::with_capacity(self.without.len());
+        for (b, without) in self.without.iter().enumerate() {
+            let mut others = all.clone();
+            if without.block.is_some() && there(b) {
+                others.subtract(&Beside::of(self, more, &self.sums.blocks[b]));
+            }
+            let through = without.factor.solve(&others.with);
+            let mut own = &others.own - others.with.tr_mul(&through);
+            for (i, x) in diagonal.iter().enumerate() {
+                own[(i, i)] += self.terms.ridge * x;
+            }
+            let right = &others.right - others.with.tr_mul(&without.values);
+            let amplitude = bounded::solve(&own, &right, &bounds);
+            let moved = -through * &amplitude;
+            let added = if there(b) { more } else { &[] };
+            let gain = |j: usize| -> f64 {
+                let block = &self.sums.blocks[b][j];
+                let change = self.change(j, block, added, (without, &moved, &amplitude));
+                -self.terms.weights[j] * change
+            };
+            gains.push((0..joints).map(gain).collect());
+        }
+        Gain::of(&gains)
+    }
+
+    /// Change of a joint's squared error in a block.
+    fn change(
+        &self,
+        j: usize,
+        block: &DMatrix<f64>,
+        more: &[Term],
+        (without, moved, amplitude): (&Without, &DVector<f64>, &DVector<f64>),
+    ) -> f64 {
+        let own = &self.own[j];
+        let tau = block.nrows() - 1;
+        let mut change = 0.0;
+        for (k, &(i, a)) in own.iter().enumerate() {
+            let step = moved[i];
+            if step != 0.0 {
+                let column = block.column(a);
+                let through: f64 = own.iter().map(|&(l, b)| column[b] * moved[l]).sum();
+                change += step * (through - 2.0 * without.pull[j][k]);
+            }
+        }
+        let added = more.iter().zip(amplitude.iter());
+        let added: Vec<(usize, f64)> = added
+            .filter_map(|(term, x)| Some((term.column(j)?, *x)))
+            .filter(|(_, x)| *x != 0.0)
+            .collect();
+        for &(c, x) in &added {
+            let column = block.column(c);
+            let used: f64 = own
+                .iter()
+                .map(|&(i, a)| column[a] * (without.values[i] + moved[i]))
+                .sum();
+            let among: f64 = added.iter().map(|&(d, y)| column[d] * y).sum();
+            change += x * (among + 2.0 * used - 2.0 * column[tau]);
+        }
+        change
+    }
+
+    /// Amplitudes of terms that are there in some blocks alone, beside those in use over all fitted blocks.
+    pub fn amplitude_within(&self, more: &[Term], there: Range<usize>) -> DVector<f64> {
+        let (mut normal, mut right) = self.terms.normal(&self.total);
+        let diagonal: Vec<f64> = normal.diagonal().iter().map(|x| x.max(1e-300)).collect();
+        self.terms.firm(&mut normal, &mut right, &diagonal);
+        let all = self.within(more, &there);
+        let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
+        let Some(factor) = normal.cholesky() else {
+            return DVector::zeros(more.len());
+        };
+        let mut own = &all.own - all.with.tr_mul(&factor.solve(&all.with));
+        for i in 0..more.len() {
+            own[(i, i)] += self.terms.ridge * all.own[(i, i)];
+        }
+        let right = &all.right - all.with.tr_mul(&factor.solve(&right));
+        bounded::solve(&own, &right, &bounds)
+    }
+}
+
+/// What is left to pull each of a joint's terms in some rows.
+fn pull(sums: &DMatrix<f64>, own: &[(usize, usize)], values: &DVector<f64>) -> DVector<f64> {
+    let tau = sums.nrows() - 1;
+    let of_term = |&(_, a): &(usize, usize)| -> f64 {
+        let column = sums.column(a);
+        column[tau] - own.iter().map(|&(l, b)| column[b] * values[l]).sum::<f64>()
+    };
+    DVector::from_iterator(own.len(), own.iter().map(of_term))
+}
+
+/// Weighted products of more terms with those in use and with one another.
+#[derive(Clone)]
+struct Beside {
+    with: DMatrix<f64>,
+    own: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl Beside {
+    fn of(used: &LeftOut, more: &[Term], sums: &[DMatrix<f64>]) -> Self {
+        let (u, k) = (used.terms.len(), more.len());
+        let mut out = Beside {
+            with: DMatrix::zeros(u, k),
+            own: DMatrix::zeros(k, k),
+            right: DVector::zeros(k),
+        };
+        for (c, term) in more.iter().enumerate() {
+            for &(j, column) in &term.columns {
+                let w = used.terms.weights[j];
+                let products = sums[j].column(column);
+                for &(i, a) in &used.own[j] {
+                    out.with[(i, c)] += w * products[a];
+                }
+                for (d, other) in more.iter().enumerate() {
+                    if let Some(other) = other.column(j) {
+                        out.own[(d, c)] += w * products[other];
+                    }
+                }
+                out.right[c] += w * products[products.len() - 1];
+            }
+        }
+        out
+    }
+
+    fn subtract(&mut self, other: &Beside) {
+        self.with -= &other.with;
+        self.own -= &other.own;
+        self.right -= &other.right;
+    }
+}

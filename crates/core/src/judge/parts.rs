@@ -1,0 +1,152 @@
+//! Agreement of an amplitude between parts of the data: a statistic that no search has seen.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::sums::{BlockSums, Terms};
+use super::{Blocks, Numbers};
+
+/// What parts of the data ask for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreement {
+    /// Scatter that the amplitude has over that which the parts have: F with k and k (P - 1) degrees of freedom.
+    pub z: f64,
+    /// Factor of the amplitude in predictions, 0..1.
+    pub s: f64,
+    /// Amplitudes by part, those of parts in which its torque is next to nothing left out.
+    pub parts: Vec<Vec<f64>>,
+}
+
+/// Part of the mean information below which a part says nothing.
+const SILENT: f64 = 1e-3;
+
+/// Whether the parts agree on the terms `effect` of a fit: terms of several joints are held at `values`, those that
+/// only one joint has are fitted in each part anew.
+pub fn agreement(
+    sums: &BlockSums,
+    blocks: &Blocks,
+    terms: &Terms,
+    (effect, values): (&[usize], &DVector<f64>),
+    numbers: &Numbers,
+) -> Agreement {
+    let joints = terms.weights.len();
+    let touched: Vec<usize> = (0..joints)
+        .filter(|j| effect.iter().any(|i| terms.list[*i].column(*j).is_some()))
+        .collect();
+    let k = effect.len();
+    let mut found: Vec<(DMatrix<f64>, DVector<f64>)> = Vec::new();
+    for part in 0..blocks.parts {
+        let own = (0..blocks.list.len()).filter(|b| blocks.list[*b].part == part);
+        let sums = sums.over(own);
+        let (mut s, mut r) = (DMatrix::zeros(k, k), DVector::zeros(k));
+        for j in &touched {
+            reduced(&sums[*j], terms, *j, (effect, values), (&mut s, &mut r));
+        }
+        found.push((s, r));
+    }
+    let total = found.iter().fold(DMatrix::zeros(k, k), |t, (s, _)| t + s);
+    // what says nothing of the amplitude is no part that agrees
+    let mean = total.trace() / found.len().max(1) as f64;
+    found.retain(|(s, _)| s.trace() > SILENT * mean);
+    let firm = |m: &DMatrix<f64>, by: &DMatrix<f64>| {
+        let mut m = m.clone();
+        for i in 0..k {
+            m[(i, i)] += numbers.ridge * by[(i, i)].max(1e-200);
+        }
+        m
+    };
+    let right = found.iter().fold(DVector::zeros(k), |t, (_, r)| t + r);
+    let count = found.len();
+    let none = Agreement {
+        z: 0.0,
+        s: 0.0,
+        parts: Vec::new(),
+    };
+    let Some(all) = firm(&total, &total).cholesky() else {
+        return none;
+    };
+    let amplitude = all.solve(&right);
+    let mut scatter = 0.0;
+    let mut parts = Vec::new();
+    for (s, r) in &found {
+        let Some(own) = firm(s, &total).cholesky() else {
+            return none;
+        };
+        let off = own.solve(&(r - s * &amplitude));
+        scatter += off.dot(&(s * &off));
+        parts.push((&amplitude + off).iter().copied().collect());
+    }
+    let size = amplitude.dot(&(&total * &amplitude));
+    let p = count as f64;
+    let z = match scatter > 0.0 {
+        true => size * (p - 1.0) / (p * scatter),
+        false => 0.0,
+    };
+    let enough = count >= numbers.parts;
+    Agreement {
+        z,
+        s: if enough {
+            (1.0 - numbers.doubt / z).max(0.0)
+        } else {
+            0.0
+        },
+        parts,
+    }
+}
+
+/// Adds a joint's information on an effect in one part, its own other terms projected out.
+fn reduced(
+    sums: &DMatrix<f64>,
+    terms: &Terms,
+    j: usize,
+    (effect, values): (&[usize], &DVector<f64>),
+    (s, r): (&mut DMatrix<f64>, &mut DVector<f64>),
+) {
+    let own = terms.own(j);
+    let tau = sums.nrows() - 1;
+    let other = |(i, _): &&(usize, usize)| !effect.contains(i);
+    let (free, held): (Vec<&(usize, usize)>, Vec<_>) = own
+        .iter()
+        .filter(other)
+        .partition(|(i, _)| terms.list[*i].is_of(j));
+    let target = |a: usize| -> f64 {
+        let column = sums.column(a);
+        column[tau]
+            - held
+                .iter()
+                .map(|(i, b)| column[*b] * values[*i])
+                .sum::<f64>()
+    };
+    let c: Vec<(usize, usize)> = effect
+        .iter()
+        .enumerate()
+        .filter_map(|(at, i)| Some((at, terms.list[*i].column(j)?)))
+        .collect();
+    let o: Vec<usize> = free.iter().map(|(_, a)| *a).collect();
+    let of = |rows: &[usize], columns: &[usize]| {
+        DMatrix::from_fn(rows.len(), columns.len(), |a, b| {
+            sums[(rows[a], columns[b])]
+        })
+    };
+    let columns: Vec<usize> = c.iter().map(|(_, a)| *a).collect();
+    let mut inner = of(&o, &o);
+    for i in 0..o.len() {
+        let x = inner[(i, i)];
+        inner[(i, i)] = x * (1.0 + terms.ridge) + f64::MIN_POSITIVE.sqrt();
+    }
+    let across = of(&o, &columns);
+    let mut own_part = of(&columns, &columns);
+    let mut side = DVector::from_iterator(columns.len(), columns.iter().map(|a| target(*a)));
+    if let (false, Some(factor)) = (o.is_empty(), inner.cholesky()) {
+        let through = factor.solve(&across);
+        own_part -= across.tr_mul(&through);
+        let targets = DVector::from_iterator(o.len(), o.iter().map(|a| target(*a)));
+        side -= through.tr_mul(&targets);
+    }
+    let w = terms.weights[j];
+    for (x, (i, _)) in c.iter().enumerate() {
+        r[*i] += w * side[x];
+        for (y, (l, _)) in c.iter().enumerate() {
+            s[(*i, *l)] += w * own_part[(x, y)];
+        }
+    }
+}

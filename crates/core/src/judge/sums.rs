@@ -1,0 +1,198 @@
+//! Sums of products per block and joint, and the fit of all terms.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::bounded;
+
+/// Values that a term may have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bound {
+    pub least: f64,
+    pub most: f64,
+}
+
+impl Bound {
+    /// Any value.
+    pub const NONE: Bound = Bound {
+        least: f64::NEG_INFINITY,
+        most: f64::INFINITY,
+    };
+
+    /// How far a value is beyond.
+    pub(super) fn excess(self, x: f64) -> f64 {
+        (self.least - x).max(x - self.most).max(0.0)
+    }
+
+    /// The nearest value that it may have.
+    pub fn nearest(self, x: f64) -> f64 {
+        x.max(self.least).min(self.most)
+    }
+}
+
+/// An unknown, with its column in the rows of each joint that it acts on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Joint and column.
+    pub columns: Vec<(usize, usize)>,
+    pub bound: Bound,
+}
+
+impl Term {
+    /// Its column in the rows of a joint.
+    pub(super) fn column(&self, joint: usize) -> Option<usize> {
+        let own = self.columns.iter().find(|(j, _)| *j == joint);
+        own.map(|(_, column)| *column)
+    }
+
+    /// Whether only this joint's rows have it.
+    pub(super) fn is_of(&self, joint: usize) -> bool {
+        matches!(self.columns.as_slice(), [(j, _)] if *j == joint)
+    }
+}
+
+/// Sums of products of every joint's columns, the torque last, `[block][joint]`.
+#[derive(Debug, Clone, Default)]
+pub struct BlockSums {
+    pub blocks: Vec<Vec<DMatrix<f64>>>,
+    /// Rows, `[block][joint]`.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl BlockSums {
+    /// Zeros for so many blocks of joints with so many columns each, the torque not counted.
+    pub fn zeros(blocks: usize, columns: &[usize]) -> Self {
+        let of_joint = |c: &usize| DMatrix::zeros(c + 1, c + 1);
+        let of_block = |_| columns.iter().map(of_joint).collect();
+        Self {
+            blocks: (0..blocks).map(of_block).collect(),
+            rows: vec![vec![0.0; columns.len()]; blocks],
+        }
+    }
+
+    /// The sum over some blocks, joint by joint.
+    pub fn over(&self, blocks: impl Iterator<Item = usize>) -> Vec<DMatrix<f64>> {
+        let mut total: Vec<DMatrix<f64>> = Vec::new();
+        for b in blocks {
+            match total.is_empty() {
+                true => total.clone_from(&self.blocks[b]),
+                false => (total.iter_mut().zip(&self.blocks[b])).for_each(|(t, x)| *t += x),
+            }
+        }
+        total
+    }
+
+    /// Rows of each joint in all blocks.
+    pub fn rows_of(&self, joint: usize) -> f64 {
+        self.rows.iter().map(|rows| rows[joint]).sum()
+    }
+}
+
+/// Terms that are fitted together, and what is known of them beforehand.
+#[derive(Debug, Clone)]
+pub struct Terms {
+    pub list: Vec<Term>,
+    /// Weight of each joint's squares: 1 / variance of its residual.
+    pub weights: Vec<f64>,
+    /// Information of the first terms, and its pull at zero.
+    pub prior: (DMatrix<f64>, DVector<f64>),
+    /// Part of the diagonal that is added to it.
+    pub ridge: f64,
+}
+
+/// A fit of all terms.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    pub values: DVector<f64>,
+    /// Squared residual of each joint.
+    pub squares: Vec<f64>,
+}
+
+impl Terms {
+    /// Number of terms.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Weighted normal matrix and right side of joints' sums, without prior and ridge.
+    pub(super) fn normal(&self, sums: &[DMatrix<f64>]) -> (DMatrix<f64>, DVector<f64>) {
+        let u = self.len();
+        let (mut normal, mut right) = (DMatrix::zeros(u, u), DVector::zeros(u));
+        for (j, (sums, w)) in sums.iter().zip(&self.weights).enumerate() {
+            let own = self.own(j);
+            let tau = sums.nrows() - 1;
+            for &(i, a) in &own {
+                right[i] += w * sums[(a, tau)];
+                for &(l, b) in &own {
+                    normal[(i, l)] += w * sums[(a, b)];
+                }
+            }
+        }
+        (normal, right)
+    }
+
+    /// Places and columns of the terms that a joint's rows have.
+    pub(super) fn own(&self, joint: usize) -> Vec<(usize, usize)> {
+        let list = self.list.iter().enumerate();
+        list.filter_map(|(i, term)| Some((i, term.column(joint)?)))
+            .collect()
+    }
+
+    /// Adds what is known beforehand, and the ridge of the matrix of all data.
+    pub(super) fn firm(&self, normal: &mut DMatrix<f64>, right: &mut DVector<f64>, all: &[f64]) {
+        let (information, pull) = &self.prior;
+        let known = pull.len();
+        let mut corner = normal.view_mut((0, 0), (known, known));
+        corner += information;
+        let mut first = right.rows_mut(0, known);
+        first += pull;
+        for (i, x) in all.iter().enumerate() {
+            normal[(i, i)] += self.ridge * x;
+        }
+    }
+
+    /// Fits all terms to joints' sums, some of them held.
+    pub fn fit(&self, sums: &[DMatrix<f64>], held: &[(usize, f64)]) -> Fit {
+        let (mut normal, mut right) = self.normal(sums);
+        let diagonal: Vec<f64> = normal.diagonal().iter().copied().collect();
+        self.firm(&mut normal, &mut right, &diagonal);
+        let mut bounds: Vec<Bound> = self.list.iter().map(|t| t.bound).collect();
+        for (i, x) in held {
+            bounds[*i] = Bound {
+                least: *x,
+                most: *x,
+            };
+        }
+        let values = bounded::solve(&normal, &right, &bounds);
+        Fit {
+            squares: self.squares(sums, &values),
+            values,
+        }
+    }
+
+    /// Squared residual of each joint at some values.
+    pub fn squares(&self, sums: &[DMatrix<f64>], values: &DVector<f64>) -> Vec<f64> {
+        let of_joint = |(j, sums): (usize, &DMatrix<f64>)| {
+            let own = self.own(j);
+            let tau = sums.nrows() - 1;
+            let mut square = sums[(tau, tau)];
+            for &(i, a) in &own {
+                let through: f64 = own.iter().map(|&(l, b)| sums[(a, b)] * values[l]).sum();
+                square += values[i] * (through - 2.0 * sums[(a, tau)]);
+            }
+            square.max(0.0)
+        };
+        sums.iter().enumerate().map(of_joint).collect()
+    }
+
+    /// The same terms and more.
+    pub fn with(&self, more: &[Term]) -> Terms {
+        let mut all = self.clone();
+        all.list.extend_from_slice(more);
+        all
+    }
+}

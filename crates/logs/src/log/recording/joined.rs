@@ -1,0 +1,436 @@
+//! Numbers of any messages as rows: those of one topic, or of several, each on its own clock, brought onto that of the
+//! first by linear interpolation.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::encoding::reader_of;
+use super::message::{MessageHead, MessageReader, Schema, Wanted};
+use super::parts::MessageFiles;
+use super::path::FieldPath;
+use super::value::Value;
+use crate::log::layout::{Channel, Layout};
+use crate::log::rows::LogRows;
+use crate::log::time::{Instant, Stamped};
+use crate::log::{Block, LogError, escape, list, source};
+use cft_ident_core::number::{beyond, is_usable};
+
+/// Messages at the beginning in which topics are looked for.
+const LOOKED_AT: u64 = 4000;
+/// Numbers from which a message is the state of a machine by itself.
+const STATE: usize = 4;
+/// Columns that are read without a robot file.
+const COLUMNS: usize = 1024;
+/// Rows that wait for messages of other topics at most.
+const WAITING: usize = 1 << 14;
+/// A step longer than this many usual ones is a dropout.
+const DROPOUT: f64 = 2.5;
+
+/// The numbers of one topic.
+struct Source {
+    topic: String,
+    schema: Arc<Schema>,
+    reader: Box<dyn MessageReader>,
+    /// Its fields, behind the seconds and nanoseconds of a stamp.
+    values: Vec<Value>,
+    samples: VecDeque<(Instant, Vec<f64>)>,
+    /// Sum and number of the steps of its clock \[s\].
+    steps: (f64, u32),
+}
+
+/// The rows of a recording.
+pub(in crate::log) struct JoinedTopics {
+    recording: MessageFiles,
+    sources: Vec<Source>,
+    /// Names of the columns, the time first, and what they are called by the names in the messages.
+    names: Vec<String>,
+    labels: Vec<String>,
+    layout: Layout,
+    /// Place in a row of each position, torque and velocity.
+    channels: [Vec<usize>; 3],
+    waiting: VecDeque<(Instant, Vec<f64>, u64)>,
+    row: Vec<f64>,
+    number: u64,
+    ended: bool,
+    lost: u64,
+    file: String,
+}
+
+impl fmt::Debug for JoinedTopics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("JoinedTopics")
+            .field("names", &self.names)
+            .finish_non_exhaustive()
+    }
+}
+
+/// `/topic:path` as topic and path.
+fn parted(column: &str) -> Option<(&str, &str)> {
+    column
+        .split_once(':')
+        .filter(|(topic, path)| topic.starts_with('/') && !path.is_empty())
+}
+
+/// Whether channels are named by their topics, so that each may have its own.
+pub(in crate::log) fn of_topics(layout: &Layout) -> bool {
+    let mut channels = layout.positions.iter().chain(&layout.torques);
+    channels.any(|channel| parted(&channel.column).is_some())
+}
+
+impl JoinedTopics {
+    /// The channels of a robot, `/topic:path` each.
+    ///
+    /// # Errors
+    /// A file that cannot be read; a channel without a topic, or whose topic is not there.
+    pub(in crate::log) fn of_robot(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
+        let named = |channels: &[Channel]| channels.iter().all(|c| parted(&c.column).is_some());
+        let mut layout = layout.clone();
+        if !named(&layout.velocities) {
+            layout.velocities.clear();
+        }
+        let all = || {
+            layout
+                .positions
+                .iter()
+                .chain(&layout.torques)
+                .chain(&layout.velocities)
+        };
+        if let Some(channel) = all().find(|channel| parted(&channel.column).is_none()) {
+            return Err(LogError::Topic {
+                file: source::shown_all(paths),
+                problem: format!("`{}` names no topic, as other channels do", escape(&channel.column)),
+                remedy: "write every position and torque as \"/topic:path\" in [log.joint]; `inspect` lists topics and paths".to_owned(),
+            });
+        }
+        let mut fields: Vec<(String, Vec<(String, String)>)> = Vec::new();
+        for channel in all() {
+            let Some((topic, path)) = parted(&channel.column) else {
+                continue;
+            };
+            let entry = (channel.column.clone(), path.to_owned());
+            match fields.iter_mut().find(|(known, _)| known == topic) {
+                Some((_, paths)) => paths.push(entry),
+                None => fields.push((topic.to_owned(), vec![entry])),
+            }
+        }
+        let wanted = layout.clone();
+        let mut rows = Self::open(paths, fields, layout)?;
+        let place = |channel: &Channel| rows.names.iter().position(|name| *name == channel.column);
+        let places = |channels: &[Channel]| -> Vec<usize> {
+            channels
+                .iter()
+                .filter_map(|c| Some(place(c)? - 1))
+                .collect()
+        };
+        rows.channels = [&wanted.positions, &wanted.torques, &wanted.velocities].map(|c| places(c));
+        Ok(rows)
+    }
+
+    /// Every number of a topic: of the one that is named, of the first that holds a whole state, else of all.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or without a number.
+    pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
+        let mut recording = MessageFiles::open(paths, Wanted::default())?;
+        let mut found: Vec<(String, Vec<(String, String)>)> = Vec::new();
+        let mut looked = 0;
+        while looked < LOOKED_AT
+            && let Some(message) = recording.next()?
+        {
+            looked += 1;
+            let name = &message.topic.name;
+            let asked = topic.is_none_or(|topic| topic == name);
+            if !asked || found.iter().any(|(known, _)| known == name) {
+                continue;
+            }
+            if let Ok(reader) = reader_of(&message.topic.schema, &[]) {
+                let leaves = reader.leaves(message.data).into_iter();
+                found.push((name.clone(), leaves.map(|l| (l.path, l.label)).collect()));
+            }
+        }
+        found.retain(|(_, leaves)| !leaves.is_empty());
+        let most = found.iter().map(|(_, leaves)| leaves.len()).max();
+        if most.is_some_and(|most| most >= STATE) {
+            found.retain(|(_, leaves)| Some(leaves.len()) == most);
+            found.truncate(1);
+        }
+        if found.is_empty() {
+            let topics = recording.seen.iter().map(|topic| topic.name.as_str());
+            return Err(LogError::Topic {
+                file: source::shown_all(paths),
+                problem: "no message of it holds numbers that can be read".to_owned(),
+                remedy: format!("record the joints' states; the topics are {}", list(topics)),
+            });
+        }
+        let alone = found.len() == 1;
+        let mut left = COLUMNS;
+        let fields = found.into_iter().map(|(topic, leaves)| {
+            let leaves: Vec<_> = leaves.into_iter().take(left).collect();
+            left -= leaves.len();
+            let named = leaves.into_iter().map(|(path, label)| match alone {
+                true => (path, label),
+                false => {
+                    let words = topic.trim_matches('/').replace('/', ".");
+                    (format!("{topic}:{path}"), format!("{words}.{label}"))
+                }
+            });
+            (topic.clone(), named.collect())
+        });
+        let fields: Vec<(String, Vec<(String, String)>)> = fields.collect();
+        Self::open(paths, fields, Layout::joint_columns(&[] as &[&str]))
+    }
+
+    /// Opens topics, each with its columns and their labels.
+    fn open(
+        paths: &[PathBuf],
+        fields: Vec<(String, Vec<(String, String)>)>,
+        layout: Layout,
+    ) -> Result<Self, LogError> {
+        let topics: Vec<String> = fields.iter().map(|(topic, _)| topic.clone()).collect();
+        let mut schemas: Vec<Option<Arc<Schema>>> = vec![None; topics.len()];
+        let names = topics.clone();
+        let mut recording = MessageFiles::open(paths, Wanted { names })?;
+        while schemas.contains(&None)
+            && let Some(message) = recording.next()?
+        {
+            let at = topics.iter().position(|topic| *topic == message.topic.name);
+            if let Some(schema) = at.and_then(|at| schemas.get_mut(at)) {
+                schema.get_or_insert_with(|| Arc::clone(&message.topic.schema));
+            }
+        }
+        let refuse = |topic: &str, problem: String| LogError::Topic {
+            file: source::shown_all(paths),
+            problem: format!("topic {}: {problem}", escape(topic)),
+            remedy: "`cft-ident inspect` lists the topics and what is in them".to_owned(),
+        };
+        let (mut sources, mut columns, mut labels) =
+            (Vec::new(), vec!["t".to_owned()], vec!["t".to_owned()]);
+        for ((topic, own), schema) in fields.into_iter().zip(schemas) {
+            let schema = schema.ok_or_else(|| refuse(&topic, "no message of it".to_owned()))?;
+            let mut wanted = vec![
+                vec![FieldPath::parse("header.stamp.sec")],
+                vec![FieldPath::parse("header.stamp.nanosec")],
+            ];
+            for (column, label) in own {
+                let path = parted(&column).map_or(&*column, |(_, path)| path);
+                wanted.push(vec![FieldPath::parse(path)]);
+                columns.push(column);
+                labels.push(label);
+            }
+            let reader = reader_of(&schema, &wanted).map_err(|reason| refuse(&topic, reason))?;
+            sources.push(Source {
+                values: vec![Value::Absent; wanted.len()],
+                topic,
+                schema,
+                reader,
+                samples: VecDeque::new(),
+                steps: (0.0, 0),
+            });
+        }
+        let names = topics;
+        Ok(Self {
+            recording: MessageFiles::open(paths, Wanted { names })?,
+            sources,
+            row: vec![f64::NAN; columns.len() - 1],
+            names: columns,
+            labels,
+            layout,
+            channels: Default::default(),
+            waiting: VecDeque::new(),
+            number: 0,
+            ended: false,
+            lost: 0,
+            file: source::shown_all(paths),
+        })
+    }
+
+    /// Reads one message.
+    fn take_message(&mut self) -> Result<(), LogError> {
+        let Some(message) = self.recording.next()? else {
+            self.ended = true;
+            return Ok(());
+        };
+        let (head, topic) = (message.head, message.topic);
+        let is = |s: &Source| s.topic == topic.name && s.schema == topic.schema;
+        let Some(at) = self.sources.iter().position(is) else {
+            return Ok(());
+        };
+        let one = &mut self.sources[at];
+        if one.reader.read(message.data, &mut one.values).is_err() {
+            self.lost += 1;
+            return Ok(());
+        }
+        let t = one.instant(&head);
+        let numbers = one.values[2..].iter();
+        let numbers: Vec<f64> = numbers.map(|v| v.number().unwrap_or(f64::NAN)).collect();
+        if at == 0 {
+            self.waiting.push_back((t, numbers, head.number));
+            if self.waiting.len() > WAITING {
+                self.waiting.pop_front();
+                self.lost += 1;
+            }
+            return Ok(());
+        }
+        if let Some((before, _)) = one.samples.back() {
+            if t <= *before {
+                self.lost += 1;
+                return Ok(());
+            }
+            one.steps = (one.steps.0 + t.since(*before), one.steps.1 + 1);
+        }
+        one.samples.push_back((t, numbers));
+        Ok(())
+    }
+
+    /// Puts the first row that waits into place, where all topics have numbers for it; `None` while some may come.
+    fn join(&mut self) -> Option<bool> {
+        let (t, _, _) = self.waiting.front()?;
+        let t = *t;
+        let open = |s: &Source| s.samples.back().is_none_or(|(last, _)| *last < t);
+        if self.sources[1..].iter().any(open) && !self.ended {
+            return None;
+        }
+        let (_, own, number) = self.waiting.pop_front()?;
+        self.row.clear();
+        self.row.extend(own);
+        for one in &mut self.sources[1..] {
+            if !one.at(t, &mut self.row) {
+                self.lost += 1;
+                return Some(false);
+            }
+        }
+        self.number = number;
+        Some(true)
+    }
+}
+
+impl Source {
+    fn instant(&self, head: &MessageHead) -> Instant {
+        let part = |index: usize| self.values[index].integer();
+        let stamp = part(0).zip(part(1)).map(|(s, ns)| s * 1_000_000_000 + ns);
+        let stamp = stamp.filter(|ns| *ns != 0);
+        Instant::from_ns(stamp.unwrap_or(i128::from(head.log_ns)))
+    }
+
+    /// Its numbers at a time, between the messages before and after it; false where there are none near.
+    fn at(&mut self, t: Instant, row: &mut Vec<f64>) -> bool {
+        while self.samples.len() > 1 && self.samples[1].0 <= t {
+            self.samples.pop_front();
+        }
+        let Some((before, a)) = self.samples.front() else {
+            return false;
+        };
+        if *before == t {
+            row.extend(a);
+            return true;
+        }
+        let Some((after, b)) = self.samples.get(1).filter(|_| *before < t) else {
+            return false;
+        };
+        let step = after.since(*before);
+        let usual = self.steps.0 / f64::from(self.steps.1.max(1));
+        if step > DROPOUT * usual {
+            return false;
+        }
+        let share = t.since(*before) / step;
+        row.extend(a.iter().zip(b).map(|(a, b)| a + share * (b - a)));
+        true
+    }
+}
+
+impl LogRows for JoinedTopics {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn label(&self, column: usize) -> Option<&str> {
+        self.labels.get(column).map(String::as_str)
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        loop {
+            let t = self.waiting.front().map(|(t, ..)| *t);
+            match (self.join(), t) {
+                (Some(true), Some(t)) => return Ok(Some(Stamped::Exact(t))),
+                (Some(_), _) => {}
+                (None, _) if self.ended => return Ok(None),
+                (None, _) => self.take_message()?,
+            }
+        }
+    }
+
+    fn logged(&self, column: usize) -> Option<f64> {
+        self.row.get(column.checked_sub(1)?).copied()
+    }
+
+    fn append(&self, block: &mut Block) -> Result<(), LogError> {
+        let Layout {
+            positions,
+            torques,
+            velocities,
+            ..
+        } = &self.layout;
+        let parts = [
+            (positions, &self.channels[0], &mut block.q),
+            (torques, &self.channels[1], &mut block.tau),
+        ];
+        let scaled = |channel: &Channel, place: usize| {
+            let number = self.row.get(place).copied().unwrap_or(f64::NAN);
+            number * channel.factor + channel.offset
+        };
+        for (channels, places, to) in parts {
+            for (channel, place) in channels.iter().zip(places) {
+                let value = scaled(channel, *place);
+                if !is_usable(value) {
+                    return Err(LogError::NotFinite {
+                        at: self.place(),
+                        column: escape(&channel.column),
+                        text: format!("{value:?}{}", beyond(value)),
+                        remedy: "use the parts before and after it as two logs, FILE@0..10s and FILE@10.1..s: a made-up number is worse than a gap",
+                    });
+                }
+                to.push(value);
+            }
+        }
+        let pairs = velocities.iter().zip(&self.channels[2]);
+        block
+            .dq
+            .extend(pairs.map(|(channel, place)| scaled(channel, *place)));
+        Ok(())
+    }
+
+    fn has_velocities(&self) -> bool {
+        !self.channels[2].is_empty()
+    }
+
+    fn number(&self) -> u64 {
+        self.number
+    }
+
+    fn place(&self) -> String {
+        format!("{}: message {}", self.file, self.number)
+    }
+
+    fn breaks(&self) -> Vec<String> {
+        self.recording.breaks("")
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out = self.breaks();
+        let topics = list(self.sources.iter().map(|one| one.topic.as_str()));
+        if self.sources.len() > 1 {
+            out.push(format!(
+                "rows are those of {topics}, interpolated linearly at the times of the first"
+            ));
+        }
+        if self.lost > 0 {
+            out.push(format!(
+                "{} messages of {topics} are left out: no message of another topic is near, or they cannot be read",
+                self.lost
+            ));
+        }
+        out
+    }
+}

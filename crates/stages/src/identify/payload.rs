@@ -1,0 +1,490 @@
+//! The body on the last link of an arm, by least squares of what a model of the arm without it leaves.
+//!
+//! Rows of all joints are filtered as the model's own; friction and offset of each joint are free, for a load and a
+//! day change them. The body is one that can exist. It is found twice: with the gains of the torque channels as the
+//! model has them, and with one gain error a joint free. Deviations hold the correlation of residuals (Newey and West
+//! 1987) and the covariance of the model's own parameters.
+
+use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::in_memory::{InMemory, read_whole};
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use crate::band::NORMAL_95;
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::inertia::bandwidth;
+use cft_ident_core::inertia::feasible::{ConsistencyProblem, feasible};
+use cft_ident_core::math::long_run::long_run;
+use cft_ident_core::math::rank::svd;
+use cft_ident_core::math::rfactor::RFactor;
+use cft_ident_core::motion::{ParallelFilters, Stretch, rest};
+use cft_ident_core::robot::bodies::StandardMap;
+use cft_ident_core::robot::friction::sign;
+use cft_ident_core::robot::standard::{Body, STANDARD};
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
+use cft_ident_logs::log::Provenance;
+
+/// Entries of a row: ten of the body, viscous and Coulomb friction, offset.
+const OWN: usize = STANDARD + 3;
+/// Where rows have the torque of the model, what it leaves, and their weight.
+const HAT: usize = OWN;
+const LEFT: usize = OWN + 1;
+const WEIGHT: usize = OWN + 2;
+/// Duration of a block of scores \[s\].
+const BLOCK_S: f64 = 0.25;
+/// Rounds of the joints' weights and of the gains, which multiply the body too.
+const ROUNDS: usize = 4;
+/// Share of the largest singular value (columns scaled) below which a direction is not excited.
+const NOTHING: f64 = 1e-7;
+/// Share of a number in a direction that is not excited from which on it is open.
+const PART: f64 = 1e-3;
+
+/// A number with its 95 % confidence interval; null where the log does not determine it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Number95 {
+    pub value: Option<f64>,
+    pub std: Option<f64>,
+    pub interval_95: Option<[f64; 2]>,
+    pub unit: String,
+}
+
+/// A gain error of a joint's torque channel: what was logged over what the model's channel would show, less 1.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct GainOff {
+    pub joint: String,
+    pub error: Number95,
+}
+
+/// The torque error of a joint.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LeftOfJoint {
+    pub joint: String,
+    /// Relative error of the model as given.
+    pub before: f64,
+    /// The same with body, friction and offset (and gains) of this reading.
+    pub after: f64,
+}
+
+/// The body by one reading of the torque channels.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PayloadReading {
+    /// Whether gain errors were free.
+    pub gains_free: bool,
+    pub mass: Number95,
+    /// Centre of gravity in the frame of the link \[m\].
+    pub centre: [Number95; 3],
+    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity \[kg m^2\].
+    pub inertia: [Number95; 6],
+    pub gains: Vec<GainOff>,
+    pub joints: Vec<LeftOfJoint>,
+    /// Standard parameters of the body.
+    #[serde(skip)]
+    pub body: [f64; STANDARD],
+}
+
+/// What `payload` found.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Payload {
+    /// Link that carries the body, in whose frame it is told.
+    pub link: String,
+    /// With the gains of the model, then with free ones.
+    pub readings: Vec<PayloadReading>,
+    pub samples: u64,
+    #[serde(skip)]
+    pub inputs: Vec<Provenance>,
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+/// Filtered rows of every joint, and the sums that say what the model's own parameters do to a fit of them.
+struct Rows {
+    /// Joint by joint: entries of each row, and its block.
+    joints: Vec<Vec<([f64; OWN + 3], usize)>>,
+    /// Stretch of each block.
+    blocks: Vec<usize>,
+    /// Filtered columns of the model's inertial parameters beside the entries, joint by joint: `OWN + 1` x p sums.
+    beside: Vec<DMatrix<f64>>,
+}
+
+/// Finds the body.
+///
+/// # Errors
+/// Logs that cannot be used, and a robot whose last link has no place for a body.
+pub fn payload(
+    machine: &LoggedRobot,
+    (name, file, model): (&str, &ModelFile, &AugmentedModel),
+    logs: &[Log],
+    control: &Control,
+) -> Result<Payload, IdentifyError> {
+    let robot = &machine.robot;
+    if robot.tool_stays_level() {
+        return Err(IdentifyError::NoPayload {
+            model: name.to_owned(),
+        });
+    }
+    let whole = read_whole(machine, logs, control)?;
+    machine.check_temperatures(model, logs, &whole.stretches)?;
+    let work = control.begin("payload", None);
+    let rows = rows(machine, model, &whole, name, control)?;
+    let covariance = inertial_covariance(file, model);
+    let readings = [false, true].map(|gains| reading(machine, &rows, &covariance, gains));
+    let readings = readings.into_iter().collect::<Result<Vec<_>, _>>()?;
+    drop(work);
+    control.check()?;
+    let links = robot.tree().links();
+    Ok(Payload {
+        link: links.last().map_or(String::new(), |link| link.name.clone()),
+        readings,
+        samples: rows.joints.iter().map(|rows| rows.len() as u64).sum(),
+        inputs: whole.inputs,
+        warnings: whole.warnings,
+    })
+}
+
+/// Covariance of the model's inertial parameters, zeros where it is not known.
+fn inertial_covariance(file: &ModelFile, model: &AugmentedModel) -> DMatrix<f64> {
+    let (u, p) = (model.model.parameters(), model.model.theta.len());
+    let whole = DMatrix::from_row_slice(u, u, &file.model_covariance(&model.model));
+    whole.view((0, 0), (p, p)).into_owned()
+}
+
+fn rows(
+    machine: &LoggedRobot,
+    model: &AugmentedModel,
+    whole: &InMemory,
+    name: &str,
+    control: &Control,
+) -> Result<Rows, IdentifyError> {
+    let (n, p) = (machine.robot.joints(), model.model.theta.len());
+    let failed = |error| IdentifyError::motion(name, error);
+    let filters = ParallelFilters::design(&machine.settings(), &whole.stretches).map_err(failed)?;
+    let mut out = Rows {
+        joints: vec![Vec::new(); n],
+        blocks: Vec::new(),
+        beside: vec![DMatrix::zeros(OWN + 1, p); n],
+    };
+    for (number, stretch) in whole.stretches.iter().enumerate() {
+        control.check()?;
+        let filter = filters.of(stretch);
+        if filter.rows(stretch.len()) < 2 {
+            continue;
+        }
+        let first = out.blocks.len();
+        let seconds = stretch.dt * stretch.len() as f64;
+        let count = (seconds / BLOCK_S).ceil().max(1.0) as usize;
+        out.blocks.extend(std::iter::repeat_n(number, count));
+        let hat = model.reconstruct(stretch);
+        for j in 0..n {
+            // a joint that rests takes any torque up to its Coulomb level
+            let weights = filter.weights(stretch, j, whole.rest_speed[j]);
+            let channels = channels(machine, model, stretch, (j, &hat[j]), &weights);
+            let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
+            let filtered = filter.run(&channels).map_err(failed)?;
+            for i in 0..filter.rows(stretch.len()) {
+                if rest::rests(filtered[WEIGHT][i]) {
+                    continue;
+                }
+                let row: [f64; OWN + 3] = std::array::from_fn(|k| filtered[k][i]);
+                let at = (filter.sample_of(i) as f64 * stretch.dt / BLOCK_S) as usize;
+                for (c, x) in row[..=HAT].iter().enumerate() {
+                    for k in 0..p {
+                        out.beside[j][(c, k)] += x * filtered[OWN + 3 + k][i];
+                    }
+                }
+                out.joints[j].push((row, first + at.min(count - 1)));
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Channels of one joint along a stretch: entries, model, what it leaves, weight, then the regressor.
+fn channels(
+    machine: &LoggedRobot,
+    model: &AugmentedModel,
+    stretch: &Stretch,
+    (j, hat): (usize, &[f64]),
+    weights: &[f64],
+) -> Vec<Vec<f64>> {
+    let (n, p) = (machine.robot.joints(), model.model.theta.len());
+    let mut out = vec![Vec::with_capacity(stretch.len()); OWN + 3 + p];
+    let mut regressor = vec![0.0; n * p];
+    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for (k, hat) in hat.iter().enumerate() {
+        stretch.at(k, &mut q, &mut v, &mut a);
+        model.model.robot.regressor(&q, &v, &a, &mut regressor);
+        let weight = weights[k];
+        let body = machine.robot.tool_row(j, &q, &v, &a);
+        let own = [v[j], sign(v[j]), 1.0, *hat, stretch.tau[j][k] - hat];
+        let all = body.into_iter().chain(own).map(|x| weight * x);
+        let rest = regressor[j * p..(j + 1) * p].iter().map(|x| weight * x);
+        let all = all.chain([weight]).chain(rest);
+        out.iter_mut().zip(all).for_each(|(out, x)| out.push(x));
+    }
+    out
+}
+
+/// Places of the unknowns of joint `j`: the body, its friction and offset, and its gain.
+fn places(j: usize, n: usize, gains: bool) -> Vec<usize> {
+    let own = (0..3).map(|k| STANDARD + 3 * j + k);
+    let gain = gains.then_some(STANDARD + 3 * n + j);
+    (0..STANDARD).chain(own).chain(gain).collect()
+}
+
+/// The columns of a row, the gain's where it is free: it multiplies what the joint carries with the body.
+fn columns(row: &[f64; OWN + 3], body: &DVector<f64>, gains: bool) -> Vec<f64> {
+    let carried: f64 = row[..STANDARD]
+        .iter()
+        .zip(body.iter())
+        .map(|(y, x)| y * x)
+        .sum();
+    let gain = gains.then_some(row[HAT] + carried);
+    row[..OWN].iter().copied().chain(gain).collect()
+}
+
+fn reading(
+    machine: &LoggedRobot,
+    rows: &Rows,
+    covariance: &DMatrix<f64>,
+    gains: bool,
+) -> Result<PayloadReading, IdentifyError> {
+    let n = machine.robot.joints();
+    let u = STANDARD + 3 * n + if gains { n } else { 0 };
+    let mut weights = vec![1.0; n];
+    let mut theta = DVector::zeros(u);
+    let mut normal = DMatrix::zeros(u, u);
+    for _ in 0..ROUNDS {
+        let mut factor = RFactor::new(u + 1);
+        let mut whole = vec![0.0; u + 1];
+        let body = theta.rows(0, STANDARD).into_owned();
+        for (j, of) in rows.joints.iter().enumerate() {
+            let places = places(j, n, gains);
+            for (row, _) in of {
+                whole.fill(0.0);
+                for (at, x) in places.iter().zip(columns(row, &body, gains)) {
+                    whole[*at] = weights[j] * x;
+                }
+                whole[u] = weights[j] * row[LEFT];
+                factor.fold(&whole);
+            }
+        }
+        let r = factor.r();
+        normal = r.columns(0, u).tr_mul(&r.columns(0, u));
+        theta = bounded(&r, rows, u)?;
+        for (j, weight) in weights.iter_mut().enumerate() {
+            let square: f64 = errors(rows, j, n, &theta, gains).map(|e| e * e).sum();
+            *weight = (rows.joints[j].len().max(1) as f64 / square.max(f64::MIN_POSITIVE)).sqrt();
+        }
+    }
+    let (inverse, open) = inverse(&normal)?;
+    let body = theta.rows(0, STANDARD).into_owned();
+    let mut scores = vec![DVector::zeros(u); rows.blocks.len()];
+    let mut by_model = DMatrix::zeros(u, covariance.nrows());
+    for (j, of) in rows.joints.iter().enumerate() {
+        let places = places(j, n, gains);
+        let square = weights[j] * weights[j];
+        for ((row, block), error) in of.iter().zip(errors(rows, j, n, &theta, gains)) {
+            for (at, x) in places.iter().zip(columns(row, &body, gains)) {
+                scores[*block][*at] += square * x * error;
+            }
+        }
+        // the gain's column is that of the model but for the body
+        for (c, at) in places.iter().enumerate() {
+            for k in 0..by_model.ncols() {
+                by_model[(*at, k)] += square * rows.beside[j][(c, k)];
+            }
+        }
+    }
+    let scores: Vec<(usize, DVector<f64>)> = rows.blocks.iter().copied().zip(scores).collect();
+    let lag = bandwidth(&scores, u, BLOCK_S);
+    let middle = long_run(&scores, u, lag) + &by_model * covariance * by_model.transpose();
+    let spread = &inverse * middle * &inverse;
+    Ok(told(machine, rows, &theta, &spread, &open, gains))
+}
+
+/// What a joint's rows leave.
+fn errors<'a>(
+    rows: &'a Rows,
+    j: usize,
+    n: usize,
+    theta: &'a DVector<f64>,
+    gains: bool,
+) -> impl Iterator<Item = f64> + 'a {
+    let (places, body) = (places(j, n, gains), theta.rows(0, STANDARD).into_owned());
+    rows.joints[j].iter().map(move |(row, _)| {
+        let fitted = columns(row, &body, gains);
+        let fitted = places.iter().zip(fitted).map(|(at, x)| theta[*at] * x);
+        row[LEFT] - fitted.sum::<f64>()
+    })
+}
+
+/// Least squares over bodies that can exist.
+fn bounded(factor: &DMatrix<f64>, rows: &Rows, u: usize) -> Result<DVector<f64>, IdentifyError> {
+    let map = StandardMap {
+        links: vec!["payload".to_owned()],
+        drives: Vec::new(),
+        matrix: DMatrix::identity(STANDARD, STANDARD),
+    };
+    let count: usize = rows.joints.iter().map(Vec::len).sum();
+    let found = feasible(&ConsistencyProblem {
+        map: &map,
+        bodies: &[None],
+        factor,
+        // rows are few enough to be counted by their blocks
+        effective: (rows.blocks.len() as f64 / count.max(1) as f64).min(1.0),
+    })?;
+    Ok(found.theta.rows(0, u).into_owned())
+}
+
+/// Inverse of the normal matrix on the directions that are excited, and which unknowns have a part in others.
+fn inverse(normal: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), IdentifyError> {
+    let u = normal.nrows();
+    let size = |i: usize| normal[(i, i)].sqrt();
+    let scale: Vec<f64> = (0..u)
+        .map(|i| if size(i) > 0.0 { 1.0 / size(i) } else { 0.0 })
+        .collect();
+    let scaled = DMatrix::from_fn(u, u, |i, j| normal[(i, j)] * scale[i] * scale[j]);
+    let parts = svd(&scaled).map_err(cft_ident_core::inertia::solution::FitError::from)?;
+    let mut open: Vec<bool> = scale.iter().map(|s| *s == 0.0).collect();
+    let mut out = DMatrix::zeros(u, u);
+    for k in 0..u {
+        let v = parts.v.column(k);
+        if parts.s[k] > NOTHING * NOTHING * parts.s[0] {
+            out += v * v.transpose() / parts.s[k];
+        } else {
+            for (open, part) in open.iter_mut().zip(v.iter()) {
+                *open |= part.abs() > PART;
+            }
+        }
+    }
+    Ok((
+        DMatrix::from_fn(u, u, |i, j| out[(i, j)] * scale[i] * scale[j]),
+        open,
+    ))
+}
+
+fn interval(value: f64, variance: f64, open: bool, unit: &str) -> Number95 {
+    let std = variance.max(0.0).sqrt();
+    let known = !open && std.is_finite();
+    Number95 {
+        value: known.then_some(value),
+        std: known.then_some(std),
+        interval_95: known.then(|| [value - NORMAL_95 * std, value + NORMAL_95 * std]),
+        unit: unit.to_owned(),
+    }
+}
+
+fn told(
+    machine: &LoggedRobot,
+    rows: &Rows,
+    theta: &DVector<f64>,
+    spread: &DMatrix<f64>,
+    open: &[bool],
+    gains: bool,
+) -> PayloadReading {
+    let n = machine.robot.joints();
+    let standard: [f64; STANDARD] = std::array::from_fn(|i| theta[i]);
+    let body = Body::of(&standard);
+    // slopes of centre and inertia by the standard parameters, differenced: they are smooth where there is a mass
+    let number = |of: &dyn Fn(&Body) -> f64, takes: &[usize], unit: &str| {
+        let mut slopes = DVector::zeros(STANDARD);
+        for k in 0..STANDARD {
+            let step = 1e-6 * (1e-3 + standard[k].abs());
+            let at = |sign: f64| {
+                let mut moved = standard;
+                moved[k] += sign * step;
+                of(&Body::of(&moved))
+            };
+            slopes[k] = (at(1.0) - at(-1.0)) / (2.0 * step);
+        }
+        let own = spread.view((0, 0), (STANDARD, STANDARD));
+        let variance = (slopes.transpose() * own * &slopes)[(0, 0)];
+        interval(of(&body), variance, takes.iter().any(|k| open[*k]), unit)
+    };
+    let centre = std::array::from_fn(|i| number(&|b| b.centre[i], &[6 + i, 9], "m"));
+    let inertia = std::array::from_fn(|i| number(&|b| b.inertia[i], &[i, 6, 7, 8, 9], "kg m^2"));
+    let names = machine.robot.joint_names();
+    let gain = |j: usize| {
+        let at = STANDARD + 3 * n + j;
+        GainOff {
+            joint: names[j].clone(),
+            error: interval(theta[at], spread[(at, at)], open[at], ""),
+        }
+    };
+    let of_joint = |j: usize| {
+        let torque: f64 = rows.joints[j]
+            .iter()
+            .map(|(row, _)| (row[HAT] + row[LEFT]).powi(2))
+            .sum();
+        let before: f64 = rows.joints[j]
+            .iter()
+            .map(|(row, _)| row[LEFT].powi(2))
+            .sum();
+        let after: f64 = errors(rows, j, n, theta, gains).map(|e| e * e).sum();
+        LeftOfJoint {
+            joint: names[j].clone(),
+            before: (before / torque).sqrt(),
+            after: (after / torque).sqrt(),
+        }
+    };
+    PayloadReading {
+        gains_free: gains,
+        mass: interval(body.mass, spread[(9, 9)], open[9], "kg"),
+        centre,
+        inertia,
+        gains: if gains {
+            (0..n).map(gain).collect()
+        } else {
+            Vec::new()
+        },
+        joints: (0..n).map(of_joint).collect(),
+        body: standard,
+    }
+}
+
+impl PayloadReading {
+    /// The body as an effect of a model: its inertia is the same about every axis there.
+    fn effect(&self) -> EffectSection {
+        let body = Body::of(&self.body);
+        let parameter = |value: f64, std: Option<f64>, unit: &str| EffectParameter {
+            value,
+            std,
+            unit: unit.to_owned(),
+            bound: false,
+        };
+        let [xx, _, _, yy, _, zz] = body.inertia;
+        let mut parameters = std::collections::BTreeMap::from([
+            ("mass".to_owned(), parameter(body.mass, self.mass.std, "kg")),
+            (
+                "inertia".to_owned(),
+                parameter((xx + yy + zz) / 3.0, None, "kg m^2"),
+            ),
+        ]);
+        for (i, key) in ["mx", "my", "mz"].into_iter().enumerate() {
+            parameters.insert(key.to_owned(), parameter(self.body[6 + i], None, "kg m"));
+        }
+        EffectSection {
+            name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
+            joint: None,
+            parameters,
+        }
+    }
+}
+
+impl Payload {
+    /// The model with the body of the reading without gain errors, as an effect.
+    pub fn loaded(&self, file: &ModelFile) -> ModelFile {
+        let mut model = file.clone();
+        if let Some(reading) = self.readings.first() {
+            model.effects.push(reading.effect());
+            model.provenance.command = "payload".to_owned();
+            model.provenance.inputs.extend(self.inputs.iter().cloned());
+        }
+        model
+    }
+}

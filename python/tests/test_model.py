@@ -1,0 +1,59 @@
+"""Models compute with arrays: torques, their parts and their derivatives belong together."""
+
+import cft_ident as ci
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def model(measured):
+    return ci.lsq("configs/ur10.toml", measured("ur10/ur10_exciting.csv")).model
+
+
+def motion(count, joints, seed=1):
+    rng = np.random.default_rng(seed)
+    return [rng.uniform(-1.0, 1.0, (count, joints)) for _ in range(3)]
+
+
+def test_torques_are_links_and_friction_and_one_row_is_a_row_of_many(model):
+    q, v, a = motion(40, 6)
+    tau = model.torque(q, v, a)
+    theta = np.array([p.in_use for p in model.parameters.itertuples() if p.joint is None])
+    offset = np.array([p.in_use for p in model.parameters.itertuples() if p.parameter == "offset"])
+    offset = offset if len(offset) else np.zeros(6)
+    assert np.allclose(tau, model.regressor(q, v, a) @ theta + model.friction(v) + offset)
+    assert np.allclose(model.torque(q[3], v[3], a[3]), tau[3])
+    still = np.zeros_like(q)
+    assert np.allclose(model.torque(q, still, still), model.gravity(q) + offset)
+
+
+def test_the_mass_matrix_is_symmetric_positive_and_the_derivative_of_the_torque(model):
+    q, v, a = motion(20, 6)
+    mass = model.mass_matrix(q)
+    assert mass.shape == (20, 6, 6)
+    assert np.allclose(mass, np.swapaxes(mass, 1, 2))
+    assert np.linalg.eigvalsh(mass).min() > 0.0
+    step = model.torque(q, v, a + 1.0) - model.torque(q, v, a)
+    assert np.allclose(step, mass.sum(axis=2))
+
+
+def test_the_covariance_is_named_as_the_parameters_and_has_their_deviations(model):
+    frame = model.parameters
+    names = [p.parameter if p.joint is None else f"{p.parameter}:{p.joint}" for p in frame.itertuples()]
+    covariance = model.covariance
+    for name, std in zip(names, frame["std"]):
+        if name in covariance.columns and np.isfinite(std):
+            assert np.isclose(np.sqrt(covariance.loc[name, name]), std, rtol=1e-6)
+
+
+def test_arrays_of_another_robot_are_refused(model):
+    with pytest.raises(ci.UsageError, match="6 joints"):
+        model.torque(np.zeros((3, 5)), np.zeros((3, 5)), np.zeros((3, 5)))
+
+
+def test_a_model_is_written_for_other_programs(model, tmp_path):
+    model.to_c(tmp_path / "arm.h")
+    model.to_urdf(tmp_path / "arm.urdf")
+    model.to_mjcf(tmp_path / "arm.xml")
+    assert "_tau(" in (tmp_path / "arm.h").read_text()
+    assert (tmp_path / "arm.toml").exists() and (tmp_path / "arm.xml").exists()

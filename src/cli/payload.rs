@@ -1,0 +1,143 @@
+//! `cft-ident payload`: the body on the last link, from a log with it and a model without it.
+
+use std::path::{Path, PathBuf};
+
+use super::{CliError, Context, Outcome, files, logs_of, names_of};
+use cft_ident_core::number;
+use cft_ident_logs::log::{LogSpec, escape};
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::table::{Align, Table};
+use cft_ident_stages::identify::{self, LoggedRobot, Number95, Payload, PayloadReading, refined};
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident payload loaded.csv -m empty.toml
+  cft-ident payload loaded.csv -m empty.toml -o loaded.toml";
+
+/// Find mass, centre of gravity and inertia of what the last link carries, with 95 % intervals.
+///
+/// The model is that of the arm without the load. Friction and offsets of the joints are free, and the body is one
+/// that can exist. It is told twice: with the gains of the torque channels as the model has them, and with a gain
+/// error of each joint free, for currents.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident payload [OPTIONS] -m MODEL.toml LOG...")]
+pub struct Args {
+    /// Logs with the load; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<LogSpec>,
+    /// Model file of the arm without the load
+    #[arg(short, long, value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Model file to write, with the load as an effect
+    #[arg(short, long, value_name = "LOADED.toml")]
+    pub output: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let logs = args.logs.iter().map(|log| log.path.as_path());
+    let inputs: Vec<&Path> = logs.chain([args.model.as_path()]).collect();
+    let outputs: Vec<&Path> = args.output.as_deref().into_iter().collect();
+    context.check_outputs(&inputs, &outputs)?;
+    let given = files::model(&args.model, context)?;
+    let (name, file) = (given.name, given.value);
+    let model = refined(&file, &name)?;
+    let machine = LoggedRobot::new(&name, file.robot.clone());
+    let logs = logs_of(&args.logs);
+    let of_model = (name.as_str(), &file, &model);
+    let found = identify::payload(&machine, of_model, &logs, context.control())?;
+    let mut text = told(&found, &names_of(&args.logs).join(", "));
+    if let Some(path) = &args.output {
+        context.write_text(path, &found.loaded(&file).to_toml()?)?;
+        text += &format!("written: {}\n", path.display());
+    }
+    let brief = sentences(&found).join("\n");
+    Ok(Outcome {
+        text: context.text(text, &brief),
+        document: Document::new("payload", &found.inputs, &found.warnings, &found)?,
+        missed: Vec::new(),
+    })
+}
+
+/// A number with its interval.
+fn shown(x: &Number95) -> String {
+    match (x.value, x.interval_95) {
+        (Some(value), Some([low, high])) => {
+            let [value, low, high] = [value, low, high].map(|x| number::significant(x, 4));
+            format!("{value} ({low} .. {high})")
+        }
+        _ => number::ABSENT.to_owned(),
+    }
+}
+
+/// The mass by each reading.
+fn sentences(found: &Payload) -> Vec<String> {
+    let of = |reading: &PayloadReading| {
+        let how = match reading.gains_free {
+            false => "with the gains of the torque channels as the model has them",
+            true => "with a gain error of every joint free",
+        };
+        match reading.mass.value {
+            Some(_) => format!("{how}: {} kg", shown(&reading.mass)),
+            None => format!("{how}: this log does not determine the mass"),
+        }
+    };
+    found.readings.iter().map(of).collect()
+}
+
+/// Both readings, for a person.
+fn told(found: &Payload, logs: &str) -> String {
+    let caption = format!(
+        "body on {} by {}, in the frame of that link, with 95 % intervals",
+        escape(&found.link),
+        escape(logs)
+    );
+    let mut table = Table::new(&[
+        ("", Align::Left),
+        ("gains as in the model", Align::Left),
+        ("gain errors free", Align::Left),
+        ("unit", Align::Left),
+    ])
+    .caption(&caption);
+    if let [as_given, free] = &found.readings[..] {
+        let mut row = |name: &str, a: &Number95, b: &Number95| {
+            table.row([name, &shown(a), &shown(b), &a.unit]);
+        };
+        row("mass", &as_given.mass, &free.mass);
+        for (name, (a, b)) in ["x", "y", "z"]
+            .into_iter()
+            .zip(as_given.centre.iter().zip(&free.centre))
+        {
+            row(name, a, b);
+        }
+        let names = ["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+        for (name, (a, b)) in names
+            .into_iter()
+            .zip(as_given.inertia.iter().zip(&free.inertia))
+        {
+            row(name, a, b);
+        }
+    }
+    let mut errors = Table::new(&[
+        ("joint", Align::Left),
+        ("error as given", Align::Decimal),
+        ("with the body", Align::Decimal),
+        ("and gains", Align::Decimal),
+        ("gain error", Align::Left),
+    ]);
+    if let [as_given, free] = &found.readings[..] {
+        for ((a, b), gain) in as_given.joints.iter().zip(&free.joints).zip(&free.gains) {
+            errors.row([
+                a.joint.as_str(),
+                &number::percent(a.before),
+                &number::percent(a.after),
+                &number::percent(b.after),
+                &shown(&gain.error),
+            ]);
+        }
+    }
+    format!("{table}\n{errors}")
+}
