@@ -4,8 +4,6 @@
 mod arms;
 #[path = "../../examples/docs_tables/blocks.rs"]
 mod blocks;
-#[path = "../../examples/docs_tables/setup.rs"]
-mod setup;
 #[path = "../../examples/docs_tables/tables.rs"]
 mod tables;
 
