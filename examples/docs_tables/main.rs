@@ -7,7 +7,6 @@
 mod arms;
 mod blocks;
 mod figures;
-mod setup;
 mod tables;
 
 use std::path::Path;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{arms, setup};
+use super::arms;
 use cft_ident::number::{percent, significant, value_and_std};
 use serde_json::Value;
 
@@ -24,7 +24,6 @@ pub fn render(words: &[&str]) -> Rendered {
         ["arm-errors", names @ ..] => arms::errors(names),
         ["arm-friction", names @ ..] => arms::friction(names),
         ["arm-parameters", names @ ..] => arms::named(names),
-        ["setup-faults", study] => setup::faults(study),
         ["left-out", result] => Ok(left_out(&json(result)?)),
         ["replay", result] => Ok(replay(&json(result)?)),
         ["text", name] => {

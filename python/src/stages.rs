@@ -40,11 +40,10 @@ struct Checked {
 fn checked(
     machine: &LoggedRobot,
     logs: &[identify::Log],
-    friction: Option<(&str, &cft_ident::config::ModelFile)>,
     control: &Control,
 ) -> PyResult<Checked> {
     // logs that cannot be checked are told by the fit itself
-    let report = check_setup(machine, logs, friction, control)
+    let report = check_setup(machine, logs, control)
         .unwrap_or_default()
         .report;
     control.check().map_err(of_stage)?;
@@ -105,7 +104,7 @@ pub fn friction(
     work::run(py, move |control, _| {
         let setup = match as_declared {
             true => Checked::default(),
-            false => checked(&machine, &logs, None, control)?,
+            false => checked(&machine, &logs, control)?,
         };
         let settings = FrictionSettings { joint };
         let mut found =
@@ -172,7 +171,7 @@ pub fn lsq(
         }
         let setup = match as_declared {
             true => Checked::default(),
-            false => checked(&machine, &logs, friction, control)?,
+            false => checked(&machine, &logs, control)?,
         };
         let settings = LsqSettings {
             estimator: kind,
@@ -296,7 +295,7 @@ pub fn reduce(
     work::run(py, move |control, _| {
         let friction = friction.as_ref().map(|(name, file)| (name.as_str(), file));
         if !as_declared {
-            checked(&machine, &logs, friction, control)?;
+            checked(&machine, &logs, control)?;
         }
         let found = identify::reduce(&machine, &logs, friction, control).map_err(of_stage)?;
         Ok(Part {

@@ -84,7 +84,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model, context)?;
     let (name, file) = (given.name, given.value);
-    let machine = LoggedRobot::new(&name, file.robot.clone());
+    let machine = LoggedRobot::of_model(&name, &file);
     let machine = match args.as_declared {
         true => machine.as_declared(),
         false => machine,
@@ -113,7 +113,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let model = (name.as_str(), &file);
     // before the logs are looked at
     identify::check_candidates(&settings.candidates, &machine, model)?;
-    let report = setup::report(&machine, &train, None, context)?;
+    let report = setup::report(&machine, &train, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
     let refused = fault.as_ref().filter(|_| !args.as_declared);
     if let Some(fault) = refused {

@@ -75,7 +75,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let logs = logs_of(&args.logs);
     let robot = Path::new(&args.robot);
-    let checked = setup::checked(machine, (robot, &[]), &logs, None, &args.setup, context)?;
+    let checked = setup::checked(machine, (robot, &[]), &logs, &args.setup, context)?;
     let machine = &checked.machine;
     let mut found = identify::friction(machine, &logs, &settings, context.control())?;
     found.setup.clone_from(&checked.report.findings);

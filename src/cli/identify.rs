@@ -339,7 +339,6 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         machine,
         (&robot, &[]),
         &logs_of(&training),
-        None,
         &with_draft,
         context,
     )?;

@@ -315,7 +315,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         model: None,
     }) = &known
     {
-        report = setup::report(machine, &logs_of(&args.logs), None, context)?;
+        report = setup::report(machine, &logs_of(&args.logs), context)?;
     }
     let mut text = stages::inspect::inspect(&logs, &report.findings);
     stages::setup::section(&mut text.everywhere(), &report);

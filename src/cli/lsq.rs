@@ -126,7 +126,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         gains: gains.as_ref(),
     };
     let robot = Path::new(&args.robot);
-    let checked = setup::checked(machine, (robot, &edits), &logs, known, &args.setup, context)?;
+    let checked = setup::checked(machine, (robot, &edits), &logs, &args.setup, context)?;
     let machine = &checked.machine;
     let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
     if let Some(window) = args.open_loop {

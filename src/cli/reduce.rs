@@ -105,7 +105,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         machine,
         (Path::new(&args.robot), &[]),
         &logs,
-        known,
         &args.setup,
         context,
     )?;

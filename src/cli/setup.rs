@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{CliError, Context};
 use cft_ident_files::config::correction::{Edit, edited};
-use cft_ident_files::config::{self, ModelFile, RobotFile};
+use cft_ident_files::config::{self, RobotFile};
 use cft_ident_stages::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
 use cft_ident_stages::setup::{Finding, FindingSeverity, SetupReport};
 
@@ -50,7 +50,6 @@ pub fn checked(
     machine: LoggedRobot,
     (robot, before): (&Path, &[Edit]),
     logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
     args: &SetupArgs,
     context: &Context,
 ) -> Result<Checked, CliError> {
@@ -59,13 +58,11 @@ pub fn checked(
         false => machine,
     };
     machine.check_gains()?;
-    // a set-up that is kept whatever the torques say is not asked about: that reads all logs again
-    let asked = if args.as_declared { &[] } else { logs };
     let CheckedSetup {
         report,
         corrected,
         edits,
-    } = check(&machine, asked, friction, context)?;
+    } = check(&machine, logs, context)?;
     let mut warnings: Vec<String> = report
         .findings
         .iter()
@@ -78,12 +75,7 @@ pub fn checked(
         warnings.push(power.sentence());
     }
     let refusals: Vec<&Finding> = report.refusals().collect();
-    if refusals.is_empty() || args.as_declared {
-        warnings.extend(
-            refusals
-                .iter()
-                .map(|f| format!("kept as declared: {}", f.told())),
-        );
+    if refusals.is_empty() {
         let new_file = match args.fix_setup.as_ref().filter(|_| !before.is_empty()) {
             Some(path) => {
                 let text = new_text(robot, before, &machine.file, path)?;
@@ -117,13 +109,8 @@ pub fn checked(
 }
 
 /// The check; logs that cannot be checked are told by the fit itself.
-fn check(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
-    context: &Context,
-) -> Result<CheckedSetup, CliError> {
-    match check_setup(machine, logs, friction, context.control()) {
+fn check(machine: &LoggedRobot, logs: &[Log], context: &Context) -> Result<CheckedSetup, CliError> {
+    match check_setup(machine, logs, context.control()) {
         Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
         found => Ok(found.unwrap_or_default()),
     }
@@ -136,10 +123,9 @@ fn check(
 pub fn report(
     machine: &LoggedRobot,
     logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
     context: &Context,
 ) -> Result<SetupReport, CliError> {
-    Ok(check(machine, logs, friction, context)?.report)
+    Ok(check(machine, logs, context)?.report)
 }
 
 /// Text of the new robot file: the user's with the lines that differ, else the whole anew.

@@ -61,7 +61,6 @@ mod serial_cft;
 mod serial_logs;
 mod serial_urdf;
 mod setup;
-mod setup_faults;
 mod simulate_serial;
 mod temperature;
 mod track;

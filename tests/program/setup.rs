@@ -87,10 +87,17 @@ impl Altered {
         words
     }
 
-    /// The entries of the key `setup`.
+    /// The entries of the key `setup`, by none of which the error of a joint rises.
     fn told(&self) -> Vec<Value> {
         let found = run(self.folder.path(), &self.words("inspect", &[]));
-        found["setup"].as_array().unwrap().clone()
+        let told = found["setup"].as_array().unwrap().clone();
+        for entry in &told {
+            for joint in entry["joints"].as_array().unwrap() {
+                let [before, after] = ["before", "after"].map(|key| joint[key].as_f64());
+                assert!(before.is_none() || after <= before, "{entry}");
+            }
+        }
+        told
     }
 
     /// Standard error of a fit that is refused, which writes nothing.
@@ -196,8 +203,10 @@ fn a_turned_torque_is_refused_mended_and_kept_where_the_user_says_so() {
         turned.folder.path(),
         &turned.words("lsq", &["--as-declared"]),
     );
-    // the torques are not asked
+    // the torques are not asked, and the model remembers it
     assert_eq!(kept["setup"], Value::Array(Vec::new()));
+    let model = std::fs::read_to_string(turned.folder.path().join("m.toml")).unwrap();
+    assert!(model.contains("as_declared = true"), "{model}");
     assert!(
         kept["joints"][2]["relative_error"].as_f64()
             > unchanged["joints"][2]["relative_error"].as_f64()
@@ -335,7 +344,7 @@ fn disturb(log: &mut Log) {
 }
 
 #[test]
-fn what_leaves_more_than_a_third_unexplained_is_a_warning_with_both_readings_and_the_fit_goes_on() {
+fn what_leaves_more_than_sound_machines_do_is_a_warning_with_both_readings_and_the_fit_goes_on() {
     let Some(log) = shared("ur10/ur10_exciting.csv") else {
         return;
     };
@@ -357,5 +366,95 @@ fn what_leaves_more_than_a_third_unexplained_is_a_warning_with_both_readings_and
         "the set-up as declared is possible too",
     ] {
         assert!(warnings.contains(reading), "{warnings}");
+    }
+}
+
+#[test]
+fn a_factor_that_is_no_ratio_is_an_estimate_and_a_ratio_is_written() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let told = |factor: f64| {
+        Altered::new(&log, "configs/ur10.toml", |log| {
+            log.map("tau2", |x| x / factor);
+        })
+        .told()
+    };
+    let estimate = &told(7.23)[0];
+    assert_eq!(short(estimate), ("scale", "torque", "q2", false));
+    assert_eq!(
+        (&estimate["severity"], &estimate["remedy"]),
+        (&"hint".into(), &"".into())
+    );
+    let [found, std] = ["found", "found_std"].map(|key| estimate[key].as_f64().unwrap());
+    assert!(
+        (found - 7.23).abs() < 3.0 * std.max(0.02 * found),
+        "{estimate}"
+    );
+    let thousand = &told(1e3)[0];
+    assert_eq!(short(thousand), ("scale", "torque", "q2", true));
+    assert!(
+        thousand["remedy"]
+            .as_str()
+            .unwrap()
+            .contains("torque_scale = 1000.0"),
+        "{thousand}"
+    );
+}
+
+#[test]
+fn a_position_on_the_motors_side_is_given_its_ratio_and_not_a_unit() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let geared = Altered::new(&log, "configs/ur10.toml", |log| {
+        log.map("q3", |x| x * 50.0);
+    });
+    let told = &geared.told()[0];
+    assert_eq!(short(told), ("scale", "position", "q3", true));
+    assert!(
+        (told["found"].as_f64().unwrap() - 0.02).abs() < 1e-9,
+        "{told}"
+    );
+}
+
+const MOTORS: [(&str, f64, [&str; 4]); 3] = [
+    (
+        "x_c2",
+        -1.0,
+        ["sign", "position", "x_c2", "position_sign = -1"],
+    ),
+    (
+        "x_c4",
+        1000.0,
+        ["scale", "position", "x_c4", "position_unit = \"mm\""],
+    ),
+    (
+        "u_4",
+        1000.0,
+        ["scale", "torque", "x_c4", "volts_scale = 0.001"],
+    ),
+];
+
+#[test]
+fn motors_whose_positions_are_no_poses_or_in_other_units_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "simulate -r configs/cft.toml --seconds 20 --seed 5 -o made.csv";
+    run(folder.path(), &words.split(' ').collect::<Vec<_>>());
+    let made = folder.path().join("made.csv");
+    let right = Altered::new(&made, "configs/cft.toml", |_| {});
+    assert!(right.told().is_empty());
+    for (column, factor, [kind, channel, joint, remedy]) in MOTORS {
+        let altered = Altered::new(&made, "configs/cft.toml", |log| {
+            log.map(column, |x| x * factor);
+        });
+        let told = altered.told();
+        let entry = told.first().expect("something is said");
+        let of = ["kind", "channel", "joint"].map(|key| entry[key].as_str());
+        assert_eq!(of, [kind, channel, joint].map(Some), "{entry}");
+        assert!(
+            entry["remedy"].as_str().unwrap().contains(remedy),
+            "{entry}"
+        );
     }
 }

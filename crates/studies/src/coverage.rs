@@ -262,6 +262,7 @@ pub fn table(rows: &Rows) -> String {
     );
     let tools = rows.tools();
     let mut failed: Vec<(usize, usize)> = vec![(0, 0); tools.len()];
+    let mut least = vec![usize::MAX; tools.len()];
     for cell in cells() {
         let name = cell.name();
         for (which, tool) in tools.iter().enumerate() {
@@ -278,15 +279,16 @@ pub fn table(rows: &Rows) -> String {
                 shown += &format!(" {} |", said(&share, &runs, out));
             }
             failed[which].1 += 1;
+            least[which] = least[which].min(own.len());
             failed[which].0 += usize::from(fails);
             let verdict = if fails { "fails" } else { "" };
             text += &format!("| {name} | {tool} | {} |{shown} {verdict} |\n", own.len());
         }
     }
-    let sums = tools
-        .iter()
-        .zip(&failed)
-        .map(|(tool, (bad, all))| format!("{tool}: {bad} of {all} cells fail"));
+    let sums = tools.iter().enumerate().map(|(k, tool)| {
+        let ((bad, all), runs) = (failed[k], least[k]);
+        format!("{tool}: {bad} of {all} cells fail, with {runs} runs a cell or more (few runs show gross failures only)")
+    });
     format!("{}.\n\n{text}", sums.collect::<Vec<_>>().join("; "))
 }
 

@@ -104,7 +104,7 @@ pub(super) fn told(
     let off = names.zip(&sums).filter_map(|(name, sums)| {
         let slope = sums.slope()?;
         let times = if slope < 1.0 { 1.0 / slope } else { slope };
-        (times > OFF).then(|| (name, slope, times))
+        (times > OFF).then_some((name, slope, times))
     });
     let mut off: Vec<(&String, f64, f64)> = off.collect();
     off.sort_by(|a, b| b.2.total_cmp(&a.2));

@@ -123,6 +123,7 @@ pub fn write_model(path: &Path) {
         covariance: None,
         residual_std: BTreeMap::new(),
         effects: Vec::new(),
+        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: Default::default(),
         candidates: Vec::new(),

@@ -1,9 +1,9 @@
 //! `backlash`: a play of width `gap`. After a reversal the motor crosses the gap and does not feel
 //! what lies behind it: c sgn(v) is missing until the gap is used up, a fixed distance.
 
-use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{Law, Memory};
+use super::law_text::exact;
 use super::physics::{Limit, Number, Rule};
 use super::signal::CurveSignal;
 use super::unit::Unit;

@@ -4,9 +4,9 @@
 //!
 //! Files and tables have first moments in the place of the centre: mx = mass x.
 
-use super::site::Property;
 use super::law::{KeyValue, Law, Reparametrisation};
 use super::payload::{self, body};
+use super::site::Property;
 use crate::robot::standard::Body;
 use crate::robot::tree::MOST_JOINTS;
 

@@ -1,9 +1,9 @@
 //! `counterbalance`: a smooth moment over position, as of a spring or gas cylinder between two fixed
 //! points, as a cubic B-spline over the travel that was seen; constant beyond it.
 
-use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::law_text::exact;
 use super::physics::{Limit, Number, Rule};
 use super::signal::CurveSignal;
 use super::unit::Unit;

@@ -5,11 +5,11 @@
 //! joint j too: power is kept, so that both rows have the same three numbers. That place is told by
 //! `both`.
 
-use super::site::CodeSite;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::physics::Rule;
 use super::place::{Place, Places};
+use super::site::CodeSite;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 

@@ -35,11 +35,11 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     code: Some(|to| to.late()),
     ..Law::linear(&ENTRY, &["d"], |scene, _, _, joint, out| {
-    // tau(t - d) = tau - d dtau/dt + ..
-    let hat = &scene.hat[joint];
-    let step = scene.stretch.dt;
-    for k in 1..hat.len().saturating_sub(1) {
-        out[0][k] = -(hat[k + 1] - hat[k - 1]) / (2.0 * step);
-    }
-})
+        // tau(t - d) = tau - d dtau/dt + ..
+        let hat = &scene.hat[joint];
+        let step = scene.stretch.dt;
+        for k in 1..hat.len().saturating_sub(1) {
+            out[0][k] = -(hat[k + 1] - hat[k - 1]) / (2.0 * step);
+        }
+    })
 };

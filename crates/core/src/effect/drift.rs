@@ -23,9 +23,9 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     code: Some(|to| to.step(format!("{} * state.t", to.x(0)))),
     ..Law::linear(&ENTRY, &["c"], |scene, _, _, _, out| {
-    let s = scene.stretch;
-    for (k, x) in out[0].iter_mut().enumerate() {
-        *x = s.began + s.dt * k as f64;
-    }
-})
+        let s = scene.stretch;
+        for (k, x) in out[0].iter_mut().enumerate() {
+            *x = s.began + s.dt * k as f64;
+        }
+    })
 };

@@ -1,13 +1,13 @@
 //! `empirical`: a torque that the data show and that no named law gives with numbers that a machine can have: a
 //! natural cubic spline of one signal of one joint (de Boor 1978, ch. IV), told by its peak.
 
-use super::site::CodeSite;
-use super::law_text::exact;
 use super::added::Added;
 use super::entry::{Entry, Family, Key, Role, Search};
 use super::law::{Law, Memory};
+use super::law_text::exact;
 use super::scene::Scene;
 use super::signal::{CurveSignal, SIGNALS};
+use super::site::CodeSite;
 use super::unit::Unit;
 use crate::number;
 
@@ -253,11 +253,19 @@ fn written(to: &mut CodeSite) {
     let signal = CurveSignal::of(to.shape()[0]);
     match signal {
         CurveSignal::Position | CurveSignal::Speed => {
-            let over = if signal == CurveSignal::Speed { to.v() } else { to.q() };
+            let over = if signal == CurveSignal::Speed {
+                to.v()
+            } else {
+                to.q()
+            };
             to.added(curve_text(to, &over));
         }
         CurveSignal::Friction | CurveSignal::Load => {
-            let over = if signal == CurveSignal::Load { to.load() } else { to.q() };
+            let over = if signal == CurveSignal::Load {
+                to.load()
+            } else {
+                to.q()
+            };
             to.added(format!("{} * ({})", to.direction(), curve_text(to, &over)));
         }
         CurveSignal::Way => {

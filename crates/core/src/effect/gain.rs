@@ -32,10 +32,15 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     code: Some(|to| {
         let load = to.load();
-        to.added(format!("{} * ({load} + ({} + {}))", to.x(0), to.law(), to.offset()));
+        to.added(format!(
+            "{} * ({load} + ({} + {}))",
+            to.x(0),
+            to.law(),
+            to.offset()
+        ));
     }),
     ..Law::linear(&ENTRY, &["k"], |scene, place, _, _, out| {
-    let Some(j) = place.joint() else { return };
-    out[0].copy_from_slice(&scene.hat[j]);
-})
+        let Some(j) = place.joint() else { return };
+        out[0].copy_from_slice(&scene.hat[j]);
+    })
 };

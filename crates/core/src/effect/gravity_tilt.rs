@@ -2,13 +2,13 @@
 //! know: a base that stands askew. Two numbers explain it on all joints; the columns are those of
 //! [`Tilt`](crate::robot::undeclared::Tilt).
 
-use super::site::Property;
-use super::site::CodeSite;
-use super::law_text::exact;
 use super::entry::{Entry, Family, Key};
 use super::law::Law;
+use super::law_text::exact;
 use super::place::{Place, Places};
 use super::scene::Scene;
+use super::site::CodeSite;
+use super::site::Property;
 use super::unit::Unit;
 use crate::number;
 use crate::robot::tree::MOST_JOINTS;

@@ -2,9 +2,9 @@
 //! it flips with the direction, a ripple does not (Remark 1 of the report). Where the joint's law is smooth at
 //! rest, so is the sign.
 
-use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::law_text::exact;
 use super::order::{order_limits, orders, wavenumber};
 use super::physics::{Limit, Number, Rule};
 use super::signal::CurveSignal;

@@ -1,9 +1,9 @@
 //! `ripple`: torque that repeats with position and does not flip with direction. Each harmonic is an
 //! effect of its own order.
 
-use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::law_text::exact;
 use super::order::{order_limits, orders, wavenumber};
 use super::unit::Unit;
 

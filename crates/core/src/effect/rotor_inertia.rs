@@ -2,11 +2,11 @@
 //! actuator coordinates x_r and y_r the screws move with the pantograph's Jacobian:
 //! tau = J' m (J a + Jdot v).
 
-use super::site::Property;
 use super::entry::{Entry, Family, Key, Ladder};
 use super::law::Law;
 use super::physics::Rule;
 use super::place::{Place, Places};
+use super::site::Property;
 use super::unit::Unit;
 use crate::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
 
@@ -40,20 +40,20 @@ pub static LAW: Law = Law {
         place.joint().map(of)
     },
     ..Law::linear(&ENTRY, &["J"], |scene, place, _, joint, out| match place {
-    Place::Joint(j) => out[0].copy_from_slice(&scene.stretch.a[j]),
-    Place::Actuator(r) => {
-        let s = scene.stretch;
-        let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-        for (k, out) in out[0].iter_mut().enumerate() {
-            s.at(k, &mut q, &mut v, &mut a);
-            let (jacobian, rate) = (reference_jacobian(&q), reference_jacobian_rate(&q, &v));
-            let acceleration = jacobian[r][0] * a[2]
-                + jacobian[r][1] * a[3]
-                + rate[r][0] * v[2]
-                + rate[r][1] * v[3];
-            *out = jacobian[r][joint - 2] * acceleration;
+        Place::Joint(j) => out[0].copy_from_slice(&scene.stretch.a[j]),
+        Place::Actuator(r) => {
+            let s = scene.stretch;
+            let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            for (k, out) in out[0].iter_mut().enumerate() {
+                s.at(k, &mut q, &mut v, &mut a);
+                let (jacobian, rate) = (reference_jacobian(&q), reference_jacobian_rate(&q, &v));
+                let acceleration = jacobian[r][0] * a[2]
+                    + jacobian[r][1] * a[3]
+                    + rate[r][0] * v[2]
+                    + rate[r][1] * v[3];
+                *out = jacobian[r][joint - 2] * acceleration;
+            }
         }
-    }
-    _ => {}
-})
+        _ => {}
+    })
 };

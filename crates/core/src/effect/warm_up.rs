@@ -65,12 +65,14 @@ pub static LAW: Law = Law {
             .to_vec())
     },
     limits: |cover, _| vec![[0.03 * cover.duration_s, 10.0 * cover.duration_s]],
-    code: Some(|to| to.step(format!(
-        "{} * (({}) * -expm1(-state.t / {}))",
-        to.x(0),
-        to.law(),
-        to.s(0)
-    ))),
+    code: Some(|to| {
+        to.step(format!(
+            "{} * (({}) * -expm1(-state.t / {}))",
+            to.x(0),
+            to.law(),
+            to.s(0)
+        ))
+    }),
     ..Law::linear(&ENTRY, &["k"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let s = scene.stretch;

@@ -98,7 +98,10 @@ impl RegressorColumns {
     /// The processing of rows in which joints rest as these columns say.
     pub(super) fn with_rests(&self, settings: &FilterSettings) -> FilterSettings {
         FilterSettings {
-            rest_speed: self.rest_speed.clone(),
+            rest_speed: match settings.weighs_rests {
+                true => self.rest_speed.clone(),
+                false => Vec::new(),
+            },
             ..settings.clone()
         }
     }

@@ -47,6 +47,8 @@ pub struct FilterSettings {
     pub trim_s: Option<f64>,
     /// Speed up to which each joint rests [m/s or rad/s], below 0 of one that never does; empty where none does.
     pub rest_speed: Vec<f64>,
+    /// Whether samples of a joint that stands or turns weigh nothing; plain least squares weighs all alike.
+    pub weighs_rests: bool,
 }
 
 impl Default for FilterSettings {
@@ -65,6 +67,7 @@ impl Default for FilterSettings {
             q_trim_s: None,
             trim_s: None,
             rest_speed: Vec::new(),
+            weighs_rests: true,
         }
     }
 }

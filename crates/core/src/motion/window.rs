@@ -104,7 +104,8 @@ impl FilterWindow {
         self.weight.clear();
         self.weight.resize(self.t.len() * joints, 1.0);
         self.rests.clear();
-        self.rests.resize(joints, false);
+        // where no speed of rest is given, any joint may rest
+        self.rests.resize(joints, chain.rests.is_empty());
         for (j, (speed, reach)) in chain.rests.iter().enumerate().take(joints) {
             rest::weigh(&self.v, (joints, j), *speed, *reach, &mut self.weight);
             // of as many samples as a row takes, about, so many weigh nothing

@@ -69,11 +69,10 @@ pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Op
                 *sum += x;
             }
         }
-        let drives = friction
-            .iter()
-            .zip(&speeds)
-            .filter(|(f, v)| **f * **v < 0.0);
-        drives.map(|(_, v)| v.abs()).fold(None, |range, v| {
+        // what is the same both ways is a constant torque, and no friction
+        let pairs = friction.chunks_exact(2).zip(speeds.chunks_exact(2));
+        let drives = pairs.filter(|(f, _)| f[0] - f[1] < 0.0);
+        drives.map(|(_, v)| v[0]).fold(None, |range, v| {
             let [low, high] = range.unwrap_or([v, v]);
             Some([f64::min(low, v), f64::max(high, v)])
         })

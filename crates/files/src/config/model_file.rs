@@ -204,6 +204,9 @@ pub struct ModelProvenance {
     /// Command that wrote the file.
     #[serde(default)]
     pub command: String,
+    /// The set-up was kept as it is declared, whatever the torques said of it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub as_declared: bool,
     /// Seed, where chance played.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,

@@ -403,7 +403,12 @@ fn without_common_head(joints: &[&str]) -> Vec<String> {
         let from = spoken.get(head).map_or(0, |word| word.at.start);
         joint[from..].to_owned()
     };
-    joints.iter().zip(&all).map(short).collect()
+    // numbers alone are no names
+    let named = |spoken: &Vec<Word>| spoken[head..].iter().any(|word| word.number().is_none());
+    match all.iter().all(named) {
+        true => joints.iter().zip(&all).map(short).collect(),
+        false => joints.iter().map(|joint| (*joint).to_owned()).collect(),
+    }
 }
 
 /// The family of a role that fits the joints best, by their names, else by what is left of those without the words

@@ -134,11 +134,13 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
             |at: std::ops::Range<usize>| format!("{}#{}", &name[..at.start], &name[at.end..]);
         let spoken = words(name);
         for word in spoken.iter().filter(|word| word.number().is_some()) {
-            add(
-                without(word.at.clone()),
-                Key::Number(word.number().unwrap_or(0)),
-                column,
-            );
+            let (pattern, key) = (without(word.at.clone()), word.number().unwrap_or(0));
+            // `q_1 [rad]` and `q_3 [m]` are of one kind
+            let plain = without_units(&pattern);
+            if words(&plain).len() != words(&pattern).len() {
+                add(plain, Key::Number(key), column);
+            }
+            add(pattern, Key::Number(key), column);
         }
         // the names of the robot's joints, the longest that is in it
         let part = |joint: &str| {
@@ -165,7 +167,8 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
         let numbered = |k: usize| spoken.get(k).is_some_and(|word| word.number().is_some());
         for (k, word) in spoken.iter().enumerate() {
             let alone = !numbered(k + 1) && !k.checked_sub(1).is_some_and(numbered);
-            if word.text.len() == 1 && word.number().is_none() && alone {
+            let axis = word.text.len() == 1 && word.number().is_none() && k > 0;
+            if axis && alone && word.text != column.joint {
                 let key = Key::Name(word.text.clone());
                 add(without(word.at.clone()), key, column);
             }

@@ -69,7 +69,10 @@ fn mapped(path: &Path) -> Layout {
         if seen.is_recording() {
             continue;
         }
-        let named = |column: &Option<String>| column.clone().unwrap_or_else(|| panic!("{joint:?}"));
+        let named = |column: &Option<String>| match column {
+            Some(column) => column.clone(),
+            None => panic!("{}: {:?}", joint.joint, seen.columns),
+        };
         layout.positions[k].column = named(&joint.position);
         layout.torques[k].column = named(&joint.torque);
         layout.positions[k].factor = match joint.position_unit {
@@ -247,6 +250,8 @@ fn recording(rng: &mut ChaCha8Rng, motion: &Motion, path: &Path) -> bool {
     let (json, swapped) = (rng.random_bool(0.3), rng.random_bool(0.4));
     let (unstamped, second) = (rng.random_bool(0.4), rng.random_bool(0.4));
     let (still, short) = (rng.random_bool(0.4), rng.random_bool(0.2));
+    // efforts of the other publisher would be whole
+    let second = second && !short;
     let names = |order: [usize; 4]| -> Vec<String> {
         let all = ["gripper", JOINTS[0], JOINTS[1], JOINTS[2]];
         order.map(|k| all[k].to_owned()).to_vec()

@@ -137,7 +137,8 @@ fn raw_channels_of_the_cft_robot_come_out_as_joint_positions_and_torques() {
 
 #[test]
 fn encoder_counts_with_a_homing_offset_are_scaled_by_table_5() {
-    let text = std::fs::read_to_string("configs/cft.toml").unwrap();
+    let text = std::fs::read_to_string(Path::new(cft_ident_support::ROOT).join("configs/cft.toml"))
+        .unwrap();
     let mut counts = text.replace(
         "[control]",
         "[log.actuator.x_c4]\nposition_unit = \"counts\"\nhome = 0.05\n[control]",

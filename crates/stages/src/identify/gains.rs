@@ -10,7 +10,7 @@ use super::gain_error::GainError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::passes::{Passes, PositionFilter};
-use super::setup_words::differences;
+use super::setup_file::differences;
 use super::unknowns::columns;
 use crate::setup::{ChannelKind, Finding, FindingKind, Setting};
 use cft_ident_core::inertia::columns::RegressorColumns;

@@ -19,8 +19,8 @@ use cft_ident_core::motion::{
 };
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_core::validate::TorqueErrors;
-use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::robot_file::{DifferencesKind, FilterKind};
+use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::inspect::{Gate, LogFault};
 use cft_ident_logs::log::{Block, Layout, LogError, Reader, RowFault, escape};
 
@@ -71,6 +71,14 @@ impl LoggedRobot {
             position_cutoffs_hz: Arc::default(),
             looks: Arc::default(),
             as_declared: false,
+        }
+    }
+
+    /// The robot of a model, its set-up kept as it is declared where that of the model was.
+    pub fn of_model(name: &str, model: &ModelFile) -> Self {
+        LoggedRobot {
+            as_declared: model.provenance.as_declared,
+            ..Self::new(name, model.robot.clone())
         }
     }
 
@@ -453,6 +461,7 @@ impl LoggedRobot {
             trim_s: f.trim_s,
             // each log says when its joints rest
             rest_speed: Vec::new(),
+            weighs_rests: true,
         }
     }
 

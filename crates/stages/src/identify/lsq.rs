@@ -188,6 +188,7 @@ pub fn lsq(
     let own = machine.own_settings(logs, &laws, control)?;
     let costs: Vec<CutoffCosts> = own.iter().map(|own| own.costs.clone()).collect();
     let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
+    passes.plain = estimator == EstimatorKind::Ols;
     let mut estimated = estimate(&mut passes, linear.clone(), estimator, law)?;
     if let Some(gains) = settings.gains {
         share_uncertainty(&mut estimated, gains)?;

@@ -60,6 +60,7 @@ mod repeated;
 mod residual;
 mod separate;
 mod setup;
+mod setup_file;
 mod setup_words;
 mod speeds;
 mod temperatures;

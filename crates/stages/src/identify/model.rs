@@ -129,6 +129,7 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
         provenance: ModelProvenance {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: command.to_owned(),
+            as_declared: machine.as_declared,
             seed: None,
             inputs: inputs
                 .iter()

@@ -56,6 +56,8 @@ pub struct Passes<'a> {
     pub summary: Option<Summary>,
     /// Sampling step of each log, by the first reading [s].
     steps: Vec<f64>,
+    /// Samples weigh alike, as in plain least squares, also where a joint stands or turns.
+    pub(super) plain: bool,
     /// What each log calls for by itself; empty where the machine and the columns say it.
     own: Vec<OwnSettings>,
     /// Logs in the order of their checksums, by the first reading: sums do not depend on the order in which
@@ -75,6 +77,7 @@ impl<'a> Passes<'a> {
             jumps: Vec::new(),
             summary: None,
             steps: Vec::new(),
+            plain: false,
             own: Vec::new(),
             order: Vec::new(),
         }
@@ -112,6 +115,7 @@ impl<'a> Passes<'a> {
     /// The processing of a log; a narrower filter is that of the log's own rate.
     fn settings(&self, filter: PositionFilter, log: usize) -> FilterSettings {
         let mut declared = self.machine.settings();
+        declared.weighs_rests = !self.plain;
         if let Some(own) = self.own.get(log) {
             declared.joint_q_cutoffs_hz.clone_from(&own.cutoffs_hz);
         }

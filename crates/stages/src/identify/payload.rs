@@ -179,16 +179,14 @@ fn rows(
         let count = (seconds / BLOCK_S).ceil().max(1.0) as usize;
         out.blocks.extend(std::iter::repeat_n(number, count));
         let hat = model.reconstruct(stretch);
-        for j in 0..n {
+        for (j, hat) in hat.iter().enumerate() {
             // a joint that rests takes any torque up to its Coulomb level
             let weights = filter.weights(stretch, j, whole.rest_speed[j]);
-            let channels = channels(machine, model, stretch, (j, &hat[j]), &weights);
+            let channels = channels(machine, model, stretch, (j, hat), &weights);
             let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
             let filtered = filter.run(&channels).map_err(failed)?;
-            for i in 0..filter.rows(stretch.len()) {
-                if rest::rests(filtered[WEIGHT][i]) {
-                    continue;
-                }
+            let kept = 0..filter.rows(stretch.len());
+            for i in kept.filter(|i| !rest::rests(filtered[WEIGHT][*i])) {
                 let row: [f64; OWN + 3] = std::array::from_fn(|k| filtered[k][i]);
                 let at = (filter.sample_of(i) as f64 * stretch.dt / BLOCK_S) as usize;
                 for (c, x) in row[..=HAT].iter().enumerate() {
@@ -374,7 +372,7 @@ fn interval(value: f64, variance: f64, open: bool, unit: &str) -> Number95 {
     Number95 {
         value: known.then_some(value),
         std: known.then_some(std),
-        interval_95: known.then(|| [value - NORMAL_95 * std, value + NORMAL_95 * std]),
+        interval_95: known.then_some([value - NORMAL_95 * std, value + NORMAL_95 * std]),
         unit: unit.to_owned(),
     }
 }
@@ -473,7 +471,11 @@ impl PayloadReading {
             accepted_by_user: false,
             name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
             joint: None,
+            shrinkage: None,
+            accepted_by_user: false,
             parameters,
+            shrinkage: None,
+            accepted_by_user: false,
         }
     }
 }

@@ -1,24 +1,22 @@
 //! The check of a set-up before a fit: does the robot file say of signs, order, scales, zeros and gravity
 //! what the torques of the logs say?
 
-use crate::setup::{Channels, Drive, Problem, Sample, Searched, SetupReport, Thinner, search};
-use cft_ident_core::inertia::columns::RegressorColumns;
+use crate::setup::{
+    Channels, Drive, Known, Problem, Sample, Searched, SetupReport, Thinner, search,
+};
 use cft_ident_core::motion;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::friction::sign;
-use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{DeclaredChannels as Logged, Layout};
 
 use super::control::Control;
 use super::error::IdentifyError;
 use super::gains;
-use super::known_friction::FrictionBefore;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::setup_words;
 use super::unknowns::columns;
+use super::{setup_file, setup_words};
 use cft_ident_files::config::RobotFile;
-use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::correction::Edit;
 
 /// What the check found, and the robot file that is right by it.
@@ -31,18 +29,19 @@ pub struct CheckedSetup {
     pub edits: Vec<Edit>,
 }
 
-/// Checks the set-up by logs of several joints or of one. `friction` is a model with the friction of every
-/// joint and its name, where there is one. Reduced logs are passed over: they hold no rows to look at, and were
-/// checked when they were made.
+/// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
+/// logs are passed over: they hold no rows to look at, and were checked when they were made.
 ///
 /// # Errors
 /// Logs that cannot be read or are refused, and interruption.
 pub fn check_setup(
     machine: &LoggedRobot,
     logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
     control: &Control,
 ) -> Result<CheckedSetup, IdentifyError> {
+    if machine.as_declared {
+        return Ok(CheckedSetup::default());
+    }
     let findings = gains::findings(machine);
     if !findings.is_empty() {
         // gains that differ look like signs, scales and loads
@@ -54,33 +53,56 @@ pub fn check_setup(
             ..CheckedSetup::default()
         });
     }
-    let sampled = sampled(machine, logs, friction, control)?;
+    let (channels, sample) = sampled(machine, logs, control)?;
     let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {
         let mut file = machine.file.clone();
         file.robot.gravity = Some(gravity);
         Some(file.robot())
     };
+    let columns = columns(machine, None);
     let problem = Problem::new(
         &machine.robot,
-        machine
-            .file
-            .declares_gravity()
+        (machine.file.declares_gravity())
             .then_some(&in_gravity as &(dyn Fn([f64; 3]) -> Option<Robot> + Sync)),
-        sampled.channels,
-        &sampled.columns,
-        sampled.sample,
+        (channels, &columns),
+        sample,
+        known(machine),
     );
     let searched = search(&problem, &|| control.stopped());
     control.check()?;
-    Ok(told(machine, logs, &problem, &searched))
+    Ok(told(machine, &problem, &searched))
 }
 
-/// What a search of the set-up looks at.
-struct SampledLogs {
-    channels: Channels,
-    /// Friction terms of each joint, fitted or known.
-    columns: RegressorColumns,
-    sample: Sample,
+/// What the robot file knows beside its channels.
+fn known(machine: &LoggedRobot) -> Known {
+    let file = &machine.file;
+    let links = file.robot.link.iter();
+    let bodies: Vec<Option<[f64; 10]>> = links
+        .map(|link| Some(link.inertial.as_ref()?.body().standard()))
+        .collect();
+    let weighs = bodies.iter().any(Option::is_some);
+    let scales = |name: &String| {
+        let of = file.log.joint.get(name);
+        of.map_or([None; 2], |c| [c.position_scale, c.torque_scale])
+    };
+    let names = machine.robot.joint_names();
+    let gears = file.log.gears.iter().flatten().copied();
+    let written = names.iter().flat_map(scales).flatten().chain(gears);
+    let either = |x: f64| [x.abs(), x.abs().recip()];
+    Known {
+        torque: (names.iter())
+            .map(|name| file.limits.of.get(name).and_then(|limits| limits.torque))
+            .collect(),
+        ratios: (written.flat_map(either))
+            .filter(|x| x.is_finite() && *x > 1.0)
+            .collect(),
+        inertial: weighs.then(|| {
+            let mut standard = vec![0.0; machine.robot.standard_parameters()];
+            let of = (bodies.iter()).flat_map(|body| body.unwrap_or_default());
+            standard.iter_mut().zip(of).for_each(|(to, x)| *to = x);
+            machine.robot.base_of(&standard)
+        }),
+    }
 }
 
 /// A bounded number of rows of logs, as the robot file declares them.
@@ -90,37 +112,28 @@ struct SampledLogs {
 fn sampled(
     machine: &LoggedRobot,
     logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
     control: &Control,
-) -> Result<SampledLogs, IdentifyError> {
+) -> Result<(Channels, Sample), IdentifyError> {
     let n = machine.robot.joints();
     let settings = machine.settings();
     let _work = control.begin("checking the set-up", None);
-    let held = (EstimatorKind::Ols, true);
-    let known = friction.map(|given| FrictionBefore::of(machine, given, logs, held, control));
-    let known = known.transpose()?;
-    let known = known.as_ref().map(|before| before.known.as_slice());
-    let mut thinner = Thinner::new(n, settings.cutoff_hz);
+    let mut thinner = Thinner::new(n);
     let mut channels: Option<Channels> = None;
     let whole = logs.iter().filter(|log| log.reduced().is_none());
     for (index, log) in whole.enumerate() {
         let mut open = machine.open(log, control)?;
         let of_log = channels_of(machine, log, open.layout());
-        let drive = of_log.drive.clone();
-        if drive == Drive::Motors {
+        if of_log.drive == Drive::Motors {
             // positions that belong to no pose are what is looked for
             open = machine.open_channels(log, control)?;
         }
         channels.get_or_insert(of_log);
-        // at a reversal the law's mean is not the law at the mean speed
-        let laws = known.filter(|_| drive == Drive::Joints);
-        let (mut last, mut step) = (None, 0.0);
         let run = motion::run(
             &mut |block| open.read(block),
             n,
             &settings,
             None,
-            if laws.is_some() { 6 * n } else { 5 * n },
+            5 * n,
             &|s, out| {
                 for (out, x) in out.chunks_exact_mut(n).zip([s.q, s.v, s.a, s.v, s.tau]) {
                     out.copy_from_slice(x);
@@ -128,49 +141,27 @@ fn sampled(
                 for x in &mut out[3 * n..4 * n] {
                     *x = sign(*x);
                 }
-                let friction = laws.into_iter().flatten().zip(s.v);
-                for (out, (known, v)) in out[5 * n..].iter_mut().zip(friction) {
-                    *out = known.law.torque(*v);
-                }
             },
-            &mut |row| {
-                if let Some((segment, t)) = last
-                    && segment == row.segment
-                {
-                    step = row.t - t;
-                }
-                last = Some((row.segment, row.t));
-                thinner.add((index, row.segment), row.t, step, row.filtered);
-            },
+            &mut |row| thinner.add(index, row.filtered),
         );
-        let run = run.map_err(|error| IdentifyError::of_run(&log.name(), error))?;
-        thinner.logged_every(run.dt);
+        run.map_err(|error| IdentifyError::of_run(&log.name(), error))?;
     }
-    Ok(SampledLogs {
-        channels: channels.ok_or(IdentifyError::NoLog)?,
-        columns: columns(machine, known),
-        sample: thinner.finish(),
-    })
+    Ok((channels.ok_or(IdentifyError::NoLog)?, thinner.finish()))
 }
 
-fn told(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    problem: &Problem,
-    searched: &Searched,
-) -> CheckedSetup {
-    let report = setup_words::report(machine, logs, problem, searched);
+fn told(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
+    let report = setup_words::report(machine, problem, searched);
     let motors = problem.channels.drive == Drive::Motors;
-    let edits = match report.refusals().next() {
-        Some(_) => setup_words::edits(&machine.file, &searched.correction, motors),
-        None => Vec::new(),
+    let Some(by) = &searched.correction else {
+        return CheckedSetup {
+            report,
+            ..CheckedSetup::default()
+        };
     };
-    let corrected = (!edits.is_empty())
-        .then(|| setup_words::corrected(&machine.file, &searched.correction, motors));
     CheckedSetup {
         report,
-        corrected,
-        edits,
+        corrected: Some(setup_file::corrected(&machine.file, by, motors)),
+        edits: setup_file::edits(&machine.file, by, motors),
     }
 }
 

@@ -1,50 +1,53 @@
-//! What a search of the set-up found, as the user reads it and as the robot file has it.
+//! What a search of the set-up found, as the user reads it.
 
-use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::setup_file::{Declared, edits};
 use crate::setup::{
-    Alternative, Change, ChannelKind, Correction, Drive, Evidence, Finding, FindingKind,
-    FindingSeverity, Found, FrictionPower, Hint, Problem, Searched, Setting, SetupReport, Small,
+    Alternative, Change, ChannelKind, Correction, Drive, Factor, Finding, FindingKind,
+    FindingSeverity, Found, FrictionPower, JointErrors, LIMITS, Problem, Searched, Setting,
+    SetupReport, Weight,
 };
 use cft_ident_core::number;
-use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::COORDINATES;
 use cft_ident_files::config::RobotFile;
-use cft_ident_files::config::correction::Edit;
-use cft_ident_logs::log::{ActuatorChannels, ColumnName, JointChannels, PositionUnit};
 
 /// The entries of the key `setup`, and the joints whose friction drives them.
-pub(super) fn report(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    problem: &Problem,
-    searched: &Searched,
-) -> SetupReport {
+pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> SetupReport {
+    let motors = problem.channels.drive == Drive::Motors;
+    let joints = machine.robot.joint_names();
     let words = Words {
         file: &machine.file,
-        names: match problem.channels.drive {
-            Drive::Motors => COORDINATES.map(str::to_owned).to_vec(),
-            _ => machine.robot.joint_names().to_vec(),
+        joints,
+        names: match motors {
+            true => COORDINATES.map(str::to_owned).to_vec(),
+            false => joints.to_vec(),
         },
-        motors: problem.channels.drive == Drive::Motors,
+        motors,
         gravity: machine.robot.tree().gravity(),
     };
-    let findings = searched
-        .found
-        .iter()
+    let mut findings: Vec<Finding> = (searched.found.iter())
         .flat_map(|found| words.findings(found))
-        .chain(searched.hint.iter().map(|hint| words.hint(hint, logs)))
         .collect();
-    let power = |negative: &crate::setup::Negative| FrictionPower {
-        joint: machine.robot.joint_names()[negative.joint].clone(),
-        power: negative.power,
-        std: negative.std,
-        unit: power_unit(machine, negative.joint),
-        cause: cause(problem, negative.joint).to_owned(),
+    findings.extend(
+        searched
+            .factor
+            .iter()
+            .map(|(factor, errors)| words.factor(factor, errors)),
+    );
+    findings.extend(words.weight(&searched.weights, searched.without_gravity.as_ref()));
+    findings.extend(words.limits(problem));
+    let power = |driven: &crate::setup::Driven| {
+        FrictionPower {
+        joint: joints[driven.joint].clone(),
+        power: driven.power,
+        std: driven.std,
+        unit: power_unit(machine, driven.joint),
+        cause: "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine".to_owned(),
+    }
     };
     SetupReport {
         findings,
-        friction_power: searched.negative.iter().map(power).collect(),
+        friction_power: searched.driven.iter().map(power).collect(),
     }
 }
 
@@ -59,20 +62,10 @@ fn power_unit(machine: &LoggedRobot, joint: usize) -> String {
     }
 }
 
-/// Why a friction may come out negative.
-fn cause(problem: &Problem, joint: usize) -> &'static str {
-    match problem.tells_friction(joint) {
-        false => {
-            "the log has too few reversals or speeds to tell friction from a constant torque; log the joint at several speeds in both directions"
-        }
-        true => {
-            "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine"
-        }
-    }
-}
-
 struct Words<'a> {
     file: &'a RobotFile,
+    joints: &'a [String],
+    /// Channels.
     names: Vec<String>,
     motors: bool,
     gravity: [f64; 3],
@@ -83,12 +76,10 @@ impl Words<'_> {
     fn findings(&self, found: &Found) -> Vec<Finding> {
         let split = |change: &Change| -> Vec<Change> {
             match change {
-                Change::Sign(channel, joints) => joints
-                    .iter()
+                Change::Sign(channel, joints) => (joints.iter())
                     .map(|j| Change::Sign(*channel, vec![*j]))
                     .collect(),
-                Change::Scale(channel, joints, f) => joints
-                    .iter()
+                Change::Scale(channel, joints, f) => (joints.iter())
                     .map(|j| Change::Scale(*channel, vec![*j], *f))
                     .collect(),
                 other => vec![other.clone()],
@@ -97,148 +88,190 @@ impl Words<'_> {
         let tied: Vec<Alternative> = found
             .tied
             .iter()
-            .map(|change| self.alternative(change))
+            .take(3)
+            .map(|c| self.alternative(c))
             .collect();
+        let [before, after] = found.errors.each_ref().map(|e| overall(e));
         let finding = |change: Change| {
             let (kind, channel, joint, with) = self.place(&change);
             let (declared, value) = self.values(&change);
             Finding {
-                kind,
                 channel,
-                joint,
                 with,
-                declared,
-                found: value,
-                found_std: found.std,
-                error_before: found.error[0].is_finite().then_some(found.error[0]),
-                error_after: Some(found.error[1]),
-                remedy: self.remedy(&change),
-                severity: match found.sure {
-                    true => FindingSeverity::Error,
-                    false => FindingSeverity::Warning,
-                },
-                sure: found.sure,
-                evidence: Evidence {
-                    held_out_gain: found.gain,
-                    needed: found.needed,
-                    tried: found.tried,
-                    violated_before: found.violated[0].clone(),
-                    violated_after: found.violated[1].clone(),
-                },
+                error_before: before,
+                error_after: after,
+                joints: self.errors(&found.errors),
                 tied_with: tied.clone(),
-                meaning: self.meaning(&change, found),
-            }
-        };
-        split(&found.change).into_iter().map(finding).collect()
-    }
-
-    /// A small thing, which is no fault.
-    fn hint(&self, hint: &Hint, logs: &[Log]) -> Finding {
-        let names: Vec<String> = logs.iter().map(Log::name).collect();
-        let remedy = format!("cft-ident diagnose {} -m MODEL.toml", names.join(" "));
-        let (kind, channel, joint, [declared, found]) = self.small(&hint.small);
-        let alternative = |small: &Small| {
-            let (kind, channel, joint, [_, found]) = self.small(small);
-            Alternative {
-                kind,
-                channel,
-                joint,
-                with: None,
-                found,
-                remedy: remedy.clone(),
-            }
-        };
-        let looks = |small: &Small| match small {
-            Small::Zero(j, angle, _) => format!(
-                "a zero of {} that is off by {} degrees",
-                self.names[*j],
-                number::significant(angle.to_degrees(), 2)
-            ),
-            Small::Tilt(g) => {
-                let dot = g.iter().zip(&self.gravity).map(|(a, b)| a * b).sum::<f64>();
-                let square = |x: &[f64; 3]| x.iter().map(|x| x * x).sum::<f64>();
-                let lean = (dot / (square(g) * square(&self.gravity)).sqrt()).acos();
-                format!(
-                    "a base that leans by {} degrees",
-                    number::significant(lean.to_degrees(), 2)
+                ..Finding::new(
+                    kind,
+                    joint,
+                    [declared, value],
+                    self.meaning(&change, found),
+                    self.remedy(&change),
+                    found.sure,
                 )
             }
-            Small::Delay(late, _) => format!(
-                "torques {} ms {} the positions",
-                number::significant(1e3 * late.abs(), 2),
-                if *late < 0.0 { "ahead of" } else { "behind" }
-            ),
         };
-        let like: Vec<String> = [&hint.small]
-            .into_iter()
-            .chain(&hint.tied)
-            .map(looks)
-            .collect();
-        let [before, after] = hint.error.map(number::percent);
-        let meaning = format!(
-            "the misfit looks like {}: the model misses {before} of the torque without it, {after} with it",
-            like.join(", or as well like ")
-        );
+        let single = found.change.single();
+        single.into_iter().flat_map(split).map(finding).collect()
+    }
+
+    /// Errors of each joint that moves, rounded to what thinned rows resolve.
+    fn errors(&self, [before, after]: &[Vec<f64>; 2]) -> Vec<JointErrors> {
+        let pairs = self.joints.iter().zip(before.iter().zip(after));
+        pairs
+            .filter(|(_, (_, after))| **after > 0.0)
+            .map(|(joint, (before, after))| JointErrors {
+                joint: joint.clone(),
+                before: before.is_finite().then_some(*before),
+                // what no block bears out is no rise
+                after: match *after <= *before * (1.0 + LIMITS.same) {
+                    true => after.min(*before),
+                    false => *after,
+                },
+            })
+            .collect()
+    }
+
+    /// A word on these data, which is no fault.
+    fn word(
+        &self,
+        (kind, channel, joint): (FindingKind, Option<ChannelKind>, Option<String>),
+        values: [Setting; 2],
+        meaning: String,
+        severity: FindingSeverity,
+    ) -> Finding {
         Finding {
             channel,
-            found_std: match hint.small {
-                Small::Zero(_, _, std) | Small::Delay(_, std) => Some(std),
-                Small::Tilt(_) => None,
-            },
-            error_before: Some(hint.error[0]),
-            error_after: Some(hint.error[1]),
-            severity: FindingSeverity::Hint,
-            evidence: Evidence {
-                held_out_gain: hint.gain,
-                needed: hint.needed,
-                tried: hint.tried,
-                ..Evidence::default()
-            },
-            tied_with: hint.tied.iter().map(alternative).collect(),
-            ..Finding::new(
-                kind,
-                joint,
-                [declared, found],
+            severity,
+            ..Finding::new(kind, joint, values, meaning, String::new(), false)
+        }
+    }
+
+    /// A factor that is on no list.
+    fn factor(&self, factor: &Factor, errors: &[Vec<f64>; 2]) -> Finding {
+        let joint = &self.names[factor.joint];
+        let [low, high] = factor.interval_95.map(|x| number::significant(x, 4));
+        let channel = match factor.channel {
+            ChannelKind::Both => "the position of a motor behind a gear and its torque, ratio",
+            channel => word(channel),
+        };
+        let [before, after] = errors.each_ref().map(|e| number::percent(e[factor.joint]));
+        let meaning = format!(
+            "{joint} fits {} times the {channel} (95 % CI {low} to {high}; error of {joint} {before} as declared, {after} with it): an estimate and no unit or ratio of a list; compare the gain of this channel with the machine",
+            number::significant(factor.value, 4)
+        );
+        let place = (
+            FindingKind::Scale,
+            Some(factor.channel),
+            Some(joint.clone()),
+        );
+        Finding {
+            found_std: Some((factor.interval_95[1] - factor.interval_95[0]) / 3.92),
+            error_before: overall(&errors[0]),
+            error_after: overall(&errors[1]),
+            joints: self.errors(errors),
+            ..self.word(
+                place,
+                [1.0, factor.value].map(Setting::Number),
                 meaning,
-                remedy.clone(),
-                false,
+                FindingSeverity::Hint,
             )
         }
     }
 
-    /// Kind, channel, joint, and what is declared and found.
-    fn small(
-        &self,
-        small: &Small,
-    ) -> (
-        FindingKind,
-        Option<ChannelKind>,
-        Option<String>,
-        [Setting; 2],
-    ) {
-        match small {
-            Small::Zero(j, angle, _) => {
-                let offset = Declared::of(self.file, &self.names[*j], self.motors).offset;
-                (
-                    FindingKind::Zero,
-                    Some(ChannelKind::Position),
-                    Some(self.names[*j].clone()),
-                    [offset, offset + angle].map(Setting::Number),
+    /// What the file's own masses say of the torques, and whether they hold a weight at all.
+    fn weight(&self, weights: &[Weight], without: Option<&[Vec<f64>; 2]>) -> Vec<Finding> {
+        let told: Vec<&Weight> = weights
+            .iter()
+            .filter(|w| w.share > LIMITS.doubtful)
+            .collect();
+        let below = |w: &&&Weight| w.interval_95[1] * LIMITS.yardstick < 1.0;
+        let gravity = [self.gravity, [0.0; 3]].map(Setting::Vector);
+        let of_masses = !told.is_empty() && told.iter().filter(below).count() == told.len();
+        if let Some(errors) = without {
+            let none = told.iter().all(|w| w.gain.abs() * LIMITS.yardstick < 1.0);
+            let (severity, meaning) = match !told.is_empty() && none {
+                true => (
+                    FindingSeverity::Warning,
+                    "gravity is not in these torques, though the file's own masses ask for it: a driver that takes it off?",
+                ),
+                false if told.is_empty() => (
+                    FindingSeverity::Hint,
+                    "gravity hardly shows in these torques: balanced, or taken off by the driver; `gravity = [0.0, 0.0, 0.0]` fits as well with fewer parameters",
+                ),
+                false => return Vec::new(),
+            };
+            let mut finding = Finding {
+                error_before: overall(&errors[0]),
+                error_after: overall(&errors[1]),
+                joints: self.errors(errors),
+                ..self.word(
+                    (FindingKind::Gravity, None, None),
+                    gravity,
+                    meaning.to_owned(),
+                    severity,
                 )
+            };
+            if severity == FindingSeverity::Warning {
+                finding.remedy = self.remedy(&Change::Gravity([0.0; 3]));
             }
-            Small::Tilt(g) => (
-                FindingKind::Gravity,
-                None,
-                None,
-                [self.gravity, *g].map(Setting::Vector),
-            ),
-            Small::Delay(late, _) => (
-                FindingKind::Delay,
-                Some(ChannelKind::Torque),
-                None,
-                [0.0, *late].map(Setting::Number),
-            ),
+            return vec![finding];
         }
+        let above = |w: &&&Weight| w.interval_95[0] > LIMITS.yardstick;
+        let all_above = !told.is_empty() && told.iter().filter(above).count() == told.len();
+        if !of_masses && !all_above {
+            return Vec::new();
+        }
+        let of = |w: &&Weight| {
+            let [low, high] = w.interval_95.map(|x| number::significant(x, 3));
+            let gain = number::significant(w.gain, 3);
+            format!(
+                "{} {gain} times (95 % CI {low} to {high})",
+                self.joints[w.joint]
+            )
+        };
+        let list: Vec<String> = told.iter().map(of).collect();
+        let meaning = format!(
+            "the torques show another weight than the masses of the robot file: {}; is the channel a current, a percentage, the motor's side of a gear, or in another unit?",
+            list.join(", ")
+        );
+        let mean = told.iter().map(|w| w.gain).sum::<f64>() / told.len() as f64;
+        let values = [1.0, mean].map(Setting::Number);
+        let place = (FindingKind::Scale, Some(ChannelKind::Torque), None);
+        vec![self.word(place, values, meaning, FindingSeverity::Warning)]
+    }
+
+    /// Torques beyond what the file says the joints can have.
+    fn limits(&self, problem: &Problem) -> Option<Finding> {
+        let sample = &problem.sample;
+        let rms = sample.rms(&sample.tau);
+        let beyond = |j: &usize| {
+            let most = problem.known.torque.get(*j).copied().flatten();
+            !self.motors && most.is_some_and(|most| rms[*j] > LIMITS.yardstick * most)
+        };
+        let joints: Vec<usize> = (0..rms.len()).filter(beyond).collect();
+        let first = *joints.first()?;
+        let most = problem.known.torque[first]?;
+        let names: Vec<&str> = joints.iter().map(|j| self.names[*j].as_str()).collect();
+        let meaning = format!(
+            "the torque of {} is beyond its limit in the robot file ({}: {} on average, limit {}): another unit, such as mNm?",
+            names.join(", "),
+            names[0],
+            number::significant(rms[first], 3),
+            number::significant(most, 3)
+        );
+        let joint = (joints.len() == 1).then(|| names[0].to_owned());
+        let place = (FindingKind::Scale, Some(ChannelKind::Torque), joint);
+        Some(Finding {
+            remedy: self.remedy(&Change::Scale(ChannelKind::Torque, joints, 1e-3)),
+            ..self.word(
+                place,
+                [1.0, 1e-3].map(Setting::Number),
+                meaning,
+                FindingSeverity::Warning,
+            )
+        })
     }
 
     fn alternative(&self, change: &Change) -> Alternative {
@@ -283,6 +316,8 @@ impl Words<'_> {
                 None,
             ),
             Change::Gravity(_) => (FindingKind::Gravity, None, None, None),
+            Change::Gear(j, _) => (FindingKind::Scale, Some(ChannelKind::Both), name(j), None),
+            Change::Two(a, _) => self.place(a),
         }
     }
 
@@ -321,6 +356,8 @@ impl Words<'_> {
                 (Setting::Number(offset), Setting::Number(offset + angle))
             }
             Change::Gravity(g) => (Setting::Vector(self.gravity), Setting::Vector(*g)),
+            Change::Gear(_, ratio) => (Setting::Number(1.0), Setting::Number(*ratio)),
+            Change::Two(a, _) => self.values(a),
         }
     }
 
@@ -367,29 +404,54 @@ impl Words<'_> {
                 joint(j),
                 number::significant(angle.to_degrees(), 3)
             ),
+            Change::Gear(j, ratio) => format!(
+                "{} is logged on the motor's side of a gear of {}, position and torque",
+                joint(j),
+                number::significant(*ratio, 4)
+            ),
+            Change::Two(a, _) => return self.meaning(a, found),
             Change::Gravity(g) => format!(
                 "free fall is along ({}) in the base frame",
                 g.map(|x| number::significant(x, 3)).join(", ")
             ),
         };
-        let [before, after] = found.error.map(number::percent);
-        let mut out = match found.error[0].is_finite() {
-            true => format!(
-                "{what}: as declared the model misses {before} of the torque, with that put right {after}"
+        let [before, after] = found
+            .errors
+            .each_ref()
+            .map(|e| overall(e).map(number::percent));
+        match (before, after) {
+            (Some(before), Some(after)) => format!(
+                "{what}: as declared the model misses {before} of the torque, with that put right {after}{}",
+                self.by_joint(&found.errors)
             ),
-            false => format!(
-                "{what}: as declared the positions belong to no pose of the robot, with that put right the model misses \
-                 {after} of the torque"
+            (_, after) => format!(
+                "{what}: as declared the positions belong to no pose of the robot, with that put right the model misses {} of the torque",
+                after.unwrap_or_default()
             ),
-        };
-        if !found.violated[0].is_empty() && found.violated[1].is_empty() {
-            out += &format!(
-                "; as declared these are negative: {}",
-                found.violated[0].join(", ")
-            );
         }
-        out
     }
+
+    /// Errors of the joints that change.
+    fn by_joint(&self, [before, after]: &[Vec<f64>; 2]) -> String {
+        let pairs = self.joints.iter().zip(before.iter().zip(after));
+        let changed = pairs.filter(|(_, (b, a))| **a < **b * (1.0 - LIMITS.same));
+        let each: Vec<String> = changed
+            .map(|(joint, (b, a))| {
+                format!("{joint} {} -> {}", number::percent(*b), number::percent(*a))
+            })
+            .collect();
+        match each.is_empty() {
+            true => ", and friction drives no joint any more".to_owned(),
+            false => format!(" ({})", each.join(", ")),
+        }
+    }
+}
+
+/// Root mean square over the joints that move.
+fn overall(errors: &[f64]) -> Option<f64> {
+    let moving: Vec<f64> = errors.iter().copied().filter(|e| *e != 0.0).collect();
+    let mean = moving.iter().map(|e| e * e).sum::<f64>() / moving.len().max(1) as f64;
+    mean.is_finite().then(|| mean.sqrt())
 }
 
 fn word(channel: ChannelKind) -> &'static str {
@@ -397,177 +459,5 @@ fn word(channel: ChannelKind) -> &'static str {
         ChannelKind::Torque => "torque",
         ChannelKind::Position => "position",
         ChannelKind::Both => "channel",
-    }
-}
-
-/// What the file says of a channel.
-struct Declared {
-    torque_sign: f64,
-    torque_scale: f64,
-    position_sign: f64,
-    position_scale: f64,
-    offset: f64,
-}
-
-impl Declared {
-    fn of(file: &RobotFile, name: &str, motors: bool) -> Self {
-        if motors {
-            let plain = ActuatorChannels::default();
-            let c = file.log.actuator.get(name).unwrap_or(&plain);
-            return Self {
-                torque_sign: c.volts_sign.unwrap_or(1.0),
-                torque_scale: c.volts_scale.unwrap_or(1.0),
-                position_sign: c.position_sign.unwrap_or(1.0),
-                position_scale: c.position_scale.unwrap_or(1.0),
-                offset: c.home.unwrap_or(0.0),
-            };
-        }
-        let plain = JointChannels::default();
-        let c = file.log.joint.get(name).unwrap_or(&plain);
-        Self {
-            torque_sign: c.torque_sign.unwrap_or(1.0),
-            torque_scale: c.torque_scale.unwrap_or(1.0),
-            position_sign: c.position_sign.unwrap_or(1.0),
-            position_scale: c.position_scale.unwrap_or(1.0),
-            offset: c.position_offset.unwrap_or(0.0),
-        }
-    }
-}
-
-/// The robot file under a correction.
-pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> RobotFile {
-    let mut out = file.clone();
-    out.robot.gravity = by.gravity.or(out.robot.gravity);
-    let names = match motors {
-        true => COORDINATES.map(str::to_owned).to_vec(),
-        false => file.joint_names(),
-    };
-    let robot = motors.then(|| file.robot());
-    let coordinate = |j: usize| robot.as_ref()?.transmission().coordinate_kind(j);
-    for (j, name) in names.iter().enumerate() {
-        let (p, t) = (by.position_from[j], by.torque_from[j]);
-        let (pf, tf) = (by.position_factor[j], by.torque_factor[j]);
-        if p == j && t == j && pf == 1.0 && tf == 1.0 && by.zero[j] == 0.0 {
-            continue;
-        }
-        let declared = Declared::of(file, name, motors);
-        if motors {
-            let of = |k: usize| {
-                file.log
-                    .actuator
-                    .get(&names[k])
-                    .cloned()
-                    .unwrap_or_default()
-            };
-            let c = out.log.actuator.entry(name.clone()).or_default();
-            if p != j {
-                c.position = of(p).position.or(Some(ColumnName(names[p].clone())));
-            }
-            if t != j {
-                c.volts = of(t).volts.or(Some(ColumnName(format!("u_{}", t + 1))));
-            }
-            if pf < 0.0 {
-                c.position_sign = Some(-declared.position_sign);
-            }
-            if pf.abs() != 1.0 {
-                let kind = coordinate(j).unwrap_or(JointKind::Prismatic);
-                match other_unit(c.position_unit, kind, pf.abs()) {
-                    Some(unit) => c.position_unit = Some(unit),
-                    None => c.position_scale = Some(declared.position_scale * pf.abs()),
-                }
-            }
-            if tf < 0.0 {
-                c.volts_sign = Some(-declared.torque_sign);
-            }
-            if tf.abs() != 1.0 {
-                c.volts_scale = Some(declared.torque_scale * tf.abs());
-            }
-            if by.zero[j] != 0.0 {
-                c.home = Some(declared.offset + by.zero[j]);
-            }
-            continue;
-        }
-        let of = |k: usize| file.log.joint.get(&names[k]).cloned().unwrap_or_default();
-        let column = |k: usize, prefix: &str| Some(ColumnName(format!("{prefix}_{}", names[k])));
-        let c = out.log.joint.entry(name.clone()).or_default();
-        if p != j {
-            c.position = of(p).position.or(column(p, "q"));
-            // one that the file does not name is optional, and the log may have none
-            c.velocity = of(p).velocity;
-            c.reference = of(p).reference;
-        }
-        if t != j {
-            c.torque = of(t).torque.or(column(t, "tau"));
-        }
-        if p != j && p == t {
-            c.name = of(p).name.or(Some(names[p].clone()));
-        }
-        if pf < 0.0 {
-            c.position_sign = Some(-declared.position_sign);
-        }
-        if pf.abs() != 1.0 {
-            match other_unit(c.position_unit, file.joint_kind(j), pf.abs()) {
-                Some(unit) => c.position_unit = Some(unit),
-                None => c.position_scale = Some(declared.position_scale * pf.abs()),
-            }
-        }
-        if by.zero[j] != 0.0 {
-            c.position_offset = Some(declared.offset + by.zero[j]);
-        }
-        if tf < 0.0 {
-            c.torque_sign = Some(-declared.torque_sign);
-        }
-        if tf.abs() != 1.0 {
-            c.torque_scale = Some(declared.torque_scale * tf.abs());
-        }
-    }
-    out
-}
-
-/// The unit that a position is in, where a factor is that of units.
-fn other_unit(now: Option<PositionUnit>, kind: JointKind, factor: f64) -> Option<PositionUnit> {
-    let near = |x: f64| (factor / x - 1.0).abs() < 1e-9;
-    let si = match kind {
-        JointKind::Revolute => PositionUnit::Radian,
-        JointKind::Prismatic => PositionUnit::Metre,
-    };
-    match now.unwrap_or(si) {
-        PositionUnit::Radian if near(1.0_f64.to_radians()) => Some(PositionUnit::Degree),
-        PositionUnit::Degree if near(1.0_f64.to_degrees()) => Some(PositionUnit::Radian),
-        PositionUnit::Metre if near(1e-3) => Some(PositionUnit::Millimetre),
-        PositionUnit::Millimetre if near(1e3) => Some(PositionUnit::Metre),
-        _ => None,
-    }
-}
-
-/// The keys by which the corrected file differs from the given one.
-pub(super) fn edits(file: &RobotFile, by: &Correction, motors: bool) -> Vec<Edit> {
-    let new = corrected(file, by, motors);
-    let mut out = Vec::new();
-    if let Some(g) = new.robot.gravity.filter(|g| Some(*g) != file.robot.gravity) {
-        out.push(Edit::new(&["robot", "gravity"], g.to_vec()));
-    }
-    differences("joint", &new.log.joint, &file.log.joint, &mut out);
-    differences("actuator", &new.log.actuator, &file.log.actuator, &mut out);
-    out
-}
-
-pub(super) fn differences<T: serde::Serialize>(
-    table: &str,
-    new: &std::collections::BTreeMap<String, T>,
-    old: &std::collections::BTreeMap<String, T>,
-    out: &mut Vec<Edit>,
-) {
-    let keys = |of: Option<&T>| -> toml::Table {
-        of.and_then(|of| toml::Table::try_from(of).ok())
-            .unwrap_or_default()
-    };
-    for (name, channels) in new {
-        let before = keys(old.get(name));
-        for (key, value) in keys(Some(channels)) {
-            if before.get(&key) != Some(&value) {
-                out.push(Edit::new(&["log", table, name, &key], value));
-            }
-        }
     }
 }

@@ -36,8 +36,6 @@ pub(super) struct Carried {
     /// What each channel gives to each joint, n x n row-major by joint: summed with the weights of
     /// [`Channels::mix`].
     pub tau: Vec<f64>,
-    /// Known friction of each joint, where the row has it: no number elsewhere.
-    pub friction: Vec<f64>,
     /// Work space.
     x: [Vec<f64>; 3],
     before: [Vec<f64>; 3],
@@ -54,7 +52,6 @@ impl Carried {
             a: zeros(),
             sign: zeros(),
             tau: vec![0.0; n * n],
-            friction: vec![f64::NAN; n],
             x: [zeros(), zeros(), zeros()],
             before: [zeros(), zeros(), zeros()],
             u: zeros(),
@@ -91,11 +88,6 @@ impl Channels {
         (0..n).map(of).collect()
     }
 
-    /// Whether two corrections give the same rows but for the weights of [`Self::mix`].
-    pub(super) fn same_rows(&self, a: &Correction, b: &Correction) -> bool {
-        a.moves_as(b) && (self.drive == Drive::Joints || a.torque_from == b.torque_from)
-    }
-
     /// A row under a correction; false where it is a pose that the robot does not have.
     pub(super) fn carry(
         &self,
@@ -117,9 +109,6 @@ impl Channels {
                     out.a[j] = f * row.a[k];
                     out.sign[j] = f.signum() * row.sign[k];
                     out.tau[j * n..(j + 1) * n].copy_from_slice(row.tau);
-                    // the law is odd; at another speed it is not in the row
-                    let friction = row.friction.get(j).filter(|_| k == j && f.abs() == 1.0);
-                    out.friction[j] = friction.map_or(f64::NAN, |friction| f * friction);
                 }
                 true
             }
@@ -236,7 +225,6 @@ mod tests {
             a,
             sign: &sign,
             tau,
-            friction: &[],
         };
         assert!(channels.carry(robot, row, by, &mut out));
         out

@@ -14,10 +14,14 @@ pub enum Change {
     Reverse,
     /// These channels are to be multiplied by a factor.
     Scale(ChannelKind, Vec<usize>, f64),
+    /// A channel that is on the motor's side of a gear of this ratio, position and torque.
+    Gear(usize, f64),
     /// This is to be added to a joint's position \[m or rad\].
     Zero(usize, f64),
     /// Acceleration of free fall in the base frame \[m/s^2\].
     Gravity([f64; 3]),
+    /// One mistake, then another.
+    Two(Box<Change>, Box<Change>),
 }
 
 /// What a set-up differs by from the declared one.
@@ -51,6 +55,9 @@ impl Correction {
 
     /// The same with one change more.
     pub fn with(&self, change: &Change) -> Self {
+        if let Change::Two(first, second) = change {
+            return self.with(first).with(second);
+        }
         let mut out = self.clone();
         let (positions, torques) = match change {
             Change::Sign(channel, _)
@@ -76,8 +83,13 @@ impl Correction {
                 out.position_from.reverse();
                 out.torque_from.reverse();
             }
+            Change::Gear(j, ratio) => {
+                out.position_factor[*j] /= ratio;
+                out.torque_factor[*j] *= ratio;
+            }
             Change::Zero(joint, angle) => out.zero[*joint] += angle,
             Change::Gravity(gravity) => out.gravity = Some(*gravity),
+            Change::Two(..) => {}
         }
         out
     }
@@ -92,20 +104,6 @@ impl Correction {
             }
         }
     }
-
-    /// Whether positions and gravity are those of another correction: the rows of the regressor are the
-    /// same then.
-    pub(super) fn moves_as(&self, other: &Self) -> bool {
-        self.position_from == other.position_from
-            && self.position_factor == other.position_factor
-            && self.zero == other.zero
-            && self.gravity == other.gravity
-    }
-
-    /// Logarithm of the size by which torques are multiplied.
-    pub(super) fn torque_size(&self) -> f64 {
-        self.torque_factor.iter().map(|f| f.abs().ln()).sum()
-    }
 }
 
 impl Change {
@@ -114,8 +112,28 @@ impl Change {
         match self {
             Self::Sign(_, joints) | Self::Scale(_, joints, _) => joints.clone(),
             Self::Exchange(_, a, b) => vec![*a, *b],
-            Self::Zero(joint, _) => vec![*joint],
+            Self::Zero(joint, _) | Self::Gear(joint, _) => vec![*joint],
             Self::Reverse | Self::Gravity(_) => Vec::new(),
+            Self::Two(a, b) => [a.joints(), b.joints()].concat(),
+        }
+    }
+
+    /// The mistakes that it is made of.
+    pub fn single(&self) -> Vec<&Change> {
+        match self {
+            Self::Two(a, b) => vec![a, b],
+            one => vec![one],
+        }
+    }
+
+    /// Whether only torques change: the columns are those of the set-up as it is.
+    pub(super) fn is_of_torques(&self) -> bool {
+        match self {
+            Self::Sign(channel, _) | Self::Exchange(channel, ..) | Self::Scale(channel, ..) => {
+                *channel == ChannelKind::Torque
+            }
+            Self::Two(a, b) => a.is_of_torques() && b.is_of_torques(),
+            _ => false,
         }
     }
 }
@@ -133,7 +151,7 @@ mod tests {
         assert_eq!(both.torque_factor, [1.0, -1.0, 1.0]);
         assert_eq!(both.position_from, [2, 1, 0]);
         assert_eq!(both.torque_from, [2, 1, 0]);
-        assert!(!both.moves_as(&none) && none.with(&turned).moves_as(&none));
+        assert!(turned.is_of_torques() && !moved.is_of_torques());
         assert_eq!(both.with(&moved).with(&turned), none);
     }
 }

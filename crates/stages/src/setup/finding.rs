@@ -50,7 +50,7 @@ pub enum FindingSeverity {
     Error,
     /// Likely, and the set-up as declared is possible too.
     Warning,
-    /// The set-up is right, and what the fit looks like is an effect, which `diagnose` finds.
+    /// An estimate or a word on these data, and no fault.
     Hint,
 }
 
@@ -99,19 +99,13 @@ pub struct Alternative {
     pub remedy: String,
 }
 
-/// What speaks for a finding.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
-pub struct Evidence {
-    /// Gain of log-likelihood on blocks of the logs that did not choose it, by effective samples.
-    pub held_out_gain: f64,
-    /// Gain that chance alone would not reach with as many hypotheses as were tried.
-    pub needed: f64,
-    /// Hypotheses that were tried.
-    pub tried: usize,
-    /// Quantities that must be positive and are not, as the set-up is declared.
-    pub violated_before: Vec<String>,
-    /// Those that are not with the finding put right.
-    pub violated_after: Vec<String>,
+/// Errors of a joint on held-out data: fractions of its torque.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct JointErrors {
+    pub joint: String,
+    /// As the set-up is declared; null where its positions belong to no pose.
+    pub before: Option<f64>,
+    pub after: f64,
 }
 
 /// One entry of the key `setup`: what the robot file declares and what the torques say.
@@ -131,12 +125,13 @@ pub struct Finding {
     pub error_before: Option<f64>,
     /// The same with this put right.
     pub error_after: Option<f64>,
-    /// What to write into the robot file; of a hint, the command that finds it.
+    /// What to write into the robot file; nothing where it is no fault.
     pub remedy: String,
     pub severity: FindingSeverity,
     /// Whether the evidence is overwhelming: a fit refuses the log then.
     pub sure: bool,
-    pub evidence: Evidence,
+    /// Errors of every joint that moves, before and after; none is larger after.
+    pub joints: Vec<JointErrors>,
     /// Other readings that fit as well.
     pub tied_with: Vec<Alternative>,
     /// What is wrong, as a sentence.
@@ -147,9 +142,6 @@ impl Finding {
     /// As it is told: what is wrong, what to write, and what these data say as well.
     pub fn told(&self) -> String {
         let mut out = self.meaning.clone();
-        if self.severity == FindingSeverity::Hint {
-            return format!("{out}; `{}` finds it", self.remedy);
-        }
         if !self.remedy.is_empty() {
             out += &format!("; write {}", self.remedy);
         }
@@ -217,7 +209,7 @@ impl Finding {
                 FindingSeverity::Warning
             },
             sure,
-            evidence: Evidence::default(),
+            joints: Vec::new(),
             tied_with: Vec::new(),
             meaning,
         }

@@ -1,59 +1,93 @@
-//! Is the set-up right that a robot file declares? Signs, order, scales and zeros of its channels, and
-//! the direction of gravity, judged by the torques of a log before anything is fitted to them.
+//! Is the set-up right that a robot file declares? Signs, order, units and zeros of its channels, and the direction of
+//! gravity, judged by the torques of a log before anything is fitted to them.
 //!
-//! A wrong set-up is a [`Correction`] away from the right one. Each that is thinkable is applied to a
-//! thinned sample of the log and the declared model is fitted to what it gives. Two measures decide: the
-//! likelihood of the residual, and physics: a body's inertia and the power that friction takes are
-//! positive. What gains more than chance and unmodelled effects can is told.
+//! ```text
+//! rows of the logs -> each hypothesis: other columns for the same blocks of time
+//!                  -> errors of every joint on blocks left out, and physics: friction brakes, inertia is positive
+//!                  -> the one mistake that repairs what the declared set-up cannot explain, or none
+//! ```
 //!
-//! | file | what |
+//! A hypothesis is a mistake that a person makes, from a list. A factor that is on no list is an estimate and no fault.
+//!
+//! | file | holds |
 //! |---|---|
-//! | `finding` | what is told: the entries of the key `setup` |
+//! | `finding` | the entries of the key `setup` |
 //! | `correction` | changes of a set-up, and their sum |
+//! | `hypotheses` | the list of mistakes |
 //! | `sample` | a bounded number of smoothed rows, spread over the logs |
-//! | `channels` | from logged channels to joints, and back, under a correction |
-//! | `normal` | normal equations of the sample under a correction, by joint and block of time |
-//! | `fit` | their solution, with weights of its own, and its likelihood |
-//! | `physics` | inertia and friction power of a solution with their deviations |
-//! | `poses` | positions that belong to no pose as they are declared |
-//! | `sizes` | how far a joint turns in a log, and how large its torque is beside the others' |
-//! | `confirm` | held-out blocks: gains that did not choose the hypothesis |
-//! | `doubt` | whether there is any reason to try them all |
-//! | `hypotheses` | which corrections are tried |
-//! | `fitted` | corrections whose number is fitted: zeros, scales, gravity of any direction |
-//! | `trial` | one hypothesis, fitted |
-//! | `decide` | the best one, and whether the evidence is enough |
-//! | `hints` | small tilts, zeros and delays: what a fit looks like where the set-up is right |
-//! | `search` | all of it, round by round |
+//! | `channels` | from logged channels to joints under a correction |
+//! | `problem` | sums of products under a correction, by block and joint |
+//! | `trial` | the fit of one hypothesis, its errors on blocks left out |
+//! | `physics` | what no machine does: friction that drives, inertia below zero |
+//! | `factor` | factors that are fitted: which round number they are, if any |
+//! | `weight` | the masses of the robot file as a yardstick of its torques |
+//! | `search` | all of it |
 
 mod channels;
-mod confirm;
 mod correction;
-mod decide;
-mod doubt;
+mod factor;
 mod finding;
-mod fit;
-mod fitted;
-mod hints;
 mod hypotheses;
-mod normal;
 mod physics;
-mod poses;
+mod problem;
 mod sample;
 mod search;
-mod sizes;
-#[cfg(test)]
-mod tests;
 mod trial;
+mod weight;
 
 pub use channels::{Channels, Drive};
 pub use correction::{Change, Correction};
-pub use decide::{Found, Negative};
+pub use factor::Factor;
 pub use finding::{
-    Alternative, ChannelKind, Evidence, Finding, FindingKind, FindingSeverity, FrictionPower,
+    Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, JointErrors,
     Setting, SetupReport,
 };
-pub use hints::{Hint, Small};
-pub use normal::Problem;
+pub use physics::Driven;
+pub use problem::{Known, Problem};
 pub use sample::{MOST_ROWS, Sample, Thinner};
-pub use search::{Searched, search};
+pub use search::{Found, Searched, search};
+pub use weight::Weight;
+
+/// The numbers that decide.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// A set-up is absurd where a joint's error is above this share of its torque. Half: machines of much friction are
+    /// refused; twice: only turned signs are.
+    pub unexplained: f64,
+    /// A repair leaves no more of the torque of such a joint, as sound machines do. Half: wrists are never repaired;
+    /// twice: anything repairs.
+    pub sound: f64,
+    /// Below this error of every joint nobody asks. Half: all machines are searched for nothing; twice: it is `sound`.
+    pub doubtful: f64,
+    /// Squared errors of blocks left out, all joints together, are at most this share of those as declared: the floor
+    /// of gain that a mistake makes. Half: exchanged neighbours are passed over; one: effects look like mistakes.
+    pub floor: f64,
+    /// A gain counts above so many standard errors of its blocks. Half: noise counts; twice: short logs say nothing.
+    pub sure: f64,
+    /// Another reading is far where it leaves so many times the squared error. One: what chance prefers is certain;
+    /// twice: readings of neighbouring joints hide each other.
+    pub far: f64,
+    /// Errors closer than this share of themselves are the same: half of it is the luck of a few blocks, twice hides
+    /// harm.
+    pub same: f64,
+    /// Torques of the robot file's own masses, and its limits of torque, are right within this factor.
+    pub yardstick: f64,
+    /// Blocks of time, of which each is left out once.
+    pub blocks: usize,
+    /// Hypotheses that few rows pass on to all rows.
+    pub short_list: usize,
+}
+
+/// The numbers of the check.
+pub const LIMITS: Limits = Limits {
+    unexplained: 0.5,
+    sound: 0.35,
+    doubtful: 0.2,
+    floor: 0.5,
+    sure: 3.0,
+    far: 1.5,
+    same: 0.1,
+    yardstick: 3.0,
+    blocks: 24,
+    short_list: 12,
+};

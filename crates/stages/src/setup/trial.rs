@@ -1,162 +1,203 @@
-//! One hypothesis, fitted.
+//! The fit of one hypothesis, and the errors of every joint in blocks that were left out of it.
 
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::channels::{Carried, Drive};
-use super::correction::Correction;
-use super::fit::{Fit, Power};
-use super::normal::{Normal, Problem};
+use super::LIMITS;
+use super::channels::Drive;
+use super::correction::{Change, Correction};
+use super::problem::{Problem, Rows};
 use cft_ident_core::robot::Robot;
 
-/// Rows whose poses stand for all of them.
-const POSES: usize = 40;
+/// Part of a column's own square that is added to the diagonal: what the data determine less stays small.
+const RIDGE: f64 = 1e-6;
 
 /// A hypothesis as it was fitted.
+#[derive(Clone)]
 pub(super) struct Trial {
+    pub change: Option<Change>,
     pub by: Correction,
     pub robot: Robot,
-    pub normal: Arc<Normal>,
-    pub fit: Fit,
-    pub power: Power,
+    rows: Arc<Rows>,
+    /// Of each joint, its columns' products, the torque last, `[block][joint]`.
+    pub sums: Vec<Vec<DMatrix<f64>>>,
+    /// Sum of squares of each joint's torque; 0 where it does not count.
+    pub power: Vec<f64>,
+    pub theta: DVector<f64>,
+    /// The unknowns by all blocks but one.
+    pub without: Vec<DVector<f64>>,
+    /// Squared errors of blocks that were left out, over the joint's power, `[block][joint]`.
+    pub left_out: Vec<Vec<f64>>,
 }
 
 impl Trial {
+    /// Fits a change upon `base` to these rows. `same` is a trial of these rows at `base`, whose columns serve where
+    /// only torques change. None where most rows belong to no pose.
     pub fn new(
         problem: &Problem,
-        by: Correction,
-        rows: &[usize],
-        blocks: usize,
-        shared: Option<&Trial>,
+        (base, change): (&Correction, Option<&Change>),
+        (rows, blocks): (&[usize], usize),
+        same: Option<&Trial>,
     ) -> Option<Self> {
-        let same = shared.filter(|s| problem.channels.same_rows(&s.by, &by));
-        let (robot, normal) = match same {
-            Some(s) => (s.robot.clone(), Arc::clone(&s.normal)),
+        let by = change.map_or_else(|| base.clone(), |change| base.with(change));
+        let torques = change.is_none_or(Change::is_of_torques);
+        let serves = torques && problem.channels.drive == Drive::Joints;
+        let (robot, rows) = match same.filter(|_| serves) {
+            Some(same) => (same.robot.clone(), Arc::clone(&same.rows)),
             None => {
                 let robot = problem.robot_under(&by)?;
-                let normal = problem.normal(&robot, &by, rows, blocks)?;
-                (robot, Arc::new(normal))
+                let rows = problem.rows(&robot, &by, rows, blocks)?;
+                (robot, Arc::new(rows))
             }
         };
         let mix = problem.channels.mix(&by);
-        let power = power(problem, &robot, &by, &normal, &mix, rows);
-        // friction that is known may have been found with the sign as it is declared, or without
-        let known = |turned: bool| {
-            let of = |(j, mix): (usize, &DVector<f64>)| {
-                let sign = by.torque_factor[j].signum();
-                Normal::target(mix, if turned { sign } else { 1.0 })
-            };
-            mix.iter().enumerate().map(of).collect::<Vec<_>>()
+        let of_joint = |(j, gram): (usize, &DMatrix<f64>)| mixed(gram, &mix[j]);
+        let sums: Vec<Vec<DMatrix<f64>>> = (rows.blocks.iter())
+            .map(|block| block.iter().enumerate().map(of_joint).collect())
+            .collect();
+        let total = total(&sums);
+        let power = |(j, m): (usize, &DMatrix<f64>)| match problem.moving()[j] {
+            true => m[(m.nrows() - 1, m.nrows() - 1)],
+            false => 0.0,
         };
-        let turned = by.torque_factor.iter().any(|f| *f < 0.0)
-            && problem.columns.known.iter().any(Option::is_some);
-        let fit = Fit::new(&normal, known(false), &power);
-        let other = turned
-            .then(|| Fit::new(&normal, known(true), &power))
-            .flatten();
-        let fit = match (fit, other) {
-            (Some(a), Some(b)) if b.score > a.score => Some(b),
-            (a, b) => a.or(b),
-        }?;
-        Some(Self {
+        let mut out = Self {
+            change: change.cloned(),
             by,
             robot,
-            normal,
-            fit,
-            power,
-        })
+            power: total.iter().enumerate().map(power).collect(),
+            rows,
+            sums,
+            theta: DVector::zeros(0),
+            without: Vec::new(),
+            left_out: Vec::new(),
+        };
+        out.fit(&total)?;
+        Some(out)
     }
-}
 
-/// By what the residuals of a hypothesis are measured, from these rows.
-pub(super) fn power(
-    problem: &Problem,
-    robot: &Robot,
-    by: &Correction,
-    normal: &Normal,
-    mix: &[DVector<f64>],
-    rows: &[usize],
-) -> Power {
-    let n = normal.joints;
-    let own = |j: usize| {
-        let first = normal.places[j].len();
-        match normal.total[j].nrows() == first + n + 1 && first > 0 {
-            true => {
-                let k = normal.total[j].view((first, first), (n, n));
-                mix[j].dot(&(k * &mix[j]))
+    fn fit(&mut self, total: &[DMatrix<f64>]) -> Option<()> {
+        let (normal, right) = self.system(total);
+        let ridge: Vec<f64> = normal.diagonal().iter().map(|x| RIDGE * x).collect();
+        let solve = |mut a: DMatrix<f64>, b: &DVector<f64>| {
+            for (i, ridge) in ridge.iter().enumerate() {
+                a[(i, i)] += if *ridge > 0.0 { *ridge } else { 1.0 };
             }
-            false => 0.0,
+            Some(a.cholesky()?.solve(b))
+        };
+        self.theta = solve(normal.clone(), &right)?;
+        for block in &self.sums {
+            let (own, side) = self.system(block);
+            let theta = solve(&normal - own, &(&right - side))?;
+            self.left_out.push(self.squares(block, &theta));
+            self.without.push(theta);
         }
-    };
-    let alone = |joints: Vec<f64>| Power { joints, size: 0.0 };
-    match problem.channels.drive {
-        Drive::Joints => alone((0..n).map(own).collect()),
-        Drive::Motors => {
-            let joints: Vec<f64> = (0..n).map(own).collect();
-            let size = through_linkage(problem, robot, by, (&joints, normal.rows), rows);
-            Power { joints, size }
+        let finite = self.left_out.iter().flatten().all(|x| x.is_finite());
+        finite.then_some(())
+    }
+
+    /// Normal matrix and right side of some sums, each joint by its torque's power.
+    fn system(&self, sums: &[DMatrix<f64>]) -> (DMatrix<f64>, DVector<f64>) {
+        let u = self.rows.unknowns;
+        let (mut normal, mut right) = (DMatrix::zeros(u, u), DVector::zeros(u));
+        for (j, sums) in sums
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| self.power[*j] > 0.0)
+        {
+            let (places, w) = (&self.rows.places[j], self.power[j].recip());
+            for (k, &at) in places.iter().enumerate() {
+                right[at] += w * sums[(k, places.len())];
+                for (i, &row) in places.iter().enumerate() {
+                    normal[(row, at)] += w * sums[(i, k)];
+                }
+            }
         }
-        // channels share joints: their sizes count together
-        _ => {
-            let scale = (2.0 * by.torque_size() / n as f64).exp();
-            let sums = squares(problem, rows);
-            let felt = sums.iter().zip(problem.moving());
-            alone(
-                felt.map(|(s, m)| if *m { scale * s } else { 0.0 })
-                    .collect(),
-            )
-        }
+        (normal, right)
+    }
+
+    /// Squared errors of each joint in some rows, over its power.
+    fn squares(&self, sums: &[DMatrix<f64>], theta: &DVector<f64>) -> Vec<f64> {
+        let of = |(j, sums): (usize, &DMatrix<f64>)| {
+            let places = &self.rows.places[j];
+            let whole = DVector::from_fn(places.len() + 1, |i, _| match places.get(i) {
+                Some(at) => -theta[*at],
+                None => 1.0,
+            });
+            match self.power[j] > 0.0 {
+                true => (whole.dot(&(sums * &whole)) / self.power[j]).max(0.0),
+                false => 0.0,
+            }
+        };
+        sums.iter().enumerate().map(of).collect()
+    }
+
+    /// Squared errors of each block by the fit to all, all joints together.
+    pub fn fitted(&self) -> Vec<f64> {
+        let of = |block: &Vec<DMatrix<f64>>| self.squares(block, &self.theta).iter().sum();
+        self.sums.iter().map(of).collect()
+    }
+
+    /// Error of each joint in blocks left out, a share of its torque.
+    pub fn errors(&self) -> Vec<f64> {
+        let joints = self.power.len();
+        let of = |j: usize| {
+            self.left_out
+                .iter()
+                .map(|block| block[j])
+                .sum::<f64>()
+                .sqrt()
+        };
+        (0..joints).map(of).collect()
+    }
+
+    /// Squared error of some joints together.
+    pub fn square(&self, joints: &[usize]) -> f64 {
+        let of = |block: &Vec<f64>| joints.iter().map(|j| block[*j]).sum::<f64>();
+        self.left_out.iter().map(of).sum()
     }
 }
 
-/// Squares of the torques of each channel in these rows.
-fn squares(problem: &Problem, rows: &[usize]) -> Vec<f64> {
-    let mut sums = vec![0.0; problem.sample.joints];
-    for &k in rows {
-        for (sum, tau) in sums.iter_mut().zip(problem.sample.row(k).tau) {
-            *sum += tau * tau;
-        }
-    }
-    sums
+/// What the second hypothesis takes off the squared errors of blocks left out, in standard errors of their sum.
+pub(super) fn gain(before: &Trial, after: &Trial, joints: &[usize]) -> f64 {
+    let pairs = before.left_out.iter().zip(&after.left_out);
+    let of = |(b, a): (&Vec<f64>, &Vec<f64>)| joints.iter().map(|j| b[*j] - a[*j]).sum::<f64>();
+    let gains: Vec<f64> = pairs.map(of).collect();
+    let count = gains.len() as f64;
+    let sum: f64 = gains.iter().sum();
+    let scatter: f64 = gains.iter().map(|g| (g - sum / count).powi(2)).sum();
+    sum / (scatter / (count - 1.0) * count)
+        .sqrt()
+        .max(f64::MIN_POSITIVE)
 }
 
-/// Logarithm of the product of the joints' mean squares over that of the motors', by the volume that the linkage and the
-/// correction make of the motors' torques.
-fn through_linkage(
-    problem: &Problem,
-    robot: &Robot,
-    by: &Correction,
-    (joints, good): (&[f64], usize),
-    rows: &[usize],
-) -> f64 {
-    let n = joints.len();
-    let mean = |sums: &[f64], rows: usize| -> f64 {
-        let all = sums.iter().filter(|s| **s > 0.0);
-        all.map(|s| (s / rows.max(1) as f64).ln()).sum()
-    };
-    let drive = robot.transmission();
-    let mut carried = Carried::new(n);
-    let (mut unit, mut torque) = (vec![0.0; n], vec![0.0; n]);
-    let (mut volume, mut count) = (0.0, 0.0);
-    for k in rows.iter().step_by(rows.len().div_ceil(POSES).max(1)) {
-        let row = problem.sample.row(*k);
-        if !problem.channels.carry(robot, row, by, &mut carried) {
-            continue;
-        }
-        let mut gains = DMatrix::zeros(n, n);
-        for c in 0..n {
-            unit[c] = 1.0;
-            drive.torques(&carried.q, &unit, &mut torque);
-            unit[c] = 0.0;
-            gains.column_mut(c).copy_from_slice(&torque);
-        }
-        let size = gains.determinant().abs();
-        if size > 0.0 {
-            volume += size.ln();
-            count += 1.0;
-        }
+/// Joints whose error a change makes smaller, and whether it makes none larger.
+pub(super) fn compared(before: &Trial, after: &Trial) -> (Vec<usize>, bool) {
+    let (b, a) = (before.errors(), after.errors());
+    let better = (0..b.len())
+        .filter(|j| a[*j] < b[*j] * (1.0 - LIMITS.same))
+        .collect();
+    let worse = b.iter().zip(&a).any(|(b, a)| *a > *b * (1.0 + LIMITS.same));
+    (better, !worse)
+}
+
+fn mixed(gram: &DMatrix<f64>, mix: &DVector<f64>) -> DMatrix<f64> {
+    let c = gram.nrows() - mix.len();
+    let mut out = DMatrix::zeros(c + 1, c + 1);
+    out.view_mut((0, 0), (c, c))
+        .copy_from(&gram.view((0, 0), (c, c)));
+    let across = gram.view((0, c), (c, mix.len())) * mix;
+    out.view_mut((0, c), (c, 1)).copy_from(&across);
+    out.view_mut((c, 0), (1, c)).copy_from(&across.transpose());
+    out[(c, c)] = mix.dot(&(gram.view((c, c), (mix.len(), mix.len())) * mix));
+    out
+}
+
+/// The sums over all blocks.
+pub(super) fn total(sums: &[Vec<DMatrix<f64>>]) -> Vec<DMatrix<f64>> {
+    let mut out = sums.first().cloned().unwrap_or_default();
+    for block in sums.iter().skip(1) {
+        (out.iter_mut().zip(block)).for_each(|(sum, x)| *sum += x);
     }
-    let volume = volume / f64::max(count, 1.0) + by.torque_size();
-    mean(joints, good) - mean(&squares(problem, rows), rows.len()) - 2.0 * volume
+    out
 }

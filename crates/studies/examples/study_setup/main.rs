@@ -4,7 +4,7 @@
 //! Each case leaves its line in target/study_setup/rows.jsonl as soon as it is done: a stopped study
 //! goes on where it was. `--again` begins anew. `--every=K` takes a sample, every K-th case of each machine from a
 //! place on that chance chose, and `--minutes=M` begins no case after that time. The summary goes to
-//! docs/results/study_setup.json, from which docs/setup.md has its tables; it says of how many cases it is.
+//! docs/results/study_setup.json; it says of how many cases it is.
 
 mod bench;
 mod summary;

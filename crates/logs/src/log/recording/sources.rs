@@ -110,8 +110,9 @@ struct Seen {
     first: Vec<f64>,
     last: Vec<f64>,
     moved: bool,
-    /// Largest step of each number from message to message.
+    /// Largest step of each number from message to message, and its least and largest value.
     steps: Vec<f64>,
+    ranges: Vec<[f64; 2]>,
     /// Messages between two of the main publisher, and those of them that are off.
     compared: u64,
     off: u64,
@@ -123,6 +124,7 @@ impl Seen {
         if self.first.is_empty() {
             self.first = numbers.to_vec();
             self.steps = vec![0.0; numbers.len()];
+            self.ranges = numbers.iter().map(|x| [*x; 2]).collect();
         } else {
             self.moved |= self.first != numbers;
             for (step, (a, b)) in self.steps.iter_mut().zip(self.last.iter().zip(numbers)) {
@@ -130,8 +132,21 @@ impl Seen {
                 *step = if now > *step { now } else { *step };
             }
         }
+        for ([low, high], x) in self.ranges.iter_mut().zip(numbers) {
+            (*low, *high) = (low.min(*x), high.max(*x));
+        }
         self.last.clear();
         self.last.extend(numbers);
+    }
+
+    /// The largest step of each number; infinite where it is no motion that was sampled finely.
+    fn fine_steps(&self) -> Vec<f64> {
+        let pairs = self.steps.iter().zip(&self.ranges);
+        let fine = |(step, [low, high]): (&f64, &[f64; 2])| match *step <= FINE * (high - low) {
+            true => *step,
+            false => f64::INFINITY,
+        };
+        pairs.map(fine).collect()
     }
 }
 
@@ -150,7 +165,7 @@ fn judged(
         .max_by_key(|(_, seen)| (seen.moved, seen.messages))
         .map(|(publisher, _)| *publisher);
     let steps = main.and_then(|main| all.get(&main));
-    let steps = steps.map_or_else(Vec::new, |seen| seen.steps.clone());
+    let steps = steps.map_or_else(Vec::new, Seen::fine_steps);
     let mut before: Option<Vec<f64>> = None;
     let mut between: Vec<(Publisher, Vec<f64>)> = Vec::new();
     through(paths, topic, fields, &mut |publisher, numbers| {
@@ -179,6 +194,8 @@ fn judged(
     Ok(all.iter().map(|(one, seen)| (*one, used(seen))).collect())
 }
 
+/// Share of its range that a number goes from message to message at most where a motion was sampled finely.
+const FINE: f64 = 0.25;
 /// Messages that wait for the next one of the main publisher at most.
 const MOST_BETWEEN: usize = 4096;
 

@@ -60,8 +60,8 @@ fn collect<'t>(
             let names = named(lists, elements.len()).map(|(_, names)| names);
             for (index, element) in elements.iter().enumerate() {
                 let number = index.to_string();
-                let name = names.and_then(|names| names.get(index)).map(String::as_str);
-                let name = name.or_else(|| own_name(element)).unwrap_or(&number);
+                let beside = || names.and_then(|names| names.get(index)).map(String::as_str);
+                let name = own_name(element).or_else(beside).unwrap_or(&number);
                 let place = (&*format!("{path}[{index}]"), &*joined(label, name));
                 collect(element, place, lists, out);
             }

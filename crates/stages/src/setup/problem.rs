@@ -1,0 +1,186 @@
+//! Sums of products of a sample under a correction, by block of time and joint.
+
+use nalgebra::DMatrix;
+
+use super::channels::{Carried, Channels, Drive};
+use super::correction::Correction;
+use super::sample::Sample;
+use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::robot::{JointKind, Robot};
+
+/// A joint that travels less stands still where others are moved \[rad, m\].
+const STILL: [f64; 2] = [0.01, 0.003];
+
+/// What the robot file knows beside its channels.
+#[derive(Debug, Clone, Default)]
+pub struct Known {
+    /// Largest torque of each joint \[N or N m\].
+    pub torque: Vec<Option<f64>>,
+    /// Gear ratios and factors that stand in the file.
+    pub ratios: Vec<f64>,
+    /// Inertial parameters by the file's own masses.
+    pub inertial: Option<Vec<f64>>,
+}
+
+/// A robot file and a sample of its logs.
+pub struct Problem<'a> {
+    pub robot: &'a Robot,
+    /// The same robot in another gravity \[m/s^2\]; none where the file declares no gravity.
+    pub in_gravity: Option<&'a (dyn Fn([f64; 3]) -> Option<Robot> + Sync)>,
+    pub channels: Channels,
+    /// Friction terms of each joint.
+    pub columns: &'a RegressorColumns,
+    pub sample: Sample,
+    pub known: Known,
+    /// Joints that move, and whose torques are not all zero.
+    moving: Vec<bool>,
+}
+
+/// Sums of products by block and joint: the joint's inertial parameters, its own terms, the torque of each channel.
+pub(super) struct Rows {
+    pub blocks: Vec<Vec<DMatrix<f64>>>,
+    /// Of each joint, the unknowns that its columns are of.
+    pub places: Vec<Vec<usize>>,
+    pub unknowns: usize,
+}
+
+impl<'a> Problem<'a> {
+    /// A robot, the channels of its logs, its friction terms, a sample and what the file knows.
+    pub fn new(
+        robot: &'a Robot,
+        in_gravity: Option<&'a (dyn Fn([f64; 3]) -> Option<Robot> + Sync)>,
+        (channels, columns): (Channels, &'a RegressorColumns),
+        sample: Sample,
+        known: Known,
+    ) -> Self {
+        let mut out = Self {
+            robot,
+            in_gravity,
+            channels,
+            columns,
+            sample,
+            known,
+            moving: Vec::new(),
+        };
+        out.moving = out.joints_that_move();
+        out
+    }
+
+    /// Joints that move, and whose torques are not all zero.
+    pub(super) fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    /// In a log that moves one joint the others stand still; where several move, one that seems not to may be in
+    /// thousandths of its unit.
+    fn joints_that_move(&self) -> Vec<bool> {
+        let n = self.sample.joints;
+        let travels = |j: usize| {
+            let least = match self.robot.joint_kind(j) {
+                JointKind::Revolute => STILL[0],
+                JointKind::Prismatic => STILL[1],
+            };
+            self.sample.travel(j) > least
+        };
+        let moved: Vec<bool> = (0..n).map(travels).collect();
+        let alone = n > 1 && moved.iter().filter(|m| **m).count() == 1;
+        // a motor behind a linkage is no joint
+        let linked = self.channels.drive == Drive::Motors;
+        let torques = self.sample.rms(&self.sample.tau);
+        let speeds = self.sample.rms(&self.sample.v);
+        let moving =
+            |j: usize| linked || torques[j] > 0.0 && speeds[j] > 0.0 && (moved[j] || !alone);
+        (0..n).map(moving).collect()
+    }
+
+    /// Channels whose signs and units are asked for.
+    pub(super) fn channels_that_move(&self) -> Vec<usize> {
+        (0..self.moving.len()).filter(|j| self.moving[*j]).collect()
+    }
+
+    /// The robot in the gravity of a correction.
+    pub(super) fn robot_under(&self, by: &Correction) -> Option<Robot> {
+        match by.gravity {
+            None => Some(self.robot.clone()),
+            Some(gravity) => self.in_gravity.and_then(|robot| robot(gravity)),
+        }
+    }
+
+    /// Place of the first own term of a joint among the unknowns.
+    pub(super) fn first_own(&self, robot: &Robot, j: usize) -> usize {
+        robot.parameters().len() + self.columns.own[..j].iter().map(Vec::len).sum::<usize>()
+    }
+
+    fn places_of(&self, robot: &Robot) -> Vec<Vec<usize>> {
+        let all = robot.parameters_by_joint().into_iter().enumerate();
+        let of = |(j, shared): (usize, Vec<usize>)| -> Vec<usize> {
+            let first = self.first_own(robot, j);
+            let own = first..first + self.columns.own[j].len();
+            match self.moving[j] {
+                true => shared.into_iter().chain(own).collect(),
+                false => Vec::new(),
+            }
+        };
+        all.map(of).collect()
+    }
+
+    /// Sums over the rows of these numbers, in `blocks` blocks; none where most of the rows are no pose of the robot.
+    pub(super) fn rows(
+        &self,
+        robot: &Robot,
+        by: &Correction,
+        rows: &[usize],
+        blocks: usize,
+    ) -> Option<Rows> {
+        let (n, p) = (robot.joints(), robot.parameters().len());
+        let places = self.places_of(robot);
+        let widths: Vec<usize> = places.iter().map(|c| c.len() + n).collect();
+        let mut carried = Carried::new(n);
+        let mut y = vec![0.0; n * p];
+        let mut out: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(blocks);
+        let mut data: Vec<Vec<f64>> = vec![Vec::new(); n];
+        let mut good = 0;
+        for block in 0..blocks {
+            data.iter_mut().for_each(Vec::clear);
+            for &k in &rows[block * rows.len() / blocks..(block + 1) * rows.len() / blocks] {
+                if !(self.channels).carry(robot, self.sample.row(k), by, &mut carried) {
+                    continue;
+                }
+                robot.regressor(&carried.q, &carried.v, &carried.a, &mut y);
+                if y.iter().any(|x| !x.is_finite()) {
+                    continue;
+                }
+                good += 1;
+                for (j, data) in data.iter_mut().enumerate().filter(|(j, _)| self.moving[*j]) {
+                    let shared = places[j].len() - self.columns.own[j].len();
+                    data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));
+                    let own = self.columns.own[j].iter();
+                    data.extend(own.map(|own| own_column(*own, &carried, j)));
+                    data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
+                }
+            }
+            let gram = |(data, width): (&Vec<f64>, &usize)| match data.is_empty() {
+                true => DMatrix::zeros(*width, *width),
+                // columns of the transposed are rows
+                false => {
+                    let x = DMatrix::from_column_slice(*width, data.len() / width, data);
+                    &x * x.transpose()
+                }
+            };
+            out.push(data.iter().zip(&widths).map(gram).collect());
+        }
+        (good > 0 && 2 * good >= rows.len()).then(|| Rows {
+            blocks: out,
+            unknowns: self.first_own(robot, n),
+            places,
+        })
+    }
+}
+
+/// The column of a joint's own term in a row.
+pub(super) fn own_column(own: Own, carried: &Carried, j: usize) -> f64 {
+    match own {
+        Own::Coulomb => carried.sign[j],
+        own => own.column(carried.v[j]),
+    }
+}
