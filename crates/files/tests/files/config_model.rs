@@ -62,6 +62,7 @@ fn model(values: &[f64]) -> ModelFile {
     }
     let names = vec!["theta_1".to_owned(), "viscous:q4".to_owned()];
     ModelFile {
+        estimates: Vec::new(),
         robot: robot.clone(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
