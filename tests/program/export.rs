@@ -343,7 +343,6 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
         covariance: None,
         residual_std: Default::default(),
         effects: Vec::new(),
-        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: Default::default(),
         candidates: Vec::new(),
@@ -702,8 +701,6 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
             name: name.to_owned(),
             joint: Some("elbow".to_owned()),
             parameters: numbers.collect(),
-            shrinkage: None,
-            accepted_by_user: false,
         }];
         std::fs::write(&path, file.to_toml().unwrap()).unwrap();
     };

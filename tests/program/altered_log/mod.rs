@@ -123,7 +123,6 @@ pub fn write_model(path: &Path) {
         covariance: None,
         residual_std: BTreeMap::new(),
         effects: Vec::new(),
-        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: Default::default(),
         candidates: Vec::new(),

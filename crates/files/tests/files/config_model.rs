@@ -63,6 +63,7 @@ fn model(values: &[f64]) -> ModelFile {
     let names = vec!["theta_1".to_owned(), "viscous:q4".to_owned()];
     ModelFile {
         robot: robot.clone(),
+        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         candidates: Vec::new(),

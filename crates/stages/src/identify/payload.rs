@@ -471,11 +471,7 @@ impl PayloadReading {
             accepted_by_user: false,
             name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
             joint: None,
-            shrinkage: None,
-            accepted_by_user: false,
             parameters,
-            shrinkage: None,
-            accepted_by_user: false,
         }
     }
 }

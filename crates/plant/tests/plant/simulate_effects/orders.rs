@@ -235,7 +235,6 @@ fn model(robot: &RobotFile, effects: Vec<EffectSection>) -> ModelFile {
         covariance: None,
         residual_std: BTreeMap::new(),
         effects,
-        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         candidates: Vec::new(),
@@ -259,8 +258,6 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> EffectSec
         name: name.to_owned(),
         joint: joint.map(str::to_owned),
         parameters: numbers.iter().map(number).collect(),
-        shrinkage: None,
-        accepted_by_user: false,
     }
 }
 
