@@ -64,6 +64,7 @@ fn model(values: &[f64]) -> ModelFile {
     ModelFile {
         estimates: Vec::new(),
         robot: robot.clone(),
+        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         candidates: Vec::new(),
