@@ -62,7 +62,6 @@ fn model(values: &[f64]) -> ModelFile {
     }
     let names = vec!["theta_1".to_owned(), "viscous:q4".to_owned()];
     ModelFile {
-        estimates: Vec::new(),
         robot: robot.clone(),
         estimates: Vec::new(),
         links: Vec::new(),
