@@ -66,7 +66,7 @@ pub(super) fn weights(problem: &Problem, rows: &[usize]) -> Vec<Weight> {
         let scatter: f64 = without.iter().map(|x| (x - mean).powi(2)).sum();
         let std = (scatter * (count - 1.0) / count).sqrt();
         let told = problem.moving()[j] && std.is_finite() && share.is_finite();
-        told.then(|| Weight {
+        told.then_some(Weight {
             joint: j,
             gain,
             interval_95: [gain - TWO_SIDED * std, gain + TWO_SIDED * std],
