@@ -207,22 +207,23 @@ pub(super) fn tell(stderr: &mut dyn Write, text: &str) {
 /// The parts of a message between `; `, but for those inside of quotes: names and lines of files stand there.
 fn parts(text: &str) -> Vec<String> {
     let mut parts = vec![String::new()];
-    let mut open = None;
-    let mut rest = text.chars().peekable();
-    while let Some(c) = rest.next() {
-        match (c, open) {
-            ('"' | '`', None) => open = Some(c),
-            (c, Some(quote)) if c == quote => open = None,
-            (';', None) if rest.peek() == Some(&' ') => {
-                rest.next();
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        // a quote that nothing closes is a sign like others
+        let closed = matches!(c, '"' | '`').then(|| rest[1..].find(c)).flatten();
+        let length = match closed {
+            Some(at) => at + 2,
+            None if rest.starts_with("; ") => {
                 parts.push(String::new());
+                rest = &rest[2..];
                 continue;
             }
-            _ => {}
-        }
+            None => c.len_utf8(),
+        };
         if let Some(part) = parts.last_mut() {
-            part.push(c);
+            part.push_str(&rest[..length]);
         }
+        rest = &rest[length..];
     }
     parts
 }

@@ -20,7 +20,7 @@ Example:
 
 /// Write the feed-forward torque along a motion, with its prediction band.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE, override_usage = "cft-ident torque [OPTIONS] -m MODEL.toml -o OUT.csv|.mcap LOG|TRAJECTORY.toml")]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident torque [OPTIONS] -m MODEL.toml -o OUT.csv|.mcap LOG|MOTION.toml")]
 pub struct Args {
     /// Log or trajectory (.toml, .csv) of q; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(value_name = "LOG|TRAJECTORY.toml")]

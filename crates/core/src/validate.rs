@@ -20,7 +20,8 @@ pub struct JointError {
     pub rmse: f64,
     /// norm(tau - tau_hat) / norm(tau), filtered and decimated.
     pub relative_error: f64,
-    /// The same of the rows in which the joint moves; null where there are none.
+    /// The same of the rows in which the joint moves, weighed as a fit does: samples where it turns or stands count
+    /// less; null where there are none.
     pub relative_error_moving: Option<f64>,
     /// The same of the rows in which it rests.
     pub relative_error_rest: Option<f64>,
@@ -103,18 +104,24 @@ struct ErrorSums {
     raw_rows: u64,
     inside: u64,
     widths: f64,
+    /// Squared error and torque of the rows in which the joint moves, as a fit weighs them.
+    moving: [f64; 2],
     /// Squared error and torque of the rows in which the joint rests, and their number.
     rest: [f64; 2],
     resting: u64,
 }
 
 impl ErrorSums {
-    fn add(&mut self, measured: f64, reconstructed: f64, rests: bool) {
+    /// A row, `weighted` as a fit has it: measured and reconstructed.
+    fn add(&mut self, [measured, reconstructed]: [f64; 2], weighted: [f64; 2], rests: bool) {
         let e = measured - reconstructed;
         if rests {
             self.rest[0] += e * e;
             self.rest[1] += measured * measured;
             self.resting += 1;
+        } else {
+            self.moving[0] += (weighted[0] - weighted[1]).powi(2);
+            self.moving[1] += weighted[0].powi(2);
         }
         self.error += e * e;
         self.torque += measured * measured;
@@ -142,6 +149,8 @@ impl ErrorSums {
         self.raw_rows += other.raw_rows;
         self.inside += other.inside;
         self.widths += other.widths;
+        self.moving[0] += other.moving[0];
+        self.moving[1] += other.moving[1];
         self.rest[0] += other.rest[0];
         self.rest[1] += other.rest[1];
         self.resting += other.resting;
@@ -398,12 +407,14 @@ impl<'a> Reconstruction<'a> {
     }
 
     /// Adds rows of one joint of which the sums are known, and nothing else: of the errors of single rows and of the
-    /// raw samples nothing is told any more.
+    /// raw samples nothing is known then. Rows of movement stand as a fit weighs them, in the error of all rows too.
     pub fn add_sums(&mut self, joint: usize, rows: &SummedRows) {
         self.summed = true;
         let sums = &mut self.sums[joint];
         sums.error += rows.error[0] + rows.error[1];
         sums.torque += rows.torque[0] + rows.torque[1];
+        sums.moving[0] += rows.error[0];
+        sums.moving[1] += rows.torque[0];
         sums.rest[0] += rows.error[1];
         sums.rest[1] += rows.torque[1];
         sums.rows += rows.rows[0] + rows.rows[1];
@@ -442,8 +453,8 @@ impl<'a> Reconstruction<'a> {
         if keep {
             for (j, s) in self.sums.iter_mut().enumerate() {
                 let rests = rest::rests(filtered[2 * n + j]);
-                let first = if rests { 0 } else { 4 * n };
-                s.add(filtered[first + j], filtered[first + n + j], rests);
+                let row = |first: usize| [filtered[first + j], filtered[first + n + j]];
+                s.add(row(0), row(4 * n), rests);
             }
             append(&mut self.traces, self.zero + t, &filtered[..2 * n], n);
         }
@@ -471,13 +482,12 @@ impl<'a> Reconstruction<'a> {
         let has_band = self.band.is_some();
         let known = |x: Option<f64>| x.filter(|_| !self.summed).unwrap_or(f64::NAN);
         let joint = |(j, s): (usize, &ErrorSums)| {
-            let [error, torque] = [s.error - s.rest[0], s.torque - s.rest[1]];
             JointError {
                 joint: robot.joint_names()[j].clone(),
                 unit: robot.joint_unit(j),
                 rmse: (s.error / s.rows.max(1) as f64).sqrt(),
                 relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
-                relative_error_moving: ratio(error.max(0.0), torque, s.rows - s.resting),
+                relative_error_moving: ratio(s.moving[0], s.moving[1], s.rows - s.resting),
                 relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
                 relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
                 coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
@@ -494,20 +504,18 @@ impl<'a> Reconstruction<'a> {
         };
         let joints: Vec<JointError> = all.iter().enumerate().map(joint).collect();
         let one_unit = joints.iter().all(|e| e.unit == joints[0].unit);
-        // squared error and torque over all joints, then those of rest
-        let mut pooled = [0.0; 4];
+        // squared error and torque over all joints, then those of movement and of rest
+        let mut pooled = [0.0; 6];
         let (mut moving, mut resting) = (0, 0);
         for s in &all {
-            for (sum, x) in pooled
-                .iter_mut()
-                .zip([s.error, s.torque, s.rest[0], s.rest[1]])
-            {
+            let parts = [[s.error, s.torque], s.moving, s.rest];
+            for (sum, x) in pooled.iter_mut().zip(parts.as_flattened()) {
                 *sum += x;
             }
             moving += s.rows - s.resting;
             resting += s.resting;
         }
-        let [error, torque, at_rest, torque_at_rest] = pooled;
+        let [error, torque, in_motion, torque_in_motion, at_rest, torque_at_rest] = pooled;
         let part = |error: f64, torque: f64, rows: u64| {
             one_unit
                 .then(|| ratio(error.max(0.0), torque, rows))
@@ -520,7 +528,7 @@ impl<'a> Reconstruction<'a> {
         TorqueErrors {
             overall: Overall {
                 relative_error: one_unit.then(|| (error / torque).sqrt()),
-                relative_error_moving: part(error - at_rest, torque - torque_at_rest, moving),
+                relative_error_moving: part(in_motion, torque_in_motion, moving),
                 relative_error_rest: part(at_rest, torque_at_rest, resting),
                 mean_relative_error: (mean / n as f64).sqrt(),
             },

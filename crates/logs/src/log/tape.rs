@@ -19,10 +19,12 @@ use super::source::{self, OpenFile};
 use super::time::{Instant, Stamped};
 use super::{Block, LogError};
 
-/// Rows of a chunk.
+/// Rows of a chunk, fewer where they are wide.
 const ROWS: usize = 1024;
+/// Numbers of a chunk, but for its last row.
+const NUMBERS: usize = 1 << 15;
 /// Bytes of a log that are kept in memory.
-const IN_MEMORY: usize = 16 << 20;
+const IN_MEMORY: usize = 1 << 20;
 
 /// What is kept of a log while somebody holds its [`super::LogSpec`].
 #[derive(Default)]
@@ -367,7 +369,7 @@ impl Inner {
         let width: usize = widths.iter().sum();
         let mut chunk = Chunk::default();
         let mut row = Block::default();
-        while chunk.stamps.len() < ROWS {
+        while chunk.stamps.len() < ROWS && chunk.values.len() < NUMBERS {
             match self.source.next() {
                 Ok(Some(stamp)) => chunk.stamps.push(stamp),
                 Ok(None) => {
@@ -401,14 +403,14 @@ impl Inner {
             return Ok(());
         }
         let bytes = chunk.bytes();
-        if self.size + bytes <= IN_MEMORY {
+        if self.spilled.is_none() && self.size + bytes > IN_MEMORY {
+            self.spilled = tempfile::tempfile().ok();
+        }
+        // where there is no folder for temporary files, memory has to do
+        let Some(file) = &mut self.spilled else {
             self.size += bytes;
             self.chunks.push(Place::Memory(Arc::new(chunk)));
             return Ok(());
-        }
-        let file = match &mut self.spilled {
-            Some(file) => file,
-            none => none.insert(tempfile::tempfile()?),
         };
         let at = file.seek(SeekFrom::End(0))?;
         file.write_all(&chunk.written())?;

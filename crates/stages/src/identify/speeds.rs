@@ -103,7 +103,8 @@ impl SpeedMeter {
         self.between.resize(n, 0.0);
         for (k, (t, q)) in block.t.iter().zip(block.q.chunks_exact(n)).enumerate() {
             self.rows.take(*t, q);
-            if let Some(v) = block.dq.get(k * n..(k + 1) * n) {
+            let logged = block.dq.get(k * n..(k + 1) * n);
+            if let Some(v) = logged.filter(|v| v.iter().all(|v| v.is_finite())) {
                 self.between
                     .iter_mut()
                     .zip(v)

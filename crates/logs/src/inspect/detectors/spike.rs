@@ -5,8 +5,8 @@
 //! of smooth motion it is small but not nothing: what stands out there as well must also be off the
 //! cubic through the rows four and five away.
 //!
-//! What is usual is told by medians, which half of the rows would have to spoil. A peak of a torque is none where the
-//! speed of its joint changes at the same rows by more than the position's noise: an inertia explains it.
+//! A peak of a torque is none where the speed of its joint changes at the same rows by more than the position's noise:
+//! an inertia explains it.
 
 use super::histogram::Histogram;
 
@@ -23,8 +23,6 @@ const RING: usize = 64;
 const CHANGE: usize = 9;
 /// Spikes that are kept, the highest.
 const MOST: usize = 4096;
-/// A difference may be a spike from so many usual ones on.
-const SUSPECT: f64 = 10.0;
 /// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
 /// smooth motion it does in the next rows too.
 const MOVES: f64 = 6.0;
@@ -144,12 +142,7 @@ impl Spikes {
 
     /// Brings the suspicion up to date with what was seen so far.
     pub(in crate::inspect) fn settle(&mut self) {
-        self.suspect = SUSPECT * self.usual();
-    }
-
-    /// Usual difference of a row from the median about it.
-    pub(in crate::inspect) fn usual(&self) -> f64 {
-        self.differences_seen.quantile_not_zero(0.5)
+        self.suspect = 3.0 * self.differences_seen.quantile(0.99);
     }
 
     /// Change of the joint's speed at a row, less half of those six rows before and after.
