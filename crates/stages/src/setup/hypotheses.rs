@@ -49,8 +49,15 @@ pub(super) fn all(problem: &Problem) -> Vec<Change> {
 
 fn units(problem: &Problem, moving: &[usize]) -> Vec<Change> {
     let mut out = Vec::new();
+    let kind = |j: usize| match problem.channels.drive {
+        Drive::Motors => {
+            let kind = problem.robot.transmission().coordinate_kind(j);
+            kind.unwrap_or(JointKind::Prismatic)
+        }
+        _ => problem.robot.joint_kind(j),
+    };
     let factors = |j: usize| -> &[f64] {
-        match problem.robot.joint_kind(j) {
+        match kind(j) {
             JointKind::Revolute => &ANGLES,
             JointKind::Prismatic => &THOUSANDS,
         }
@@ -66,7 +73,7 @@ fn units(problem: &Problem, moving: &[usize]) -> Vec<Change> {
         out.extend(percent.map(|most| Change::Scale(Torque, vec![j], most / 100.0)));
     }
     let alike: Vec<usize> = (moving.iter().copied())
-        .filter(|j| problem.robot.joint_kind(*j) == problem.robot.joint_kind(moving[0]))
+        .filter(|j| kind(*j) == kind(moving[0]))
         .collect();
     if alike.len() > 1 {
         let same = factors(moving[0]).iter();
@@ -100,6 +107,11 @@ fn gravities(problem: &Problem) -> Vec<Change> {
         dot > 0.99 * FREE_FALL * now.iter().map(|x| x * x).sum::<f64>().sqrt() && dot > 0.0
     };
     axes.filter(|g| !along(g)).map(Change::Gravity).collect()
+}
+
+/// Whether a factor is that of two units.
+pub(super) fn is_unit(factor: f64) -> bool {
+    ANGLES.contains(&factor) || THOUSANDS.contains(&factor)
 }
 
 /// The factors of a list within an interval: gear ratios that are written in the robot file, whole and half numbers,

@@ -283,7 +283,7 @@ impl<'a> Look<'a> {
             let errors = (a.trial.square(&everyone)).total_cmp(&b.trial.square(&everyone));
             broken(a).cmp(&broken(b)).then(errors)
         });
-        let best = *order.first()?;
+        let best = plainer(&order, &everyone)?;
         let after = best.trial.errors();
         let whole = broken(best) < turned.len();
         let (better, before) = match declared {
@@ -314,7 +314,9 @@ impl<'a> Look<'a> {
             let (own, other) = (best.trial.square(seen), j.square(seen));
             other < LIMITS.far * own || gain(j, &best.trial, seen) < LIMITS.sure
         };
-        let others = (order.iter().skip(1)).filter(|j| broken(j) <= broken(best) && near(&j.trial));
+        let is_best = |j: &&&Judged| j.trial.change == best.trial.change;
+        let others = (order.iter().filter(|j| !is_best(j)))
+            .filter(|j| broken(j) <= broken(best) && near(&j.trial));
         let tied: Vec<Change> = others.filter_map(|j| j.trial.change.clone()).collect();
         let change = best.trial.change.clone()?;
         let alike = tied.iter().all(|other| same_line(&change, other));
@@ -357,10 +359,27 @@ impl<'a> Look<'a> {
     }
 }
 
+/// The first reading, or a unit of its channel that the blocks do not tell from it: units are mistaken more often than
+/// ratios next to them.
+fn plainer<'j>(order: &[&'j Judged], joints: &[usize]) -> Option<&'j Judged> {
+    let best = *order.first()?;
+    let unit = |j: &&&Judged| match (&best.trial.change, &j.trial.change) {
+        (Some(Change::Scale(a, of, _)), Some(Change::Scale(b, other, f))) => {
+            let alike = a == b && of == other && hypotheses::is_unit(*f);
+            alike && gain(&j.trial, &best.trial, joints) < LIMITS.sure
+        }
+        _ => false,
+    };
+    Some(order.iter().find(unit).copied().unwrap_or(best))
+}
+
 /// Whether two readings turn the same joint: which of its channels it is, a symmetric machine does not show.
 fn same_line(a: &Change, b: &Change) -> bool {
     match (a, b) {
         (Change::Sign(_, a), Change::Sign(_, b)) => a == b,
+        (Change::Scale(c, a, unit), Change::Scale(d, b, _)) => {
+            c == d && a == b && hypotheses::is_unit(*unit)
+        }
         (Change::Scale(Torque, a, _), Change::Gear(b, _))
         | (Change::Gear(b, _), Change::Scale(Torque, a, _)) => a.as_slice() == [*b],
         _ => false,
