@@ -151,7 +151,7 @@ fn parameters(fit: &Value, published: Option<&Value>) -> Rendered {
     Ok(out)
 }
 
-/// What `diagnose` added, step by step.
+/// What `diagnose` chose, step by step.
 fn steps(diagnosis: &Value) -> Rendered {
     let mut lines = Vec::new();
     for step in rows(&diagnosis["steps"]) {
@@ -180,7 +180,8 @@ fn steps(diagnosis: &Value) -> Rendered {
             text(&step["family"]).to_owned(),
             numbers.join(", "),
             percent(number(&step["cv_gain"])),
-            significant(number(&step["delta_bic"]).round(), 3),
+            text(&step["status"]).to_owned(),
+            significant(number(&step["shrinkage"]), 2),
             percent(number(&step["holdout_before"])),
             percent(number(&step["holdout_after"])),
             if alike.is_empty() {
@@ -193,9 +194,10 @@ fn steps(diagnosis: &Value) -> Rendered {
     let columns = [
         "<effect",
         "<family",
-        "<parameters of the last fit",
-        "cross-validated gain",
-        "BIC",
+        "<parameters of the joint fit",
+        "gain on blocks left out",
+        "<status",
+        "s",
         "unseen before",
         "after",
         "<not separated from",

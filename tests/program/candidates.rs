@@ -374,7 +374,8 @@ fn friction_that_is_held_stays_to_the_last_bit_and_its_deviation_reaches_what_go
             assert_eq!((given.1, given.2), (held.1, held.2), "{}", given.0);
             moved += usize::from(free.1 != given.1);
         } else {
-            assert!(held.2 > 0.99 * sure.2, "{}: {} {}", given.0, held.2, sure.2);
+            // what these data leave alone has none
+            assert!(held.2 >= 0.99 * sure.2, "{}: {} {}", given.0, held.2, sure.2);
         }
     }
     assert!(moved >= 1, "{free:?}");

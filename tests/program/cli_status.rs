@@ -105,6 +105,8 @@ fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() 
         "watch no.csv -m no.toml",
         "diagnose no.csv -m no.toml",
         "compare no.toml no.toml",
+        "payload no.csv -m no.toml",
+        "show no.toml",
         "torque no.csv -m no.toml -o t.csv",
         "simulate -r configs/cft.toml --seconds 1 -o a.csv",
         "identify -o run",

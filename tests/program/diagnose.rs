@@ -77,10 +77,11 @@ fn mean(document: &Value, when: &str, rows: &str) -> f64 {
         .unwrap()
 }
 
+/// Effects of the model that is written.
 fn effects(document: &Value) -> Vec<(&str, Option<&str>)> {
-    let steps = document["steps"].as_array().unwrap();
+    let steps = document["steps"].as_array().unwrap().iter();
     steps
-        .iter()
+        .filter(|s| s["written"] == true)
         .map(|s| (s["effect"].as_str().unwrap(), s["joint"].as_str()))
         .collect()
 }
@@ -93,7 +94,7 @@ fn number(step: &Value, key: &str) -> (f64, f64) {
 
 /// Each part of this log holds about one stroke, in which friction of one direction is a constant.
 #[test]
-fn what_the_parts_of_a_short_log_do_not_agree_on_is_seen_and_the_model_stays_as_it_was() {
+fn what_the_parts_of_a_short_log_do_not_agree_on_is_seen_and_not_in_the_model() {
     let (Some(id), Some(unseen)) = (
         measured("emps/emps_id.csv"),
         measured("emps/emps_pulses_val.csv"),
@@ -115,9 +116,15 @@ fn what_the_parts_of_a_short_log_do_not_agree_on_is_seen_and_the_model_stays_as_
         (&"seen".into(), &false.into())
     );
     assert!(first["cv_gain"].as_f64().unwrap() > 0.5, "{first}");
-    assert_eq!(found["before"], found["after"]);
-    let bytes = |name: &str| std::fs::read(at.join(name)).unwrap();
-    assert_eq!(bytes("declared.toml"), bytes("refined.toml"));
+    let written = effects(&found);
+    assert!(!written.contains(&("asymmetric-friction", Some("q1"))));
+    let refined = std::fs::read_to_string(at.join("refined.toml")).unwrap();
+    assert_eq!(refined.matches("[[effect]]").count(), written.len());
+    let (before, after) = (
+        mean(&found, "before", "holdout"),
+        mean(&found, "after", "holdout"),
+    );
+    assert!(after <= before, "{before} {after}");
     // what is left has its signals, the strongest first, each beyond chance
     let dependence = found["dependence"].as_array().unwrap();
     let share = |told: &Value| told["share"].as_f64().unwrap();
@@ -140,11 +147,9 @@ fn a_simulated_effect_is_found_with_its_numbers_whatever_the_number_of_threads()
         run(at, &arguments)
     };
     let found = diagnose("2");
-    let at = effects(&found)
-        .iter()
-        .position(|e| *e == ("ripple", Some("q1")))
-        .unwrap();
-    let step = &found["steps"][at];
+    assert!(effects(&found).contains(&("ripple", Some("q1"))));
+    let steps = found["steps"].as_array().unwrap();
+    let step = steps.iter().find(|s| s["effect"] == "ripple").unwrap();
     let size = |key: &str| number(step, key).0;
     let amplitude = size("sin").hypot(size("cos"));
     assert!(
@@ -181,9 +186,16 @@ type Torque<'a> = &'a dyn Fn(f64, f64) -> f64;
 /// Writes a log anew with a torque of position and speed added, and noise of 0.5 N.
 fn add_torque(from: &Path, to: &Path, torque: Torque) {
     let mut log = csv::Reader::from_path(from).unwrap();
-    let header = log.headers().unwrap().clone();
-    assert_eq!(header.len(), 3, "{header:?}");
-    let rows: Vec<[f64; 3]> = log.deserialize().map(|row| row.unwrap()).collect();
+    // time, position and torque come first
+    let header: Vec<String> = log
+        .headers()
+        .unwrap()
+        .iter()
+        .take(3)
+        .map(str::to_owned)
+        .collect();
+    let first = |row: csv::StringRecord| std::array::from_fn(|i| row[i].parse().unwrap());
+    let rows: Vec<[f64; 3]> = log.records().map(|row| first(row.unwrap())).collect();
     let noise = rand_distr::Normal::new(0.0, 0.5).unwrap();
     let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(7);
     let mut out = csv::Writer::from_path(to).unwrap();
@@ -400,8 +412,9 @@ fn a_turned_torque_and_a_dead_one_are_faults_of_the_data_and_no_physics() {
         let mut lines = text.lines();
         let mut out = lines.next().unwrap().to_owned() + "\n";
         for line in lines {
-            let (rest, tau) = line.rsplit_once(',').unwrap();
-            out += &format!("{rest},{}\n", torque(tau.parse().unwrap()));
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            cells[2] = torque(cells[2].parse().unwrap()).to_string();
+            out += &(cells.join(",") + "\n");
         }
         out
     };

@@ -38,11 +38,6 @@ const SETS: &[Set] = &[
         &["bldc-cogging/speed_test1.txt@23..29.5s"],
     ),
     set(
-        "configs/bldc.toml",
-        &["bldc-cogging/speed_test1.txt@0.5..10s"],
-        &["bldc-cogging/speed_test1.txt@10..14.5s"],
-    ),
-    set(
         "configs/panda.toml",
         &["panda/panda_exciting.csv@0..70%"],
         &["panda/panda_exciting.csv@70..100%"],
@@ -128,6 +123,28 @@ fn assert_names(found: &Value) {
         };
         assert!(holds, "{step}");
     }
+}
+
+/// The motor turns at few speeds there, of one sign.
+#[test]
+fn a_model_of_which_its_data_identify_nothing_is_refused() {
+    let Some(log) = shared("bldc-cogging/speed_test1.txt") else {
+        return;
+    };
+    let log = format!("{}@0.5..10s", log.display());
+    let folder = tempfile::tempdir().unwrap();
+    let fit = ["lsq", &log, "-r", "configs/bldc.toml", "-o", "model.toml"];
+    run(folder.path(), &fit);
+    let refused = assert_cmd::Command::cargo_bin("cft-ident")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(["diagnose", &log, "-m", "model.toml", "-o", "refined.toml"])
+        .assert()
+        .code(4);
+    let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    let says = "model.toml: none of its parameters is identified";
+    assert!(message.contains(says), "{message}");
+    assert!(!folder.path().join("refined.toml").exists());
 }
 
 #[test]

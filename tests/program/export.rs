@@ -44,21 +44,21 @@ impl Draw {
     }
 }
 
-/// A model with random numbers; double-tanh friction or viscous and Coulomb.
+/// A model with random numbers; friction that takes power at every speed, double-tanh or viscous and Coulomb.
 fn model(robot: Robot, smooth: bool, seed: u64) -> Model {
     let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
     let n = robot.joints();
     let friction = (0..n).map(|_| match smooth {
         true => JointFriction::DoubleTanh(DoubleTanh {
-            viscous: draw.one(5.0),
-            coulomb_1: draw.one(3.0),
-            coulomb_2: draw.one(2.0),
+            viscous: 5.0 + draw.one(5.0),
+            coulomb_1: 3.0 + draw.one(3.0),
+            coulomb_2: 2.0 + draw.one(2.0),
             slope_1: 50.0 + draw.one(20.0),
             slope_2: 5.0 + draw.one(2.0),
         }),
         false => JointFriction::ViscousCoulomb(ViscousCoulomb {
-            viscous: draw.one(5.0),
-            coulomb: draw.one(3.0),
+            viscous: 5.0 + draw.one(5.0),
+            coulomb: 3.0 + draw.one(3.0),
         }),
     });
     let friction = friction.collect();

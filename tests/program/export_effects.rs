@@ -371,13 +371,14 @@ fn measured(config: &str, log: &str, effects: &dyn Fn(&Robot) -> Vec<Added>) -> 
     each.collect()
 }
 
-/// Effects as the diagnosis of the UR10 finds them, and a delay, which the code leaves to the caller.
+/// Effects of the size that the diagnosis of the UR10 finds, with friction that takes power at every speed, and a delay,
+/// which the code leaves to the caller.
 fn of_ur10(robot: &Robot) -> Vec<Added> {
     let of = |name, joint, numbers: &[(&str, f64)]| named(robot, name, Some(joint), numbers);
     vec![
         of("delay", "q3", &[("d", 0.004)]),
-        of("stribeck", "q1", &[("vs", 0.113), ("c", -14.27)]),
-        of("stribeck", "q4", &[("vs", 0.055), ("c", -2.61)]),
+        of("stribeck", "q1", &[("vs", 0.113), ("c", 14.27)]),
+        of("stribeck", "q4", &[("vs", 0.055), ("c", 2.61)]),
         of(
             "load-friction",
             "q2",

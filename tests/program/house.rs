@@ -21,13 +21,17 @@ const ROOMS: &[(&str, &str)] = &[
     ("effect", "math number robot motion"),
     ("export", "number robot config motion effect"),
     ("band", "math number robot config motion effect"),
-    ("observe", "math robot log config motion effect band export"),
+    (
+        "observe",
+        "math robot block log config motion effect band export",
+    ),
     ("open_loop", "math number robot motion effect"),
     ("friction", "math robot block motion verdict"),
     ("inertia", "math robot block motion verdict"),
-    ("diagnose", "math robot block motion effect"),
+    ("judge", ""),
+    ("diagnose", "math robot block motion effect judge"),
     ("validate", "math robot block motion verdict"),
-    ("inspect", "math number log"),
+    ("inspect", "math number block log"),
     ("setup", "math robot motion inertia"),
     ("mapping", "robot log inspect"),
     ("simulate", "math number robot log config effect"),
@@ -36,8 +40,8 @@ const ROOMS: &[(&str, &str)] = &[
     ("track", ""),
     (
         "identify",
-        "math verdict number robot log config motion effect friction inertia diagnose validate \
-         inspect setup compare band observe open_loop track export",
+        "math block verdict number robot log config motion effect friction inertia judge diagnose \
+         validate inspect setup compare band observe open_loop track export",
     ),
     (
         "replay",
@@ -50,7 +54,7 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     (
         "cli",
-        "math verdict number robot log config output motion effect friction inertia diagnose \
+        "math block verdict number robot log config output motion effect friction inertia diagnose \
          validate inspect mapping setup simulate excite compare identify report export band \
          observe open_loop track replay",
     ),

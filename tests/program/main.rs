@@ -35,7 +35,6 @@ mod identify;
 mod inspect_faults;
 mod inspect_shared_data;
 mod interrupted;
-mod log_interrupted;
 #[path = "../../crates/logs/tests/logs/log_support/mod.rs"]
 mod log_support;
 mod log_writing;

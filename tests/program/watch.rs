@@ -215,6 +215,7 @@ fn a_model_without_data_set_aside_says_how_to_get_it_or_takes_an_unloaded_log() 
     let end = text.find("[provenance]").unwrap();
     let without = format!("{}{}", &text[..begin], &text[end..]);
     let without = without.replace("held_out = [\"q1\"]\n", "held_out = []\n");
+    let without = without.replace("links = 1\n", "links = 0\n");
     std::fs::write(path.join("old.toml"), without).unwrap();
     std::fs::write(path.join("log.csv"), csv(&rows(7, 8, &|_, _, _, _| 0.0))).unwrap();
     let (status, out, err) = run(path, &["watch", "log.csv", "-m", "old.toml"], None);

@@ -6,7 +6,7 @@ use super::{Bench, Names, samples};
 use crate::cli::error::CliError;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
-use cft_ident_logs::log::escape;
+use cft_ident_logs::log::{escape, escape_whole};
 use cft_ident_logs::output::JointTrajectory;
 use cft_ident_plant::excite::{ExciteError, Judgement, Motion};
 
@@ -95,8 +95,8 @@ fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
     let file = bench.args.robot.file_name().unwrap_or_default();
     let [first, second] = judged.first_words();
     vec![
-        escape(first),
-        escape(second),
+        escape_whole(first),
+        escape_whole(second),
         match &judged.broken()[..] {
             [] => format!(
                 "Checked: the limits of {}{} along the whole motion{}. {} s at {} Hz, by cft-ident {}.",
@@ -113,7 +113,7 @@ fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
                 number::significant(bench.rate_hz, 4),
                 env!("CARGO_PKG_VERSION")
             ),
-            broken => format!("BREAKS LIMITS: {}.", escape(&broken.join("; "))),
+            broken => format!("BREAKS LIMITS: {}.", escape_whole(&broken.join("; "))),
         },
         "Bring the robot to the first point slowly, and run the motion at a tenth of its speed first."
             .to_owned(),

@@ -4,7 +4,9 @@ use super::Bench;
 use crate::cli::error::CliError;
 use cft_ident_core::number;
 use cft_ident_plant::excite::limits::BoundedQuantity;
-use cft_ident_plant::excite::{GivenInformation, Judgement, LawForeseen, Motion, Terms, judge};
+use cft_ident_plant::excite::{
+    GivenInformation, Judgement, LawForeseen, Motion, MotionTerms, judge,
+};
 
 /// Judges a motion by the limits given.
 pub(super) fn judged(
@@ -14,7 +16,7 @@ pub(super) fn judged(
     given: Option<&GivenInformation>,
     friction: Option<LawForeseen>,
 ) -> Result<Judgement, CliError> {
-    let terms = Terms {
+    let terms = MotionTerms {
         channels,
         given,
         friction,

@@ -18,7 +18,7 @@ use cft_ident_logs::mapping::{
 };
 use cft_ident_plant::excite::space::always_touching;
 use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::table::{Align, Table, hanging};
 use cft_ident_stages::identify::LoggedRobot;
 use text::Draft;
 
@@ -411,7 +411,8 @@ fn inspected(faults: Option<&[LogFault]>) -> String {
             1 => String::new(),
             count => format!(" ({} more of the kind)", count - 1),
         };
-        format!("inspect: {kind}: {channel}{}{more}\n", fault.effect)
+        let text = format!("{kind}: {channel}{}{more}", fault.effect);
+        hanging("inspect: ", &text, 2)
     };
     kinds.iter().map(line).collect()
 }

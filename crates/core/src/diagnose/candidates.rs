@@ -26,7 +26,7 @@ fn close(a: &[f64], b: &[f64]) -> bool {
     pairs.all(|(a, b)| (a - b).abs() < APART * b.abs())
 }
 
-/// Whether an effect is the shape of a joint's declared friction law, which is fitted before all else.
+/// Whether an effect is of a joint's declared friction law: its shape, or what stands beside it.
 pub fn is_friction_law(effect: &Added) -> bool {
     let joint = matches!(effect.place, Place::Joint(_));
     joint && matches!(effect.family(), Family::Velocity | Family::Offset)
@@ -109,7 +109,12 @@ fn known(model: &AugmentedModel, law: &Law, place: Place) -> bool {
 fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> Option<Candidate> {
     let effect = Added::new(law, place, shape, vec![1.0; law.linear.len()]);
     // what hangs on coefficients is a bound of the fit, what hangs on the shape alone a limit of the grid
-    let coefficient = |key: &str| law.linear.contains(&key);
+    let twice = vec![2.0; law.linear.len()];
+    let value = |linear: &[f64], key: &str| {
+        let keys = law.keys(&effect.shape, linear);
+        keys.iter().find(|k| k.key == key).map(|k| k.value)
+    };
+    let coefficient = |key: &str| value(&effect.linear, key) != value(&twice, key);
     let of_coefficients = |number: &Number| match number {
         Number::Key(key) | Number::Size(key) => coefficient(key),
         Number::Amplitude(..) => true,

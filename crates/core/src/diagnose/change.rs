@@ -3,21 +3,21 @@
 use rayon::prelude::*;
 
 use super::outcome::FrictionChange;
+use super::prepared::{PreparedCase, SearchedCase};
 use super::problem::unknowns::Unknown;
-use super::run::{Prepared, Searched};
 use super::watch::UNWATCHED;
-use crate::judge::LeftOut;
+use crate::judge::BlocksLeftOut;
 
 /// Standard errors from which on a change is told: there are as many places as blocks and joints.
 const TOLD: f64 = 3.0;
 
 /// The greatest change of each joint, where it is beyond doubt. It is told as a change, and no law of it is fitted.
-pub fn friction_changes(prepared: &Prepared, searched: &Searched) -> Vec<FrictionChange> {
+pub fn friction_changes(prepared: &PreparedCase, searched: &SearchedCase) -> Vec<FrictionChange> {
     let parts = (&searched.candidates[..], &searched.layout);
     let field = prepared.field(parts, &searched.sums, UNWATCHED);
     let declared = prepared.terms(&searched.layout);
     let terms = declared.with(&field.terms_of(&searched.chosen));
-    let Some(left_out) = LeftOut::new(field.sums, field.judging, &terms) else {
+    let Some(left_out) = BlocksLeftOut::new(field.sums, field.judging, &terms) else {
         return Vec::new();
     };
     let joints = 0..prepared.case.given.model.robot.joints();

@@ -8,7 +8,7 @@ use crate::motion::MotionError;
 
 /// Rows of one use on which models are compared.
 #[derive(Clone, Copy)]
-pub struct HeldOut<'a> {
+pub struct HeldOutRows<'a> {
     pub case: &'a Case,
     pub split: &'a DataSplit,
     pub role: LogRole,
@@ -18,13 +18,13 @@ pub struct HeldOut<'a> {
 
 /// What an effect does to data that it was not fitted to.
 #[derive(Debug, Clone)]
-pub struct Change {
+pub struct EffectChange {
     /// Mean relative error without and with it.
     pub mean: [f64; 2],
     pub joints: Vec<JointChange>,
 }
 
-impl Change {
+impl EffectChange {
     /// The joint that it makes worse by the most, beyond its interval.
     pub fn worst(&self) -> Option<f64> {
         let worse = self.joints.iter().filter(|j| j.worsened);
@@ -38,7 +38,7 @@ impl Change {
     }
 }
 
-impl HeldOut<'_> {
+impl HeldOutRows<'_> {
     fn pieces(&self, model: &AugmentedModel) -> Result<Pieces, MotionError> {
         let case = self.case;
         errors::pieces(
@@ -58,14 +58,17 @@ impl HeldOut<'_> {
     }
 
     /// What the second model changes; none where there are no such rows.
-    pub fn change(&self, models: [&AugmentedModel; 2]) -> Result<Option<Change>, MotionError> {
+    pub fn change(
+        &self,
+        models: [&AugmentedModel; 2],
+    ) -> Result<Option<EffectChange>, MotionError> {
         let [before, after] = [self.pieces(models[0])?, self.pieces(models[1])?];
         let means = [&before, &after].map(errors::mean_relative_error);
         let names = models[0].model.robot.joint_names();
         let [Some(without), Some(with)] = means else {
             return Ok(None);
         };
-        Ok(Some(Change {
+        Ok(Some(EffectChange {
             mean: [without, with],
             joints: errors::changes(names, (&before, &after), self.together),
         }))

@@ -58,7 +58,7 @@ mod tests {
         let found = lag(&[wave]);
         assert!((115..=135).contains(&found), "{found}");
         let noise: Vec<f64> = (0..5000u32)
-            .map(|k| f64::from(k * k * 7919 % 1013) - 506.0)
+            .map(|k| f64::from(k * k % 1013 * 7919 % 1013) - 506.0)
             .collect();
         assert_eq!(lag(&[centred(&noise)]), 1);
     }

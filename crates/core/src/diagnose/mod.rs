@@ -19,6 +19,7 @@
 //! | `steps`, `tables`, `held_out` | the parts' verdict, estimates and predictions, held-out data |
 //! | `change` | friction that changes from a time on |
 //! | `unexplained` | errors, the noise floor, and what is above it |
+//! | `prepared` | the declared model fitted, and the search over the candidates |
 //! | `run` | the loop over all of these |
 
 mod candidates;
@@ -28,6 +29,7 @@ mod held_out;
 mod memory;
 mod orders;
 mod outcome;
+mod prepared;
 mod problem;
 mod run;
 mod search;

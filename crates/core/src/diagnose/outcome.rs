@@ -10,7 +10,7 @@ use super::unexplained::Unexplained;
 use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::{Errors, JointChange};
 use crate::effect::{Added, AugmentedModel, Law, Place};
-use crate::judge::Gain;
+use crate::judge::ErrorGain;
 
 /// How firm an effect is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -43,7 +43,7 @@ pub struct FoundEffect {
     /// Amplitudes of its coefficients by part of the data.
     pub parts: Vec<Vec<f64>>,
     /// Gain on blocks left out, beside the effects before it.
-    pub gain: Gain,
+    pub gain: ErrorGain,
     /// Part of the squared error of these blocks that it takes off.
     pub share: f64,
     /// Effects that these data do not separate from it, best first.

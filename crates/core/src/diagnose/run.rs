@@ -1,31 +1,22 @@
 //! The loop: fit what is declared, one pass over the rows with every candidate, choose, ask the parts, look at held-out
 //! data.
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, NotTried, candidates, is_friction_law};
 use super::change::friction_changes;
 use super::error::DiagnoseError;
-use super::held_out::HeldOut;
-use super::memory::memory_s;
-use super::orders;
-use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors};
+use super::outcome::{Diagnosis, FoundEffect, LeftCandidate};
+use super::prepared::{PreparedCase, SearchedCase, filtered, residuals};
 use super::problem::case::Case;
-use super::problem::data_split::{DataSplit, LogRole, Piece};
-use super::problem::fit::{Declared, Fitted, determines_some, fit};
-use super::problem::pass::{Data, Layout, pass};
-use super::problem::unknowns::{Unknowns, step};
-use super::search::{Chosen, Field, Looked};
+use super::problem::data_split::{DataSplit, LogRole};
+use super::problem::unknowns::Unknowns;
 use super::steps::{Judged, judge};
 use super::unexplained::dependence::{Left, dependences};
-use super::unexplained::errors::{self, Counted, Errors};
 use super::unexplained::{noise, part_unexplained, unexplained};
 use super::watch::Watch;
-use crate::effect::{Added, AugmentedModel, Cover, Search, Torques};
-use crate::judge::{Block, BlockSums, Blocks, LeftOut, Numbers, Terms, compare, divide};
+use crate::effect::{Search, Torques};
+use crate::judge::Numbers;
 use crate::motion::{MotionError, Stretch};
-use crate::robot::model::JointFriction;
 
 /// Diagnoses; `watch` hears of every step and is asked now and then whether to stop.
 ///
@@ -41,7 +32,7 @@ pub fn diagnose(case: &Case, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
         case.cutoff_hz,
     );
     check(case, &split)?;
-    let prepared = Prepared::of(case, &split)?;
+    let prepared = PreparedCase::of(case, &split)?;
     unless_stopped(watch)?;
     let searched = prepared.search(watch)?;
     unless_stopped(watch)?;
@@ -75,236 +66,8 @@ fn check(case: &Case, split: &DataSplit) -> Result<(), DiagnoseError> {
     Ok(())
 }
 
-/// The declared model fitted, and the data divided.
-pub struct Prepared<'a> {
-    pub case: &'a Case,
-    pub split: &'a DataSplit,
-    pub data: Data<'a>,
-    pub declared: Declared<'a>,
-    pub unknowns: Unknowns,
-    pub fitted: Fitted,
-    pub cover: Cover,
-    /// Blocks that are fitted.
-    pub blocks: Blocks,
-    /// These, then those that only judge.
-    pub all_blocks: Vec<Block>,
-    /// Neighbouring pieces of the split that a bootstrap draws together.
-    pub together: usize,
-}
-
-/// What the search came to.
-pub struct Searched {
-    pub candidates: Vec<Candidate>,
-    pub not_tried: Vec<NotTried>,
-    pub layout: Layout,
-    pub sums: BlockSums,
-    pub chosen: Vec<Chosen>,
-    pub looked: Vec<Looked>,
-    /// Squared error of blocks left out by all that was chosen, in the weights of the joints.
-    pub error: f64,
-    /// Whether the declared model explains more of blocks left out than no torque does.
-    pub determined: bool,
-}
-
-impl<'a> Prepared<'a> {
-    fn of(case: &'a Case, split: &'a DataSplit) -> Result<Self, DiagnoseError> {
-        let numbers = &case.numbers;
-        let declared = Declared {
-            open: &case.open,
-            prior: &case.prior,
-            keep: case.keep,
-            ridge: numbers.ridge,
-        };
-        let data = Data {
-            stretches: &case.stretches,
-            filters: &case.filters,
-            split,
-            rest_speed: &case.rest_speed,
-        };
-        let logs = split.logs(&case.stretches, LogRole::Train);
-        let whole = divide(&logs, f64::INFINITY, numbers).list;
-        let fitted = fit(&case.given, declared, (&data, &whole), None)?;
-        let train = case.stretches_of(LogRole::Train);
-        let unknowns = Unknowns::of(&case.given, &case.open, case.keep);
-        let mut cover = Cover::of(&case.given.model.robot, &train, case.cutoff_hz);
-        let raw = residuals(&fitted.model, &train);
-        orders::find(&mut cover, &raw, &train, &case.filters)?;
-        drop(raw);
-        let residual = filtered(&fitted.model, &data)?;
-        let memory = memory_s(&residual, &logs, split);
-        let reach = |s: &Stretch| case.filters.of(s).trim as f64 * s.dt;
-        let reach = case.stretches.iter().map(reach).fold(0.0, f64::max);
-        let least = (numbers.memory_times * memory).max(reach);
-        let blocks = divide(&logs, least, numbers);
-        let judging = divide(&split.logs(&case.stretches, LogRole::Veto), least, numbers);
-        let all_blocks = [blocks.list.as_slice(), &judging.list].concat();
-        let rows = |p: &Piece| p.rows.len() as f64 * split.step_s[p.stretch];
-        let lengths: Vec<f64> = split.pieces.iter().map(rows).collect();
-        let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
-        Ok(Prepared {
-            together: (least / mean).ceil().max(1.0) as usize,
-            case,
-            split,
-            data,
-            declared,
-            unknowns,
-            fitted,
-            cover,
-            blocks,
-            all_blocks,
-        })
-    }
-
-    /// Blocks that only judge.
-    pub fn judging(&self) -> usize {
-        self.all_blocks.len() - self.blocks.list.len()
-    }
-
-    fn sums(
-        &self,
-        candidates: &[Candidate],
-        layout: &Layout,
-        model: &AugmentedModel,
-    ) -> Result<BlockSums, MotionError> {
-        let columns = (&self.unknowns, candidates);
-        pass(model, columns, layout, &self.data, &self.all_blocks)
-    }
-
-    /// What is searched, by sums of products.
-    pub fn field<'b>(
-        &'b self,
-        (candidates, layout): (&'b [Candidate], &'b Layout),
-        sums: &'b BlockSums,
-        watch: Watch<'b>,
-    ) -> Field<'b> {
-        Field {
-            candidates,
-            terms: &layout.candidates,
-            sums,
-            judging: self.judging(),
-            numbers: &self.case.numbers,
-            watch,
-        }
-    }
-
-    /// The declared terms about the fitted model.
-    pub fn terms(&self, layout: &Layout) -> Terms {
-        let mut terms = (self.declared).terms(&self.unknowns, layout, &self.fitted.model);
-        terms.weights.clone_from(&self.fitted.weights);
-        terms
-    }
-
-    /// The friction law of every joint first, as the shape of what is declared; then all the rest.
-    fn search(&self, watch: Watch) -> Result<Searched, DiagnoseError> {
-        let (candidates, not_tried) = candidates(&self.fitted.model, self.case, &self.cover);
-        let layout = Layout::of(&self.unknowns, &candidates);
-        let mut model = self.fitted.model.clone();
-        let mut sums = self.sums(&candidates, &layout, &model)?;
-        let declared = self.terms(&layout);
-        let nothing = DiagnoseError::NothingDetermined {
-            unknowns: self.unknowns.len(),
-        };
-        if !determines_some(&sums, &declared) && !self.case.keep {
-            return Err(nothing);
-        }
-        let numbers = &self.case.numbers;
-        let parts = (&candidates[..], &layout);
-        let Some(alone) = LeftOut::new(&sums, self.judging(), &declared) else {
-            return Err(nothing);
-        };
-        let errors = alone.errors();
-        let determined = compare(&torque_squares(&sums, &layout), &errors, &declared.weights)
-            .is_beyond(numbers.screen, None);
-        let mut chosen = Vec::new();
-        let joints = self.case.given.model.robot.joints();
-        let looked = match self.blocks.parts >= numbers.parts {
-            false => Some(Vec::new()),
-            true => self.field(parts, &sums, watch).search(
-                &declared,
-                &mut chosen,
-                (&is_friction_law, joints),
-            ),
-        };
-        if looked.is_none() {
-            return Err(nothing);
-        }
-        // what goes by a joint's direction goes by its friction law
-        let smooth = chosen.iter().map(|c| &candidates[c.candidate].0);
-        let smooth: Vec<_> = smooth
-            .filter(|e| e.law.direction.is_some())
-            .cloned()
-            .collect();
-        if !smooth.is_empty() {
-            model.effects.extend(smooth);
-            sums = self.sums(&candidates, &layout, &model)?;
-        }
-        let others = |effect: &Added| !is_friction_law(effect);
-        let looked = match self.blocks.parts >= numbers.parts {
-            false => Some(Vec::new()),
-            true => self.field(parts, &sums, watch).search(
-                &declared,
-                &mut chosen,
-                (&others, numbers.effects),
-            ),
-        };
-        let looked = looked.ok_or(nothing)?;
-        let error = errors.iter().flat_map(|e| e.iter().zip(&declared.weights));
-        Ok(Searched {
-            error: error.map(|(e, w)| e * w).sum(),
-            determined,
-            candidates,
-            not_tried,
-            layout,
-            sums,
-            chosen,
-            looked,
-        })
-    }
-
-    /// The declared model fitted anew beside effects that are held.
-    pub fn refit(&self, start: &AugmentedModel) -> Result<AugmentedModel, MotionError> {
-        let data = (&self.data, self.blocks.list.as_slice());
-        Ok(fit(start, self.declared, data, Some(&self.fitted.weights))?.model)
-    }
-
-    pub fn held_out(&self, role: LogRole) -> HeldOut<'_> {
-        HeldOut {
-            case: self.case,
-            split: self.split,
-            role,
-            together: self.together,
-        }
-    }
-
-    fn split_errors(&self, model: &AugmentedModel) -> Result<SplitErrors, DiagnoseError> {
-        let train = self.held_out(LogRole::Train).errors(model)?;
-        let holdout = self.held_out(LogRole::Holdout).errors(model)?;
-        Ok(SplitErrors {
-            train: train.ok_or(DiagnoseError::TooFewRows {
-                rows: 0,
-                unknowns: self.unknowns.len(),
-            })?,
-            holdout,
-        })
-    }
-
-    fn moving(&self, model: &AugmentedModel, role: LogRole) -> Result<Option<Errors>, MotionError> {
-        let case = self.case;
-        let counted = match case.given.model.friction.iter().any(JointFriction::jumps) {
-            true => Counted::Moving,
-            false => Counted::All,
-        };
-        let pieces = errors::pieces(
-            model,
-            &case.stretches,
-            (&case.filters, &case.rest_speed),
-            self.split,
-            (role, counted),
-        )?;
-        Ok(errors::summed(model, &case.units, (&pieces, self.together)))
-    }
-
-    fn evaluate(self, searched: Searched, judged: Judged) -> Result<Diagnosis, DiagnoseError> {
+impl PreparedCase<'_> {
+    fn evaluate(self, searched: SearchedCase, judged: Judged) -> Result<Diagnosis, DiagnoseError> {
         let case = self.case;
         let before = self.split_errors(&case.given)?;
         let refitted = self.split_errors(&self.fitted.model)?.train;
@@ -371,16 +134,6 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Squared torque of every block, `[block][joint]`.
-fn torque_squares(sums: &BlockSums, layout: &Layout) -> Vec<Vec<f64>> {
-    let of_block = |joints: &Vec<DMatrix<f64>>| {
-        let each = joints.iter().enumerate();
-        let square = |(j, s): (usize, &DMatrix<f64>)| s[(layout.torque(j), layout.torque(j))];
-        each.map(square).collect()
-    };
-    sums.blocks.iter().map(of_block).collect()
-}
-
 /// Root mean square of each joint's residual over the fitted rows.
 fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
     let joints = residual.first().map_or(0, Vec::len);
@@ -394,24 +147,8 @@ fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
     (0..joints).map(of_joint).collect()
 }
 
-/// Raw residuals along stretches, `[stretch][joint][sample]`.
-fn residuals(model: &AugmentedModel, stretches: &[Stretch]) -> Vec<Vec<Vec<f64>>> {
-    let of = |s: &Stretch| model.residual(s, &model.torques(s));
-    stretches.par_iter().map(of).collect()
-}
-
-/// Filtered residuals along all stretches, `[stretch][joint][row]`.
-fn filtered(model: &AugmentedModel, data: &Data) -> Result<Vec<Vec<Vec<f64>>>, MotionError> {
-    let of = |stretch: &Stretch| {
-        let raw = model.residual(stretch, &model.torques(stretch));
-        let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
-        data.filters.of(stretch).run(&channels)
-    };
-    data.stretches.par_iter().map(of).collect()
-}
-
 /// The best shape of every law and place that was not chosen, with why.
-fn left_candidates(searched: &Searched, numbers: &Numbers) -> Vec<LeftCandidate> {
+fn left_candidates(searched: &SearchedCase, numbers: &Numbers) -> Vec<LeftCandidate> {
     let mut out: Vec<LeftCandidate> = Vec::new();
     let effect = |i: usize| &searched.candidates[i].0;
     let chosen: Vec<_> = searched
@@ -461,15 +198,4 @@ fn left_candidates(searched: &Searched, numbers: &Numbers) -> Vec<LeftCandidate>
         reason: n.lacking.clone(),
     }));
     out
-}
-
-/// A model about the fitted one, its unknowns moved.
-pub fn moved(
-    fitted: &AugmentedModel,
-    unknowns: &Unknowns,
-    values: &DVector<f64>,
-) -> AugmentedModel {
-    let mut model = fitted.clone();
-    step(&mut model, unknowns, &values.as_slice()[..unknowns.len()]);
-    model
 }

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, exclude};
+use super::candidates::{Candidate, exclude, is_friction_law};
 use super::watch::Watch;
 use crate::effect::{Added, Place};
-use crate::judge::{BlockSums, Gain, LeftOut, Numbers, Term, Terms};
+use crate::judge::{BlockSums, BlocksLeftOut, ErrorGain, Numbers, Term, Terms};
 
 /// What is searched.
 #[derive(Clone, Copy)]
@@ -26,7 +26,7 @@ pub struct Chosen {
     /// Its index.
     pub candidate: usize,
     /// Gain beside those before it.
-    pub gain: Gain,
+    pub gain: ErrorGain,
     /// Squared error before it, in the weights of the joints.
     pub error: f64,
     /// Candidates of another name that gain as much, best first.
@@ -37,28 +37,22 @@ pub struct Chosen {
 #[derive(Debug, Clone)]
 pub struct Looked {
     pub candidate: usize,
-    pub gain: Gain,
+    pub gain: ErrorGain,
 }
 
 /// Most alternatives that are told.
 const ALTERNATIVES: usize = 3;
 
 impl Field<'_> {
-    /// Adds to `chosen` what gains among the candidates that are `wanted`, at most `most` of them, and returns what the
-    /// others would gain in the end. None where these data determine nothing.
-    pub fn search(
-        &self,
-        declared: &Terms,
-        chosen: &mut Vec<Chosen>,
-        (wanted, most): (&(dyn Fn(&Added) -> bool + Sync), usize),
-    ) -> Option<Vec<Looked>> {
-        let until = chosen.len() + most;
+    /// Chooses what gains, the greatest first: at most a friction law for each joint, and `effects` besides. Returns also
+    /// what the others would gain in the end. None where these data determine nothing.
+    pub fn search(&self, declared: &Terms) -> Option<(Vec<Chosen>, Vec<Looked>)> {
+        let mut chosen = Vec::new();
         loop {
-            let terms = declared.with(&self.terms_of(chosen));
-            let left_out = LeftOut::new(self.sums, self.judging, &terms)?;
-            let taken: Vec<&Added> = self.taken(chosen);
+            let terms = declared.with(&self.terms_of(&chosen));
+            let left_out = BlocksLeftOut::new(self.sums, self.judging, &terms)?;
+            let taken: Vec<&Added> = self.taken(&chosen);
             let open: Vec<usize> = (0..self.candidates.len())
-                .filter(|i| wanted(&self.candidates[*i].0))
                 .filter(|i| !taken.iter().any(|t| exclude(t, &self.candidates[*i].0)))
                 .collect();
             let part = self.watch.part("candidates", open.len());
@@ -71,12 +65,17 @@ impl Field<'_> {
                 })
                 .collect();
             drop(part);
-            let next = match chosen.len() < until && !(self.watch.stop)() {
-                true => self.best(&looked),
-                false => None,
+            let laws = taken.iter().filter(|e| is_friction_law(e)).count();
+            let room = |effect: &Added| match is_friction_law(effect) {
+                true => laws < declared.weights.len(),
+                false => taken.len() - laws < self.numbers.effects,
+            };
+            let next = match (self.watch.stop)() {
+                true => None,
+                false => self.best(&looked, &room),
             };
             let Some(mut next) = next else {
-                return Some(looked);
+                return Some((chosen, looked));
             };
             let errors = left_out.errors();
             let weighted = errors.iter().map(|e| e.iter().zip(&terms.weights));
@@ -97,10 +96,11 @@ impl Field<'_> {
     }
 
     /// The greatest admissible gain, or what says the same with fewer numbers.
-    fn best(&self, looked: &[Looked]) -> Option<Chosen> {
+    fn best(&self, looked: &[Looked], room: &dyn Fn(&Added) -> bool) -> Option<Chosen> {
         let effect = |l: &Looked| &self.candidates[l.candidate].0;
         let admissible: Vec<&Looked> = looked
             .iter()
+            .filter(|l| room(effect(l)))
             .filter(|l| {
                 l.gain
                     .is_beyond(self.numbers.screen, own_joint(effect(l).place))

@@ -3,11 +3,11 @@
 use nalgebra::DMatrix;
 
 use super::error::DiagnoseError;
-use super::held_out::Change;
+use super::held_out::EffectChange;
 use super::outcome::{FoundEffect, StepStatus};
+use super::prepared::{PreparedCase, SearchedCase, moved};
 use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, value};
-use super::run::{Prepared, Searched, moved};
 use super::search::{Chosen, Field};
 use super::tables::{self, Estimates, Verified};
 use super::watch::UNWATCHED;
@@ -31,7 +31,7 @@ struct Way {
     accepted: bool,
     /// Amplitude in the predicting model; none where it is not in it.
     amplitude: Option<Vec<f64>>,
-    change: Option<Change>,
+    change: Option<EffectChange>,
     vetoed: bool,
 }
 
@@ -39,7 +39,7 @@ struct Way {
 ///
 /// # Errors
 /// [`DiagnoseError`].
-pub fn judge(prepared: &Prepared, searched: &Searched) -> Result<Judged, DiagnoseError> {
+pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
     let declared = prepared.terms(&searched.layout);
     let parts = (&searched.candidates[..], &searched.layout);
     let field = prepared.field(parts, &searched.sums, UNWATCHED);
@@ -61,7 +61,7 @@ pub fn judge(prepared: &Prepared, searched: &Searched) -> Result<Judged, Diagnos
 }
 
 struct Judging<'a> {
-    prepared: &'a Prepared<'a>,
+    prepared: &'a PreparedCase<'a>,
     field: Field<'a>,
     declared: Terms,
 }
@@ -72,7 +72,7 @@ impl Judging<'_> {
     }
 
     /// The effects that were chosen, and those that the user wants.
-    fn ways(&self, searched: &Searched) -> Result<Vec<Way>, DiagnoseError> {
+    fn ways(&self, searched: &SearchedCase) -> Result<Vec<Way>, DiagnoseError> {
         let case = self.prepared.case;
         let mut chosen = searched.chosen.clone();
         let robot = &case.given.model.robot;
@@ -191,7 +191,7 @@ impl Judging<'_> {
                 let change = |role| self.prepared.held_out(role).change([&without, &with]);
                 found.push((*i, change(LogRole::Holdout)?, change(vetoing)?));
             }
-            let worst = |c: &Option<Change>| c.as_ref().and_then(Change::worst);
+            let worst = |c: &Option<EffectChange>| c.as_ref().and_then(EffectChange::worst);
             let mut worse: Vec<(usize, f64)> = Vec::new();
             for (i, holdout, veto) in found {
                 if let Some(by) = worst(&veto).filter(|_| given && !ways[i].accepted) {
@@ -267,7 +267,7 @@ impl Judging<'_> {
         let size = effect.parameters();
         let others = chosen.alternatives.iter();
         let held_out = self.prepared.case.roles.contains(&LogRole::Holdout);
-        let confirms = way.change.as_ref().is_some_and(Change::confirms);
+        let confirms = way.change.as_ref().is_some_and(EffectChange::confirms);
         let status = match agreement.s {
             s if s > self.numbers().confirmed && (confirms || !held_out) && !way.vetoed => {
                 StepStatus::Confirmed

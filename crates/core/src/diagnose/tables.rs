@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::problem::unknowns::{Unknowns, step};
-use super::search::{Chosen, Field};
+use super::search::{Chosen, Field, own_joint};
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{Agreement, Blocks, LeftOut, Terms, agreement};
+use crate::judge::{Agreement, Blocks, BlocksLeftOut, Terms, agreement};
 
 /// An effect that was chosen, with what its parts say.
 #[derive(Debug, Clone)]
@@ -35,7 +35,8 @@ fn places(field: &Field, declared: usize, effects: &[Chosen]) -> Vec<Vec<usize>>
     effects.iter().map(place).collect()
 }
 
-/// Asks the parts of the data for every effect that was chosen.
+/// Asks the parts of the data for every effect that was chosen; one that gains nothing beside all the others is not
+/// confirmed.
 pub fn verified(
     field: &Field,
     declared: &Terms,
@@ -46,12 +47,30 @@ pub fn verified(
     let fitted = field.sums.blocks.len() - field.judging;
     let values = terms.fit(&field.sums.over(0..fitted), &[]).values;
     let places = places(field, declared.len(), chosen);
-    let of = |(chosen, own): (&Chosen, Vec<usize>)| Verified {
-        agreement: agreement(field.sums, blocks, &terms, (&own, &values), field.numbers),
-        amplitude: own.iter().map(|i| values[*i]).collect(),
-        chosen: chosen.clone(),
+    let of = |(at, own): (usize, Vec<usize>)| {
+        let mut agreement = agreement(field.sums, blocks, &terms, (&own, &values), field.numbers);
+        if !is_needed(field, declared, chosen, at) {
+            agreement.s = 0.0;
+        }
+        Verified {
+            agreement,
+            amplitude: own.iter().map(|i| values[*i]).collect(),
+            chosen: chosen[at].clone(),
+        }
     };
-    chosen.iter().zip(places).map(of).collect()
+    places.into_iter().enumerate().map(of).collect()
+}
+
+/// Whether an effect passes the screen beside all the others, those that came after it too.
+fn is_needed(field: &Field, declared: &Terms, chosen: &[Chosen], at: usize) -> bool {
+    let mut others = chosen.to_vec();
+    let own = others.remove(at).candidate;
+    let terms = declared.with(&field.terms_of(&others));
+    let place = field.candidates[own].0.place;
+    BlocksLeftOut::new(field.sums, field.judging, &terms).is_some_and(|left_out| {
+        let gain = left_out.gain(&field.terms[own]);
+        gain.is_beyond(field.numbers.screen, own_joint(place))
+    })
 }
 
 impl Estimates {
@@ -60,7 +79,7 @@ impl Estimates {
         let terms = declared.with(&field.terms_of(effects));
         let fitted = field.sums.blocks.len() - field.judging;
         let values = terms.fit(&field.sums.over(0..fitted), &[]).values;
-        let left_out = LeftOut::new(field.sums, field.judging, &terms)?;
+        let left_out = BlocksLeftOut::new(field.sums, field.judging, &terms)?;
         let without: Vec<&DVector<f64>> = left_out.values().collect();
         let count = without.len() as f64;
         let zero = DVector::zeros(terms.len());

@@ -19,7 +19,7 @@ pub struct LogRows {
 
 /// Neighbouring rows of one log.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Block {
+pub struct TimeBlock {
     pub log: usize,
     /// Stretches and their rows.
     pub pieces: Vec<(usize, Range<usize>)>,
@@ -30,7 +30,7 @@ pub struct Block {
 /// All blocks, in order of time.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Blocks {
-    pub list: Vec<Block>,
+    pub list: Vec<TimeBlock>,
     pub parts: usize,
     /// Least length of a block \[s\].
     pub least_s: f64,
@@ -85,7 +85,7 @@ pub fn divide(logs: &[LogRows], least_s: f64, numbers: &Numbers) -> Blocks {
         let (rows, count) = (log.rows(), parts as usize * within);
         for k in 0..count {
             let at = |k: usize| k * rows / count;
-            blocks.list.push(Block {
+            blocks.list.push(TimeBlock {
                 log: log.log,
                 pieces: log.cut(at(k), at(k + 1)),
                 part: blocks.parts + k / within,
@@ -116,7 +116,7 @@ mod tests {
         let blocks = divide(&logs, 0.5, &NUMBERS);
         assert_eq!(blocks.parts, 12);
         assert_eq!(blocks.list.len(), 24);
-        let rows = |b: &Block| b.pieces.iter().map(|p| p.1.len()).sum::<usize>();
+        let rows = |b: &TimeBlock| b.pieces.iter().map(|p| p.1.len()).sum::<usize>();
         assert_eq!(blocks.list.iter().map(rows).sum::<usize>(), 9000);
         assert!(blocks.list.iter().all(|b| rows(b) == 375), "{blocks:?}");
     }

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::bounded;
-use super::sums::{BlockSums, Bound, Term, Terms};
+use super::bounded::{self, Bound};
+use super::sums::{BlockSums, Term, Terms};
 
 /// What a hypothesis takes off the squared errors of blocks that were left out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gain {
+pub struct ErrorGain {
     /// Sum over joints and blocks, each joint in its weight.
     pub value: f64,
     /// Its standard error.
@@ -21,23 +21,23 @@ pub struct Gain {
 }
 
 /// Gain of the second hypothesis over the first: errors `[block][joint]` of blocks that neither was fitted to.
-pub fn compare(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64]) -> Gain {
+pub fn compare(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64]) -> ErrorGain {
     let of_block = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
         let pairs = a.iter().zip(b).zip(weights);
         pairs.map(|((a, b), w)| w * (a - b)).collect()
     };
     let gains: Vec<Vec<f64>> = before.iter().zip(after).map(of_block).collect();
-    Gain::of(&gains)
+    ErrorGain::of(&gains)
 }
 
-impl Gain {
+impl ErrorGain {
     /// Of weighted gains `[block][joint]`.
     pub(super) fn of(gains: &[Vec<f64>]) -> Self {
         let blocks: Vec<f64> = gains.iter().map(|g| g.iter().sum()).collect();
         let joints = gains.first().map_or(0, Vec::len);
         let of_joint = |j: usize| sum_and_error(gains.iter().map(|g| g[j]));
         let [value, se] = sum_and_error(blocks.iter().copied());
-        Gain {
+        ErrorGain {
             value,
             se,
             joints: (0..joints).map(of_joint).collect(),
@@ -52,7 +52,7 @@ impl Gain {
     }
 
     /// Whether it is that of another within so many standard errors of their difference.
-    pub fn is_near(&self, other: &Gain, errors: f64) -> bool {
+    pub fn is_near(&self, other: &ErrorGain, errors: f64) -> bool {
         let pairs = self.blocks.iter().zip(&other.blocks);
         let [value, se] = sum_and_error(pairs.map(|(a, b)| a - b));
         value.abs() <= errors * se
@@ -79,7 +79,7 @@ struct Without {
 }
 
 /// Fits of terms with each block left out.
-pub struct LeftOut<'a> {
+pub struct BlocksLeftOut<'a> {
     pub terms: &'a Terms,
     sums: &'a BlockSums,
     /// Of all fitted blocks, by joint.
@@ -88,7 +88,7 @@ pub struct LeftOut<'a> {
     without: Vec<Without>,
 }
 
-impl<'a> LeftOut<'a> {
+impl<'a> BlocksLeftOut<'a> {
     /// Of all blocks; the last `judging` of them are never fitted. None where these data determine nothing.
     pub fn new(sums: &'a BlockSums, judging: usize, terms: &'a Terms) -> Option<Self> {
         let fitted = sums.blocks.len() - judging;
@@ -117,7 +117,7 @@ impl<'a> LeftOut<'a> {
                 pull,
             });
         }
-        Some(LeftOut {
+        Some(BlocksLeftOut {
             terms,
             sums,
             total,
@@ -141,12 +141,12 @@ impl<'a> LeftOut<'a> {
     }
 
     /// Gain of more terms beside those in use, all refitted without each block.
-    pub fn gain(&self, more: &[Term]) -> Gain {
+    pub fn gain(&self, more: &[Term]) -> ErrorGain {
         self.gain_of(more, Beside::of(self, more, &self.total), &|_| true)
     }
 
     /// The same of terms that are there in some blocks alone.
-    pub fn gain_within(&self, more: &[Term], there: Range<usize>) -> Gain {
+    pub fn gain_within(&self, more: &[Term], there: Range<usize>) -> ErrorGain {
         self.gain_of(more, self.within(more, &there), &|b| there.contains(&b))
     }
 
@@ -154,7 +154,7 @@ impl<'a> LeftOut<'a> {
         Beside::of(self, more, &self.sums.over(there.clone()))
     }
 
-    fn gain_of(&self, more: &[Term], all: Beside, there: &dyn Fn(usize) -> bool) -> Gain {
+    fn gain_of(&self, more: &[Term], all: Beside, there: &dyn Fn(usize) -> bool) -> ErrorGain {
         let joints = self.total.len();
         let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
         let diagonal: Vec<f64> = all.own.diagonal().iter().copied().collect();
@@ -180,7 +180,7 @@ impl<'a> LeftOut<'a> {
             };
             gains.push((0..joints).map(gain).collect());
         }
-        Gain::of(&gains)
+        ErrorGain::of(&gains)
     }
 
     /// Change of a joint's squared error in a block.
@@ -257,7 +257,7 @@ struct Beside {
 }
 
 impl Beside {
-    fn of(used: &LeftOut, more: &[Term], sums: &[DMatrix<f64>]) -> Self {
+    fn of(used: &BlocksLeftOut, more: &[Term], sums: &[DMatrix<f64>]) -> Self {
         let (u, k) = (used.terms.len(), more.len());
         let mut out = Beside {
             with: DMatrix::zeros(u, k),

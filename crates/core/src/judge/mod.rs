@@ -13,6 +13,7 @@
 //! | file | does |
 //! |---|---|
 //! | `blocks` | divides logs into blocks and parts |
+//! | `bounded` | least squares with bounds, from normal equations |
 //! | `sums` | sums of products per block and joint, and the fit of all terms |
 //! | `left_out` | errors of each block by the fit of the others, for the terms in use and for more |
 //! | `parts` | agreement of an amplitude between parts |
@@ -25,10 +26,11 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
-pub use blocks::{Block, Blocks, LogRows, divide};
-pub use left_out::{Gain, LeftOut, compare};
+pub use blocks::{Blocks, LogRows, TimeBlock, divide};
+pub use bounded::Bound;
+pub use left_out::{BlocksLeftOut, ErrorGain, compare};
 pub use parts::{Agreement, agreement};
-pub use sums::{BlockSums, Bound, Fit, Term, Terms};
+pub use sums::{BlockSums, Term, TermFit, Terms};
 
 /// The numbers that decide.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +41,9 @@ pub struct Numbers {
     /// Least number of parts that must ask for one amplitude. Half: one log cut in parts agrees with itself and a
     /// fifth of the joints gets worse; twice: logs of a minute confirm nothing.
     pub parts: usize,
+    /// Least number of them in which the effect shows, for a joint rests now and then; fewer than `parts` must agree the
+    /// better. Half: strokes of one direction pass for proof; all: one rest in a log, and nothing is confirmed.
+    pub speaking: usize,
     /// s = max(0, 1 - doubt / z). Half: noise along a motion is written; twice: a sixth of the gain is lost.
     pub doubt: f64,
     /// Blocks that each part is cut into for the screen. One: its standard error rests on 12 values; four: blocks as
@@ -63,6 +68,7 @@ pub struct Numbers {
 pub const NUMBERS: Numbers = Numbers {
     screen: 2.0,
     parts: 12,
+    speaking: 8,
     doubt: 4.0,
     blocks_per_part: 2,
     memory_times: 5.0,

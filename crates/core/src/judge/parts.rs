@@ -81,11 +81,14 @@ pub fn agreement(
         true => size * (p - 1.0) / (p * scatter),
         false => 0.0,
     };
-    let enough = count >= numbers.parts;
+    // F at the same chance grows about as P falls: z as its square
+    let fewer = (numbers.parts as f64 / p).max(1.0);
+    let doubt = numbers.doubt * fewer * fewer;
+    let enough = count >= numbers.speaking;
     Agreement {
         z,
         s: if enough {
-            (1.0 - numbers.doubt / z).max(0.0)
+            (1.0 - doubt / z).max(0.0)
         } else {
             0.0
         },

@@ -2,32 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::bounded;
-
-/// Values that a term may have.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bound {
-    pub least: f64,
-    pub most: f64,
-}
-
-impl Bound {
-    /// Any value.
-    pub const NONE: Bound = Bound {
-        least: f64::NEG_INFINITY,
-        most: f64::INFINITY,
-    };
-
-    /// How far a value is beyond.
-    pub(super) fn excess(self, x: f64) -> f64 {
-        (self.least - x).max(x - self.most).max(0.0)
-    }
-
-    /// The nearest value that it may have.
-    pub fn nearest(self, x: f64) -> f64 {
-        x.max(self.least).min(self.most)
-    }
-}
+use super::bounded::{self, Bound};
 
 /// An unknown, with its column in the rows of each joint that it acts on.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,7 +76,7 @@ pub struct Terms {
 
 /// A fit of all terms.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub struct TermFit {
     pub values: DVector<f64>,
     /// Squared residual of each joint.
     pub squares: Vec<f64>,
@@ -156,7 +131,7 @@ impl Terms {
     }
 
     /// Fits all terms to joints' sums, some of them held.
-    pub fn fit(&self, sums: &[DMatrix<f64>], held: &[(usize, f64)]) -> Fit {
+    pub fn fit(&self, sums: &[DMatrix<f64>], held: &[(usize, f64)]) -> TermFit {
         let (mut normal, mut right) = self.normal(sums);
         let diagonal: Vec<f64> = normal.diagonal().iter().copied().collect();
         self.firm(&mut normal, &mut right, &diagonal);
@@ -168,7 +143,7 @@ impl Terms {
             };
         }
         let values = bounded::solve(&normal, &right, &bounds);
-        Fit {
+        TermFit {
             squares: self.squares(sums, &values),
             values,
         }

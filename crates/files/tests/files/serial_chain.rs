@@ -12,7 +12,7 @@ fn serial(file: &str) -> Robot {
 
 /// The file's text with one part replaced, and the error that this gives.
 fn refused(file: &str, old: &str, new: &str) -> String {
-    let text = std::fs::read_to_string(file).unwrap();
+    let text = std::fs::read_to_string(format!("{}/{file}", cft_ident_support::ROOT)).unwrap();
     assert!(text.contains(old), "{old}");
     let error = RobotFile::parse("robot.toml", &text.replacen(old, new, 1));
     error.expect_err("a file that is wrong").to_string()

@@ -97,12 +97,6 @@ fn what_cannot_be_read_is_told_with_line_and_remedy() {
         ),
         (
             arm(
-                "<link name=\"c\"/>\n<joint name=\"j 3\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/></joint>",
-            ),
-            "r.urdf:7: `joint j 3` is no name for a joint",
-        ),
-        (
-            arm(
                 "<link name=\"c\"/>\n<joint name=\"j3\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/><axis xyz=\"0 0 0\"/></joint>",
             ),
             "r.urdf:7: `joint j3` has an axis without length",
@@ -242,9 +236,10 @@ fn a_file_that_is_huge_or_no_text_is_refused() {
     let got = UrdfChain::load(&huge, None).unwrap_err().to_string();
     assert!(got.contains("more than 16 MB"), "{got}");
     let binary = folder.path().join("binary.urdf");
+    // the mark of UTF-16 and half a letter
     std::fs::write(&binary, [0xff, 0xfe, 0x00]).unwrap();
     let got = UrdfChain::load(&binary, None).unwrap_err().to_string();
-    assert!(got.contains("no UTF-8 text"), "{got}");
+    assert!(got.contains("no element at all"), "{got}");
 }
 
 #[test]

@@ -260,7 +260,7 @@ const SLIDING: [&str; 14] = [
 
 /// What makes a torque, as words name it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Drive {
+pub enum NamedDrive {
     /// A force or torque by name.
     Torque,
     Current,
@@ -270,21 +270,21 @@ pub enum Drive {
 }
 
 /// What words call a torque channel. `current` before a torque is an adjective, behind it a noun.
-pub fn drive(words: &[Word]) -> Drive {
+pub fn drive(words: &[Word]) -> NamedDrive {
     let last = |known: &[&str]| words.iter().rposition(|word| known.contains(&&*word.text));
     let (torque, current) = (last(&TORQUES), last(&CURRENTS));
     match (torque, current) {
         (torque, Some(current)) if torque.is_none_or(|torque| torque < current) => {
             match VOLTAGES.contains(&&*words[current].text) {
-                true => Drive::Voltage,
-                false => Drive::Current,
+                true => NamedDrive::Voltage,
+                false => NamedDrive::Current,
             }
         }
-        (Some(_), _) => Drive::Torque,
+        (Some(_), _) => NamedDrive::Torque,
         _ => match words.first().map(|word| &*word.text) {
-            Some("i") => Drive::Current,
-            Some("u") => Drive::Voltage,
-            _ => Drive::Unsaid,
+            Some("i") => NamedDrive::Current,
+            Some("u") => NamedDrive::Voltage,
+            _ => NamedDrive::Unsaid,
         },
     }
 }
@@ -473,15 +473,15 @@ mod tests {
     #[test]
     fn a_word_for_torque_is_no_current_and_letters_of_axes_are_no_units() {
         for (name, found) in [
-            ("Torque_A1", Drive::Torque),
-            ("A1_torque", Drive::Torque),
-            ("Ist-Moment A1", Drive::Torque),
-            ("actual_current_torque_1", Drive::Torque),
-            ("torque_current_1", Drive::Current),
-            ("MACur.A1", Drive::Current),
-            ("I_1", Drive::Current),
-            ("motor_voltage_2", Drive::Voltage),
-            ("force_kN", Drive::Torque),
+            ("Torque_A1", NamedDrive::Torque),
+            ("A1_torque", NamedDrive::Torque),
+            ("Ist-Moment A1", NamedDrive::Torque),
+            ("actual_current_torque_1", NamedDrive::Torque),
+            ("torque_current_1", NamedDrive::Current),
+            ("MACur.A1", NamedDrive::Current),
+            ("I_1", NamedDrive::Current),
+            ("motor_voltage_2", NamedDrive::Voltage),
+            ("force_kN", NamedDrive::Torque),
         ] {
             assert_eq!(drive(&words(name)), found, "{name}");
         }

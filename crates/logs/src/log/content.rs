@@ -4,7 +4,8 @@ use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::source::{Checksum, OpenFile};
+use super::held_files::OpenFile;
+use super::source::Checksum;
 use super::stream::{Stream, Watch};
 use super::{LogError, source};
 

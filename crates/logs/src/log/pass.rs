@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::columns::{choose, time_of, unit_of};
-use super::content::{Content, RawBytes};
+use super::columns::{time_of, unit_of};
+use super::content::Content;
 use super::layout::Layout;
-use super::recording::{JoinedTopics, JointStates, MessageRows, format_of, has_none, of_topics};
+use super::open::open;
 use super::rows::{LogRows, Strictness};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
@@ -329,66 +329,4 @@ fn round_within(x: f64, within: f64) -> f64 {
     });
     let mut near = shorter.filter(|short| (short - x).abs() <= within);
     near.next().unwrap_or(x)
-}
-
-/// A log that was opened.
-pub(super) struct Opened {
-    pub(super) rows: Box<dyn LogRows>,
-    /// The layout that it turns out to have.
-    pub(super) layout: Layout,
-    /// What keeps a strict reader from it.
-    pub(super) refused: Option<LogError>,
-    /// The bytes of a text log.
-    pub(super) bytes: Option<RawBytes>,
-}
-
-pub(super) fn open(
-    files: &[PathBuf],
-    layout: &Layout,
-    strictness: Strictness,
-) -> Result<Opened, LogError> {
-    if let [path] = files {
-        let content = Content::open(path)?;
-        if format_of(content.head()).is_none() {
-            let bytes = content.raw.clone();
-            let (rows, layout, refused) = TextRows::open(path, content, layout, strictness)?;
-            return Ok(Opened {
-                rows: Box::new(rows),
-                layout,
-                refused,
-                bytes,
-            });
-        }
-    }
-    let recorded = |rows, layout, refused| Opened {
-        rows,
-        layout,
-        refused,
-        bytes: None,
-    };
-    let mut refused = None;
-    // Without a robot there are no channels to look for.
-    if of_topics(layout) {
-        let rows = JoinedTopics::of_robot(files, layout)?;
-        return Ok(recorded(Box::new(rows), layout.clone(), None));
-    }
-    if !layout.joints.is_empty() {
-        match (MessageRows::open(files, layout), strictness) {
-            (Ok((rows, layout)), _) => return Ok(recorded(Box::new(rows), layout, None)),
-            (Err(error), Strictness::Refuse) => return Err(error),
-            (Err(error), Strictness::Record) => refused = Some(error),
-        }
-    }
-    match JointStates::open(files, layout.section.topic.as_deref()) {
-        Ok(states) => {
-            let layout = choose(states.names(), layout);
-            Ok(recorded(Box::new(states), layout, refused))
-        }
-        // any other messages are read by the paths of their numbers
-        Err(error) if has_none(&error) && layout.joints.is_empty() => {
-            let rows = JoinedTopics::of_all(files, layout.section.topic.as_deref())?;
-            Ok(recorded(Box::new(rows), layout.clone(), None))
-        }
-        Err(error) => Err(refused.unwrap_or(error)),
-    }
 }

@@ -1,17 +1,15 @@
 //! Files as they lie on the disk: opened with errors that help, and known again by their checksum.
 
-use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::LogError;
+use super::held_files::{OpenFile, opened};
 use super::names::{escape, escape_whole, list, nearest, quoted};
-use super::tape;
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -132,49 +130,15 @@ pub(super) fn shown_all(paths: &[PathBuf]) -> String {
     }
 }
 
-/// A file that is being read. A regular one is opened once, by whoever reads it first, and read from a
-/// place of one's own.
-pub(super) struct OpenFile {
-    file: Arc<File>,
-    at: Option<u64>,
-}
-
-impl OpenFile {
-    pub(super) fn new(file: Arc<File>, regular: bool) -> Self {
-        Self {
-            file,
-            at: regular.then_some(0),
-        }
-    }
-
-    pub(super) fn metadata(&self) -> io::Result<Metadata> {
-        self.file.metadata()
-    }
-}
-
-impl Read for OpenFile {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let Some(at) = &mut self.at else {
-            return (&*self.file).read(buffer);
-        };
-        #[cfg(unix)]
-        let count = std::os::unix::fs::FileExt::read_at(&*self.file, buffer, *at)?;
-        #[cfg(windows)]
-        let count = std::os::windows::fs::FileExt::seek_read(&*self.file, buffer, *at)?;
-        *at += count as u64;
-        Ok(count)
-    }
-}
-
 /// Opens a file for reading.
 pub(super) fn open(path: &Path) -> Result<OpenFile, LogError> {
-    tape::opened(path).map_err(|error| failed(path, error))
+    opened(path).map_err(|error| failed(path, error))
 }
 
 /// Whether a file begins with these bytes; one that cannot be read does not.
 pub fn begins_with(path: &Path, bytes: &[u8]) -> bool {
     let mut first = vec![0; bytes.len()];
-    let read = tape::opened(path).and_then(|mut file| file.read_exact(&mut first));
+    let read = opened(path).and_then(|mut file| file.read_exact(&mut first));
     read.is_ok() && first == bytes
 }
 

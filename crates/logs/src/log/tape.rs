@@ -7,15 +7,16 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::time::SystemTime;
 
 use super::columns::position_of;
 use super::content::RawBytes;
+use super::held_files::{HeldFiles, lock};
 use super::layout::Layout;
-use super::pass::{Opened, open};
+use super::open::{Opened, open};
 use super::rows::{LogRows, Strictness};
-use super::source::{self, OpenFile};
+use super::source;
 use super::time::{Instant, Stamped};
 use super::{Block, LogError};
 
@@ -27,10 +28,10 @@ const NUMBERS: usize = 1 << 15;
 const IN_MEMORY: usize = 1 << 20;
 
 /// What is kept of a log while somebody holds its [`super::LogSpec`].
-#[derive(Default)]
 pub(super) struct Kept {
     path: PathBuf,
-    files: Mutex<Vec<(PathBuf, Arc<File>)>>,
+    /// Held, so that its files stay open.
+    _files: Arc<HeldFiles>,
     tapes: Mutex<Vec<(Layout, Arc<Tape>)>>,
 }
 
@@ -43,39 +44,6 @@ impl fmt::Debug for Kept {
 /// What is kept of logs that somebody holds now.
 static HELD: Mutex<Vec<Weak<Kept>>> = Mutex::new(Vec::new());
 
-/// Files of one log that are kept open.
-const OPEN: usize = 16;
-
-/// A file, opened anew unless it is one of a log that somebody holds.
-///
-/// # Errors
-/// What the system says; a folder.
-pub(super) fn opened(path: &Path) -> io::Result<OpenFile> {
-    let held: Vec<Arc<Kept>> = lock(&HELD).iter().filter_map(Weak::upgrade).collect();
-    let kept = held.iter().find(|kept| kept.has(path));
-    let mut files = kept.map(|kept| lock(&kept.files));
-    let now = path.metadata()?;
-    let same = |file: &File| {
-        let then = file.metadata()?;
-        Ok::<bool, io::Error>(then.len() == now.len() && then.modified()? == now.modified()?)
-    };
-    if let Some(files) = &mut files {
-        files.retain(|(of, file)| of != path || same(file).unwrap_or(false));
-        if let Some((_, file)) = files.iter().find(|(of, _)| of == path) {
-            return Ok(OpenFile::new(Arc::clone(file), true));
-        }
-    }
-    if now.is_dir() {
-        return Err(io::ErrorKind::IsADirectory.into());
-    }
-    let file = Arc::new(File::open(path)?);
-    let regular = now.is_file();
-    if let Some(files) = files.as_mut().filter(|files| regular && files.len() < OPEN) {
-        files.push((path.to_owned(), Arc::clone(&file)));
-    }
-    Ok(OpenFile::new(file, regular))
-}
-
 impl Kept {
     /// What is kept of the log of this path: all who hold it share its rows, whatever their spans.
     pub(super) fn of(path: &Path) -> Arc<Self> {
@@ -87,18 +55,11 @@ impl Kept {
         }
         let kept = Arc::new(Self {
             path: path.to_owned(),
-            ..Self::default()
+            _files: HeldFiles::of(path),
+            tapes: Mutex::default(),
         });
         held.push(Arc::downgrade(&kept));
         kept
-    }
-
-    /// Whether a file is one of the log: itself, in its folder, or one of those that `+` joins.
-    fn has(&self, path: &Path) -> bool {
-        let joined = || self.path.to_str().zip(path.to_str());
-        self.path == path
-            || path.parent() == Some(&self.path)
-            || joined().is_some_and(|(all, one)| all.split('+').any(|part| part == one))
     }
 
     /// The tape of these files by this layout, its conversion aside; what the log turned out to be.
@@ -125,10 +86,6 @@ fn states(files: &[PathBuf]) -> States {
         Some((about.len(), about.modified().ok()?))
     };
     files.iter().map(state).collect()
-}
-
-fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Some consecutive rows.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::column::LogColumn;
-use crate::inspect::words::{Drive, drive, words};
+use crate::inspect::words::{NamedDrive, drive, words};
 use crate::log::escape;
 use cft_ident_core::robot::JointKind;
 
@@ -182,15 +182,15 @@ pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<
         stated_torque(column),
         drive(&words(&column.name)),
     ) {
-        (Some("A"), Drive::Unsaid | Drive::Current)
-        | (None, Drive::Current) => driving("A"),
+        (Some("A"), NamedDrive::Unsaid | NamedDrive::Current)
+        | (None, NamedDrive::Current) => driving("A"),
         (Some("mA"), _) => Unit {
             scale: Some(1e-3),
             check: Some("currents in mA, which the scale makes A: give torque constant times gear ratio times 0.001 for Nm".to_owned()),
             ..driving("A")
         },
         (Some("A"), _) => driving("A"),
-        (Some("V"), _) | (None, Drive::Voltage) => driving("V"),
+        (Some("V"), _) | (None, NamedDrive::Voltage) => driving("V"),
         (Some("%"), _) => rated("percent of a rated torque", "100"),
         (Some("Nm" | "N"), _) => Unit::default(),
         (Some(unit), _) => Unit {

@@ -178,7 +178,7 @@ impl Judgements {
 
 /// How a motion is to be judged.
 #[derive(Debug, Clone)]
-pub struct Terms<'a> {
+pub struct MotionTerms<'a> {
     /// Limits that are looked at.
     pub channels: &'a [BoundedQuantity],
     /// What is used together with the motion.
@@ -203,7 +203,7 @@ pub struct Terms<'a> {
 pub fn judge(
     machine: &ForeseenRobot,
     motion: &Motion,
-    terms: Terms,
+    terms: MotionTerms,
 ) -> Result<Judgement, ExciteError> {
     let uses = motion.usage(machine, terms.channels);
     let first = motion.at(0.0);

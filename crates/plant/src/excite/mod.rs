@@ -39,7 +39,7 @@ pub use criterion::Criterion;
 pub use foreseen::TorqueSource;
 pub use from_files::{machine, series_of, trajectory};
 pub use given::GivenInformation;
-pub use judgement::{Judgement, Judgements, LawForeseen, Terms, judge};
+pub use judgement::{Judgement, Judgements, LawForeseen, MotionTerms, judge};
 pub use motion::Motion;
 pub use objective::{NoValue, PriorInformation};
 pub use start::usual_torque;

@@ -470,7 +470,12 @@ impl LogLayout {
 /// The parts of a layout that read joint channels, and motor channels.
 fn parts(layout: &Layout) -> (Option<&Layout>, Option<&Layout>) {
     match layout.channels {
-        DeclaredChannels::Joint => (Some(layout), layout.otherwise.as_deref()),
+        // another naming of the joints' channels is no part of its own
+        DeclaredChannels::Joint => {
+            let other = layout.otherwise.as_deref();
+            let raw = other.filter(|other| other.channels == DeclaredChannels::Actuator);
+            (Some(layout), raw)
+        }
         DeclaredChannels::Actuator => (None, Some(layout)),
     }
 }

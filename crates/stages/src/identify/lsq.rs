@@ -158,12 +158,12 @@ pub fn lsq(
     }
     let reduced: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
     if let Some(part) = reduced.first()
-        && !matches!(estimator, EstimatorKind::Ols | EstimatorKind::Wls)
+        && estimator != EstimatorKind::Wls
     {
         return Err(ReducedError::NeedsLog {
             log: part.name().to_owned(),
             what: format!("what the estimator {} reads", estimator.name()),
-            remedy: "give the log itself, or take `--estimator wls` or `ols`",
+            remedy: "a reduced log holds rows as `--estimator wls` weighs them: take that, or give the log itself",
         }
         .into());
     }

@@ -2,7 +2,7 @@
 //! what the torques of the logs say?
 
 use crate::setup::{
-    Channels, Drive, Known, Problem, Sample, Searched, SetupReport, Thinner, search,
+    Channels, Drive, KnownBeforehand, Problem, Sample, Searched, SetupReport, Thinner, search,
 };
 use cft_ident_core::motion;
 use cft_ident_core::robot::Robot;
@@ -74,7 +74,7 @@ pub fn check_setup(
 }
 
 /// What the robot file knows beside its channels.
-fn known(machine: &LoggedRobot) -> Known {
+fn known(machine: &LoggedRobot) -> KnownBeforehand {
     let file = &machine.file;
     let links = file.robot.link.iter();
     let bodies: Vec<Option<[f64; 10]>> = links
@@ -89,7 +89,7 @@ fn known(machine: &LoggedRobot) -> Known {
     let gears = file.log.gears.iter().flatten().copied();
     let written = names.iter().flat_map(scales).flatten().chain(gears);
     let either = |x: f64| [x.abs(), x.abs().recip()];
-    Known {
+    KnownBeforehand {
         torque: (names.iter())
             .map(|name| file.limits.of.get(name).and_then(|limits| limits.torque))
             .collect(),

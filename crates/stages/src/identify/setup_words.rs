@@ -4,7 +4,7 @@ use super::logged_robot::LoggedRobot;
 use super::setup_file::{Declared, edits};
 use crate::setup::{
     Alternative, Change, ChannelKind, Correction, Drive, Factor, Finding, FindingKind,
-    FindingSeverity, Found, FrictionPower, JointErrors, LIMITS, Problem, Searched, Setting,
+    FindingSeverity, Found, FrictionPower, LIMITS, Problem, Searched, Setting, SetupErrors,
     SetupReport, Weight,
 };
 use cft_ident_core::number;
@@ -117,11 +117,11 @@ impl Words<'_> {
     }
 
     /// Errors of each joint that moves, rounded to what thinned rows resolve.
-    fn errors(&self, [before, after]: &[Vec<f64>; 2]) -> Vec<JointErrors> {
+    fn errors(&self, [before, after]: &[Vec<f64>; 2]) -> Vec<SetupErrors> {
         let pairs = self.joints.iter().zip(before.iter().zip(after));
         pairs
             .filter(|(_, (_, after))| **after > 0.0)
-            .map(|(joint, (before, after))| JointErrors {
+            .map(|(joint, (before, after))| SetupErrors {
                 joint: joint.clone(),
                 before: before.is_finite().then_some(*before),
                 // what no block bears out is no rise

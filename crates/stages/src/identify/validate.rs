@@ -142,7 +142,7 @@ pub fn validate(
     if let Some(other) = places.refused(&machine) {
         return Err(other);
     }
-    if let Some(error) = beyond.impossible(&machine, logs) {
+    if let Some(error) = beyond.impossible(found.judged(), &machine, logs) {
         return Err(error);
     }
     if let Some(text) = not_a_validation(found.judged()) {
@@ -241,10 +241,19 @@ impl Beyond {
         }
     }
 
-    /// The joint whose torque the model makes impossibly large.
-    fn impossible(&self, machine: &LoggedRobot, logs: &[Log]) -> Option<IdentifyError> {
+    /// The joint whose torque the model makes impossibly large: after the filter too, for a single row is noise of the
+    /// acceleration.
+    fn impossible(
+        &self,
+        errors: &TorqueErrors,
+        machine: &LoggedRobot,
+        logs: &[Log],
+    ) -> Option<IdentifyError> {
         let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
-        let mut off = pairs.filter(|(_, (m, r))| **m > 0.0 && r.0 > IMPOSSIBLE * **m);
+        let filtered = |j: usize| errors.joints.get(j).map_or(f64::NAN, |e| e.max_abs);
+        let mut off = pairs.filter(|(j, (m, r))| {
+            **m > 0.0 && r.0.min(filtered(*j)) > IMPOSSIBLE * **m && !filtered(*j).is_nan()
+        });
         let (j, (measured, (torque, t))) = off.next()?;
         let names: Vec<String> = logs.iter().map(Log::name).collect();
         Some(IdentifyError::Impossible {

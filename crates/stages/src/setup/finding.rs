@@ -101,7 +101,7 @@ pub struct Alternative {
 
 /// Errors of a joint on held-out data: fractions of its torque.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct JointErrors {
+pub struct SetupErrors {
     pub joint: String,
     /// As the set-up is declared; null where its positions belong to no pose.
     pub before: Option<f64>,
@@ -131,7 +131,7 @@ pub struct Finding {
     /// Whether the evidence is overwhelming: a fit refuses the log then.
     pub sure: bool,
     /// Errors of every joint that moves, before and after; none is larger after.
-    pub joints: Vec<JointErrors>,
+    pub joints: Vec<SetupErrors>,
     /// Other readings that fit as well.
     pub tied_with: Vec<Alternative>,
     /// What is wrong, as a sentence.

@@ -39,18 +39,18 @@ pub use channels::{Channels, Drive};
 pub use correction::{Change, Correction};
 pub use factor::Factor;
 pub use finding::{
-    Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, JointErrors,
-    Setting, SetupReport,
+    Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, Setting,
+    SetupErrors, SetupReport,
 };
 pub use physics::Driven;
-pub use problem::{Known, Problem};
+pub use problem::{KnownBeforehand, Problem};
 pub use sample::{MOST_ROWS, Sample, Thinner};
 pub use search::{Found, Searched, search};
 pub use weight::Weight;
 
 /// The numbers that decide.
 #[derive(Debug, Clone, Copy)]
-pub struct Limits {
+pub struct SetupLimits {
     /// A set-up is absurd where a joint's error is above this share of its torque. Half: machines of much friction are
     /// refused; twice: only turned signs are.
     pub unexplained: f64,
@@ -79,7 +79,7 @@ pub struct Limits {
 }
 
 /// The numbers of the check.
-pub const LIMITS: Limits = Limits {
+pub const LIMITS: SetupLimits = SetupLimits {
     unexplained: 0.5,
     sound: 0.35,
     doubtful: 0.2,

@@ -13,7 +13,7 @@ const STILL: [f64; 2] = [0.01, 0.003];
 
 /// What the robot file knows beside its channels.
 #[derive(Debug, Clone, Default)]
-pub struct Known {
+pub struct KnownBeforehand {
     /// Largest torque of each joint \[N or N m\].
     pub torque: Vec<Option<f64>>,
     /// Gear ratios and factors that stand in the file.
@@ -31,7 +31,7 @@ pub struct Problem<'a> {
     /// Friction terms of each joint.
     pub columns: &'a RegressorColumns,
     pub sample: Sample,
-    pub known: Known,
+    pub known: KnownBeforehand,
     /// Joints that move, and whose torques are not all zero.
     moving: Vec<bool>,
 }
@@ -51,7 +51,7 @@ impl<'a> Problem<'a> {
         in_gravity: Option<&'a (dyn Fn([f64; 3]) -> Option<Robot> + Sync)>,
         (channels, columns): (Channels, &'a RegressorColumns),
         sample: Sample,
-        known: Known,
+        known: KnownBeforehand,
     ) -> Self {
         let mut out = Self {
             robot,

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::pass::{Data, Layout, pass};
+use super::pass::{ColumnLayout, Data, pass};
 use super::prior::ParameterPrior;
 use super::unknowns::{FreeParameters, Unknowns, step};
 use crate::effect::AugmentedModel;
-use crate::judge::{Block, BlockSums, Terms};
+use crate::judge::{BlockSums, Terms, TimeBlock};
 use crate::motion::MotionError;
 
 /// What is open and known of a declared model.
@@ -42,11 +42,11 @@ const REWEIGHTED: usize = 3;
 pub fn fit(
     start: &AugmentedModel,
     declared: Declared,
-    (data, blocks): (&Data, &[Block]),
+    (data, blocks): (&Data, &[TimeBlock]),
     weights: Option<&[f64]>,
 ) -> Result<Fitted, MotionError> {
     let unknowns = Unknowns::of(start, declared.open, declared.keep);
-    let layout = Layout::of(&unknowns, &[]);
+    let layout = ColumnLayout::of(&unknowns, &[]);
     let mut model = start.clone();
     let mut found: Option<Fitted> = None;
     for _ in 0..PASSES {
@@ -91,7 +91,12 @@ fn weights_of(squares: &[f64], rows: &[f64]) -> Vec<f64> {
 
 impl Declared<'_> {
     /// The terms of the declared unknowns about a model, with no weights yet.
-    pub fn terms(&self, unknowns: &Unknowns, layout: &Layout, model: &AugmentedModel) -> Terms {
+    pub fn terms(
+        &self,
+        unknowns: &Unknowns,
+        layout: &ColumnLayout,
+        model: &AugmentedModel,
+    ) -> Terms {
         Terms {
             list: layout.declared.clone(),
             weights: vec![0.0; layout.columns.len()],

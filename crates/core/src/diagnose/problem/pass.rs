@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::data_split::DataSplit;
 use super::unknowns::{Unknown, Unknowns};
 use crate::effect::{Added, AugmentedModel, Scene, Torques, shifted};
-use crate::judge::{Block, BlockSums, Bound, Term};
+use crate::judge::{BlockSums, Bound, Term, TimeBlock};
 use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::model::JointFriction;
 
@@ -36,7 +36,7 @@ pub struct Data<'a> {
 }
 
 /// Where the columns of unknowns and candidates stand in the rows of each joint.
-pub struct Layout {
+pub struct ColumnLayout {
     /// Terms of the declared unknowns.
     pub declared: Vec<Term>,
     /// Terms of each candidate, as many as it has coefficients.
@@ -45,7 +45,7 @@ pub struct Layout {
     pub columns: Vec<usize>,
 }
 
-impl Layout {
+impl ColumnLayout {
     /// Of unknowns and candidates with bounds of their coefficients.
     pub fn of(unknowns: &Unknowns, candidates: &[(Added, Vec<Bound>)]) -> Self {
         let joints = unknowns.columns.len();
@@ -72,7 +72,7 @@ impl Layout {
         });
         let candidates = candidates.collect();
         columns.iter_mut().for_each(|c| *c += 1);
-        Layout {
+        ColumnLayout {
             declared,
             candidates,
             columns,
@@ -92,9 +92,9 @@ impl Layout {
 pub fn pass(
     model: &AugmentedModel,
     (unknowns, candidates): (&Unknowns, &[(Added, Vec<Bound>)]),
-    layout: &Layout,
+    layout: &ColumnLayout,
     data: &Data,
-    blocks: &[Block],
+    blocks: &[TimeBlock],
 ) -> Result<BlockSums, MotionError> {
     let mut sums = BlockSums::zeros(blocks.len(), &layout.columns);
     let pieces = blocks.iter().flat_map(|b| &b.pieces);
@@ -117,7 +117,7 @@ pub fn pass(
 }
 
 /// Windows over the rows that blocks need.
-fn windows(data: &Data, blocks: &[Block]) -> Vec<(usize, Range<usize>)> {
+fn windows(data: &Data, blocks: &[TimeBlock]) -> Vec<(usize, Range<usize>)> {
     let mut out = Vec::new();
     for (index, stretch) in data.stretches.iter().enumerate() {
         let pieces = blocks.iter().flat_map(|b| &b.pieces);
@@ -136,7 +136,7 @@ fn windows(data: &Data, blocks: &[Block]) -> Vec<(usize, Range<usize>)> {
 /// Adds the rows of a window to the blocks that they lie in.
 fn fold(
     sums: &mut BlockSums,
-    blocks: &[Block],
+    blocks: &[TimeBlock],
     (stretch, window): (usize, &Range<usize>),
     (rows, every): (&[DMatrix<f64>], usize),
 ) {
@@ -215,7 +215,7 @@ impl<'a> Window<'a> {
         &self,
         unknowns: &Unknowns,
         candidates: &[(Added, Vec<Bound>)],
-        layout: &Layout,
+        layout: &ColumnLayout,
     ) -> Result<Vec<DMatrix<f64>>, MotionError> {
         let n = self.model.model.robot.joints();
         let mut regressor = regressor(self.model, unknowns, &self.part);

@@ -20,6 +20,7 @@
 pub(super) mod beside;
 pub mod capsules;
 mod collada;
+mod link;
 pub mod mesh;
 mod parts;
 mod possible;

@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use super::link::{Body, Link};
 use super::possible;
-use super::shapes::{Shape, of_link};
+use super::shapes::of_link;
 use super::xml::{EXPAND, Element, MACRO};
 use super::{Angles, Place};
 use crate::config::ConfigError;
@@ -12,27 +13,8 @@ use crate::config::angles::Changes;
 use crate::config::document::is_plain_name;
 use crate::config::robot_file::CoordinateLimits;
 use cft_ident_core::number::is_usable;
-use cft_ident_core::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
+use cft_ident_core::robot::tree::space::{Vector, of_roll_pitch_yaw};
 use cft_ident_logs::log::{escape, list, nearest};
-
-/// A mass with its centre and inertia, in the frame of the link that carries it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Body {
-    /// \[kg\]
-    pub mass: f64,
-    /// \[m\]
-    pub centre: Vector,
-    /// About the centre, along the link's axes [kg m^2].
-    pub inertia: Rotation,
-}
-
-#[derive(Debug)]
-pub(super) struct Link {
-    pub name: String,
-    pub line: usize,
-    pub body: Option<Body>,
-    pub shapes: Vec<Option<Shape>>,
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {

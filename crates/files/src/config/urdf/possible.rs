@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::parts::{Body, Link};
+use super::link::{Body, Link};
 use cft_ident_core::robot::tree::space::Rotation;
 use cft_ident_logs::log::list;
 

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::parts::{Body, Joint, Kind, Parts};
+use super::link::Body;
+use super::parts::{Joint, Kind, Parts};
 use super::{Collision, Place, UrdfChain, turned};
 use crate::config::ConfigError;
 use crate::config::document::is_plain_name;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use csv::ByteRecord;
 
-use super::{head, number};
+use super::{head, line, number};
 use crate::log::content::{Bytes, Content};
 use crate::log::layout::Layout;
 use crate::log::rows::Strictness;
@@ -86,7 +86,7 @@ impl TextFile {
     ) -> Result<Self, LogError> {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
-        let wanted = head::Wanted {
+        let wanted = line::Wanted {
             delimiter: layout.section.delimiter,
             header_line: layout.section.header_line,
             by_number: layout.by_number(),
@@ -122,7 +122,7 @@ impl TextFile {
             watch,
         };
         if let Some((names, _)) = found.header_in_comment {
-            let parts = head::split(&names, found.delimiter, found.spaces);
+            let parts = line::split(&names, found.delimiter, found.spaces);
             rows.header = parts.into_iter().map(str::to_owned).collect();
             rows.add_units(&found.units);
             return Ok(rows);

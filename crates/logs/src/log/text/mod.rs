@@ -3,6 +3,7 @@
 mod csv;
 mod head;
 mod json_lines;
+mod line;
 mod number;
 mod table;
 

@@ -1,6 +1,6 @@
 //! Where the table begins in a text: after a preamble, with a row of units, or right away.
 
-use super::head::{Line, Wanted, delimiter_of, split};
+use super::line::{Line, Wanted, delimiter_of, split};
 use super::number;
 use crate::log::columns;
 use crate::log::time::Instant;
@@ -84,7 +84,12 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
                 row == from && fields.iter().all(|field| is_datum(field))
             };
             let fits = |row: &usize| headless(*row) || table(*row).is_some();
-            let row = (from..rows.len()).find(fits).unwrap_or(from);
+            // a name in quotes that goes on in the next line: its lines are no rows
+            let goes_on = |row: usize| lines[rows[row]].text.matches('"').count() % 2 == 1;
+            let row = match rows.get(from).is_some() && goes_on(from) {
+                true => from,
+                false => (from..rows.len()).find(fits).unwrap_or(from),
+            };
             let row = row.min(rows.len().saturating_sub(1));
             (row, table(row).unwrap_or_else(|| plain(row)))
         }

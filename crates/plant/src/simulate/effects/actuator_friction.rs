@@ -4,10 +4,10 @@
 //! the joints q4 and q5 feel J_4 f and J_5 f: their friction depends on the pose and couples them.
 
 use super::{Built, Effect, PlantLaw, PlantState, Site};
+use crate::simulate::SimulateError;
 use cft_ident_core::effect::Place;
 use cft_ident_core::effect::actuator_friction::ENTRY;
 use cft_ident_core::robot::cft::pantograph::reference_jacobian;
-use crate::simulate::SimulateError;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

@@ -6,8 +6,8 @@
 //! with the coefficients m_1..m_6 on three equal pieces between `from` and `to`, constant beyond them.
 
 use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
-use cft_ident_core::effect::counterbalance::ENTRY;
 use crate::simulate::SimulateError;
+use cft_ident_core::effect::counterbalance::ENTRY;
 
 /// Coefficients of the spline.
 const COUNT: usize = 6;

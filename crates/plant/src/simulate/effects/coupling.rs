@@ -4,8 +4,8 @@
 //! symmetric, and the plant solves it by elimination.
 
 use super::{Built, Effect, PlantLaw, PlantState, sign};
-use cft_ident_core::effect::coupling::ENTRY;
 use crate::simulate::SimulateError;
+use cft_ident_core::effect::coupling::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

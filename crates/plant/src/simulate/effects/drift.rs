@@ -7,8 +7,8 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use super::{Beginning, Built, Effect, PlantLaw, PlantState};
-use cft_ident_core::effect::drift::ENTRY;
 use crate::simulate::chance::{Purpose, stream_of};
+use cft_ident_core::effect::drift::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

@@ -8,8 +8,8 @@
 //! motor's side. Both sides are integrated.
 
 use super::{Beginning, Built, Effect, PlantLaw, PlantState, Site, Twist};
-use cft_ident_core::effect::elasticity::ENTRY;
 use crate::simulate::SimulateError;
+use cft_ident_core::effect::elasticity::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

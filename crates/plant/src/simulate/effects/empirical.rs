@@ -8,8 +8,8 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::{Beginning, Built, Effect, PlantLaw, PlantRobot, PlantState, Site, sign};
-use cft_ident_core::effect::empirical::ENTRY;
 use crate::simulate::SimulateError;
+use cft_ident_core::effect::empirical::ENTRY;
 
 const KNOTS: usize = 6;
 /// Way back that makes a reversal, over that between the ends of the curve.

@@ -11,12 +11,12 @@ use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
 use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
+use crate::simulate::SimulateError;
 use cft_ident_core::effect::gravity_tilt::ENTRY;
 use cft_ident_core::robot::cft::dynamics::Coefficients;
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_core::robot::tree::Tree;
 use cft_ident_core::robot::{JointKind, Robot};
-use crate::simulate::SimulateError;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

@@ -5,8 +5,8 @@
 //! torque in closed form, without iteration ([`super::Effect::load`]).
 
 use super::{Built, Effect, PlantLaw, PlantState};
-use cft_ident_core::effect::load_friction::ENTRY;
 use crate::simulate::SimulateError;
+use cft_ident_core::effect::load_friction::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

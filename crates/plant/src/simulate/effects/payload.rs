@@ -10,11 +10,11 @@ use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
 use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
+use crate::simulate::SimulateError;
 use cft_ident_core::effect::payload::ENTRY;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::geometry::{D, GRAVITY, L4, L5, L6, L8, U};
 use cft_ident_core::robot::tree::Tree;
-use crate::simulate::SimulateError;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

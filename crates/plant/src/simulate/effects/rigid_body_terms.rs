@@ -3,9 +3,9 @@
 //! M, C and G are linear in the parameters, so the ten alone make the inertia and the torque that are added.
 
 use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
+use crate::simulate::SimulateError;
 use cft_ident_core::effect::rigid_body_terms::ENTRY;
 use cft_ident_core::robot::cft::dynamics::{Coefficients, inertia_and_bias};
-use crate::simulate::SimulateError;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

@@ -4,8 +4,8 @@
 //! joint that turns (order 1/rev) and k = 2 pi order per metre of one that slides (order 1/m).
 
 use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
-use cft_ident_core::effect::ripple::ENTRY;
 use crate::simulate::SimulateError;
+use cft_ident_core::effect::ripple::ENTRY;
 
 const HARMONICS: usize = 3;
 

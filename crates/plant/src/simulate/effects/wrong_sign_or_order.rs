@@ -4,8 +4,8 @@
 //! places with this one's.
 
 use super::{Built, Fault, LoggedChannels, PlantLaw};
-use cft_ident_core::effect::wrong_sign_or_order::ENTRY;
 use crate::simulate::SimulateError;
+use cft_ident_core::effect::wrong_sign_or_order::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,

@@ -21,7 +21,10 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let (text, good) = words(judged);
     for told in judged.first_words() {
         report.terminal().paragraph(told);
-        report.brief().verdict(told, false);
+        // numbers of the robot file are a caution, and no verdict
+        if judged.torques_first || told == judged.not_checked {
+            report.brief().verdict(told, false);
+        }
     }
     if judged.torques_first {
         report.page().paragraph(&judged.torques);

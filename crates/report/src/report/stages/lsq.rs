@@ -55,6 +55,7 @@ pub fn lsq(of: &Lsq) -> Report {
     condition(&mut report.terminal(), of.found);
     fit_quality(&mut report.detail(), of.found);
     if let Some(links) = &of.found.consistent {
+        report.detail().table(bodies(links));
         consistent(&mut report.terminal(), links);
     }
     let mut page = report.page();
@@ -434,8 +435,8 @@ fn account(terminal: &mut Writer, account: &Account) {
     }
 }
 
-/// Links that can exist, and by how much the fit suffers.
-fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
+/// Links that can exist.
+fn bodies(found: &ConsistentLinks) -> Table {
     let numbers = ["mass", "x", "y", "z", "Ixx", "Iyy", "Izz"].map(|name| (name, Align::Decimal));
     let mut columns = vec![("link", Align::Left)];
     columns.extend(numbers);
@@ -448,7 +449,11 @@ fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
         row.extend([xx, yy, zz].map(|x| number::significant(x, 3)));
         table.row(row);
     }
-    terminal.table(table);
+    table
+}
+
+/// Drives that can exist, and by how much the fit suffers from links that can.
+fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
     let drives = found.drives.iter();
     let drives: Vec<String> = drives
         .map(|drive| format!("{} {}", drive.joint, number::significant(drive.inertia, 3)))

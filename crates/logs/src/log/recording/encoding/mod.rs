@@ -4,6 +4,7 @@
 mod cdr;
 mod cursor;
 mod descriptor;
+mod elements;
 mod json;
 mod leaves;
 mod msg;
