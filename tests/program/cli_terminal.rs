@@ -246,7 +246,8 @@ fn a_held_out_log_did_not_make_the_model_and_a_fitted_one_did() {
 }
 
 /// Files that a reader has and the built-in campaign has not.
-const READERS_OWN: [&str; 7] = [
+const READERS_OWN: [&str; 8] = [
+    "motion.toml",
     "arm.toml",
     "bag_0.mcap",
     "emps_id.csv",

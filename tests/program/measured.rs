@@ -87,7 +87,14 @@ fn without_an_offset_emps_has_the_error_of_the_symmetric_model() {
     };
     let log = log.to_str().unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let robot = ["-r", "configs/emps-symmetric.toml", "-o", "m.toml", "--estimator", "ols"];
+    let robot = [
+        "-r",
+        "configs/emps-symmetric.toml",
+        "-o",
+        "m.toml",
+        "--estimator",
+        "ols",
+    ];
     run(folder.path(), &[&["lsq", log][..], &robot].concat());
     let fit = run(folder.path(), &["validate", log, "-m", "m.toml"]);
     assert_near(relative_error(&fit), 0.071, 0.02);

@@ -248,7 +248,7 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     for heading in [
         "What the model lacks",
         "What is left",
-        "Candidates that were not added",
+        "Candidates that were not chosen",
         "Data quality",
     ] {
         assert!(headings.contains(&heading), "{headings:?}");

@@ -481,26 +481,24 @@ impl<'a> Reconstruction<'a> {
         let n = robot.joints();
         let has_band = self.band.is_some();
         let known = |x: Option<f64>| x.filter(|_| !self.summed).unwrap_or(f64::NAN);
-        let joint = |(j, s): (usize, &ErrorSums)| {
-            JointError {
-                joint: robot.joint_names()[j].clone(),
-                unit: robot.joint_unit(j),
-                rmse: (s.error / s.rows.max(1) as f64).sqrt(),
-                relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
-                relative_error_moving: ratio(s.moving[0], s.moving[1], s.rows - s.resting),
-                relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
-                relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
-                coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
-                half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
-                max_abs: known(Some(s.largest)),
-                r2: if s.scatter > 0.0 && !self.summed {
-                    1.0 - s.error / s.scatter
-                } else {
-                    f64::NAN
-                },
-                samples: s.rows,
-                resting: s.resting,
-            }
+        let joint = |(j, s): (usize, &ErrorSums)| JointError {
+            joint: robot.joint_names()[j].clone(),
+            unit: robot.joint_unit(j),
+            rmse: (s.error / s.rows.max(1) as f64).sqrt(),
+            relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
+            relative_error_moving: ratio(s.moving[0], s.moving[1], s.rows - s.resting),
+            relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
+            relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
+            coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
+            half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
+            max_abs: known(Some(s.largest)),
+            r2: if s.scatter > 0.0 && !self.summed {
+                1.0 - s.error / s.scatter
+            } else {
+                f64::NAN
+            },
+            samples: s.rows,
+            resting: s.resting,
         };
         let joints: Vec<JointError> = all.iter().enumerate().map(joint).collect();
         let one_unit = joints.iter().all(|e| e.unit == joints[0].unit);
@@ -515,7 +513,14 @@ impl<'a> Reconstruction<'a> {
             moving += s.rows - s.resting;
             resting += s.resting;
         }
-        let [error, torque, in_motion, torque_in_motion, at_rest, torque_at_rest] = pooled;
+        let [
+            error,
+            torque,
+            in_motion,
+            torque_in_motion,
+            at_rest,
+            torque_at_rest,
+        ] = pooled;
         let part = |error: f64, torque: f64, rows: u64| {
             one_unit
                 .then(|| ratio(error.max(0.0), torque, rows))

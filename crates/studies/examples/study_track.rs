@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq, reduce};
-use cft_ident::track::{ParameterEstimate, follow_together};
+use cft_ident::track::{LogEstimate, follow_together};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -148,7 +148,7 @@ fn simulated(
     seed: u64,
     (joint, both): (usize, bool),
     change: &dyn Fn(usize) -> f64,
-) -> Vec<Vec<ParameterEstimate>> {
+) -> Vec<Vec<LogEstimate>> {
     let mut draw = chance(seed);
     // relative deviation of each parameter in one log, and what the robot's own are
     let friction = |p: usize| p >= LINKS && (p - LINKS) % 3 < 2;
@@ -192,7 +192,7 @@ fn simulated(
             }
             let std = relative[p] * truth[p];
             let error = 0.6 * common[of_joint] + 0.8 * draw();
-            out[p].push(ParameterEstimate {
+            out[p].push(LogEstimate {
                 time: 86_400.0 * log as f64,
                 value: value + std * error,
                 variance: std * std,
@@ -216,10 +216,10 @@ fn groups() -> Vec<Range<usize>> {
 }
 
 /// The last change that is told in a group once the first `logs` logs are there, as the relative size of the largest.
-fn told(estimates: &[Vec<ParameterEstimate>], group: &Range<usize>, logs: usize) -> Option<f64> {
+fn told(estimates: &[Vec<LogEstimate>], group: &Range<usize>, logs: usize) -> Option<f64> {
     let level = ALARMS / groups().len() as f64;
     let own = estimates[group.clone()].iter();
-    let own: Vec<&[ParameterEstimate]> = own.map(|all| &all[..logs]).collect();
+    let own: Vec<&[LogEstimate]> = own.map(|all| &all[..logs]).collect();
     let correlation = (own.len() == 2).then_some(&CORRELATION[..]);
     let courses = follow_together(&own, correlation, level);
     let sizes = courses.iter().filter_map(|course| {

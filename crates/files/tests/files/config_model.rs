@@ -245,7 +245,8 @@ fn a_model_of_another_robot_is_refused_with_the_difference() {
 
 #[test]
 fn a_robot_file_given_as_a_model_is_told_so() {
-    let text = std::fs::read_to_string(format!("{}/configs/cft.toml", cft_ident_support::ROOT)).unwrap();
+    let text =
+        std::fs::read_to_string(format!("{}/configs/cft.toml", cft_ident_support::ROOT)).unwrap();
     refused(
         ModelFile::parse("configs/cft.toml", &text),
         &["`parameter` is missing", "robot file", "-r"],

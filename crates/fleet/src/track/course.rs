@@ -7,7 +7,7 @@ use super::walk::{Sizes, median};
 
 /// What one log says of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ParameterEstimate {
+pub struct LogEstimate {
     /// Time, by a clock that runs through all logs \[s\], or the log's number.
     pub time: f64,
     /// Estimate \[unit\].
@@ -43,7 +43,7 @@ const NEIGHBOURS: usize = 5;
 
 /// The course of a parameter from estimates in order of time. `level` is the probability at which a change is reported
 /// where there is none.
-pub fn follow(estimates: &[ParameterEstimate], level: f64) -> Course {
+pub fn follow(estimates: &[LogEstimate], level: f64) -> Course {
     let mut courses = follow_together(&[estimates], None, level);
     courses.pop().unwrap_or_default()
 }
@@ -53,7 +53,7 @@ pub fn follow(estimates: &[ParameterEstimate], level: f64) -> Course {
 /// `parameters` are estimates of the same logs `[parameter][log]`, `correlation` is that of the errors of one log's
 /// estimates, row by row, where their fits say it.
 pub fn follow_together(
-    parameters: &[&[ParameterEstimate]],
+    parameters: &[&[LogEstimate]],
     correlation: Option<&[f64]>,
     level: f64,
 ) -> Vec<Course> {
@@ -104,10 +104,9 @@ struct Signal {
 }
 
 impl Signal {
-    fn of(estimates: &[ParameterEstimate]) -> Self {
-        let told = |e: &ParameterEstimate| {
-            e.variance.is_finite() && e.variance > 0.0 && e.value.is_finite()
-        };
+    fn of(estimates: &[LogEstimate]) -> Self {
+        let told =
+            |e: &LogEstimate| e.variance.is_finite() && e.variance > 0.0 && e.value.is_finite();
         let mut variances: Vec<f64> = (estimates.iter())
             .map(|e| if told(e) { e.variance } else { f64::INFINITY })
             .collect();
@@ -230,9 +229,9 @@ mod tests {
     }
 
     /// A parameter of 10 with noise of 0.3 in each of 50 logs, and a change.
-    fn course(seed: u64, change: impl Fn(usize) -> f64) -> Vec<ParameterEstimate> {
+    fn course(seed: u64, change: impl Fn(usize) -> f64) -> Vec<LogEstimate> {
         let mut draw = chance(seed);
-        let estimate = |k: usize| ParameterEstimate {
+        let estimate = |k: usize| LogEstimate {
             time: k as f64 * 3600.0,
             value: 10.0 + change(k) + 0.3 * draw(),
             variance: 0.09,
@@ -306,14 +305,14 @@ mod tests {
     }
 
     /// Viscous and Coulomb friction, with errors of a correlation of 0.36, that grow by `size` from log 16 of 26 on.
-    fn friction(seed: u64, size: f64) -> [Vec<ParameterEstimate>; 2] {
+    fn friction(seed: u64, size: f64) -> [Vec<LogEstimate>; 2] {
         let mut draw = chance(seed);
         let mut out = [Vec::new(), Vec::new()];
         for k in 0..26 {
             let common = draw();
             for own in &mut out {
                 let error = 0.3 * (0.6 * common + 0.8 * draw());
-                own.push(ParameterEstimate {
+                own.push(LogEstimate {
                     time: k as f64 * 3600.0,
                     value: 10.0 + if k < 16 { 0.0 } else { size } + error,
                     variance: 0.09,
@@ -335,7 +334,7 @@ mod tests {
             };
             let (own, found) = both(0.8);
             // two courses, and the same chance of a false alarm
-            let shows = |own: &Vec<ParameterEstimate>| !follow(own, 0.5e-5).changes.is_empty();
+            let shows = |own: &Vec<LogEstimate>| !follow(own, 0.5e-5).changes.is_empty();
             alone += u32::from(own.iter().any(shows));
             if let [change] = found[0].changes.as_slice() {
                 together += 1;

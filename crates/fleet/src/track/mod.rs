@@ -14,5 +14,5 @@ mod together;
 mod walk;
 
 pub use changes::{ChangeKind, ParameterChange};
-pub use course::{Course, ParameterEstimate, follow, follow_together};
+pub use course::{Course, LogEstimate, follow, follow_together};
 pub use fleet::{Level, RobotApart, apart};

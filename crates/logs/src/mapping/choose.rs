@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::column::LogColumn;
-use super::family::{Family, How, Key, families, fit, penalty};
+use super::family::{Family, How, Key, families, fit};
+use super::fitting::{Taken, best, without_common_head};
 use super::look::{ClockSource, SeenColumns};
 use super::units::{of_positions, of_torques, other_velocity, stated_position, stated_torque};
 use crate::inspect::ChannelRole;
@@ -73,16 +74,6 @@ pub struct Mapping {
     /// Quantities that no column was found for, and families of columns that may be them.
     pub lacking: Vec<&'static str>,
     pub offered: Vec<String>,
-}
-
-/// A family that was taken.
-struct Taken<'a> {
-    pattern: String,
-    how: How,
-    columns: Vec<Option<&'a LogColumn>>,
-    /// Others that fit, best first, and whether the first of them is as good.
-    others: Vec<String>,
-    tie: bool,
 }
 
 const ROLES: [(ChannelRole, &str); 3] = [
@@ -330,176 +321,6 @@ fn plain(known: &Known) -> JointColumns {
         in_messages: None,
         by_path: false,
     }
-}
-
-/// Words that two patterns share.
-fn shared_words(a: &str, b: &str) -> i32 {
-    let b = words(b);
-    let shared = words(a)
-        .into_iter()
-        .filter(|word| b.iter().any(|other| other.text == word.text));
-    i32::try_from(shared.count()).unwrap_or(0)
-}
-
-/// A family that fits, and how well: less is better.
-struct Fitting<'a> {
-    rank: (i32, i32),
-    pattern: String,
-    how: How,
-    columns: Vec<Option<&'a LogColumn>>,
-}
-
-/// For every joint the column that has its name, whatever else the names say: a joint that slides has a force where
-/// others have torques.
-fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Fitting<'a>> {
-    let mut worst = 0;
-    let mut own = |joint: &&str| {
-        let has = |column: &&LogColumn| {
-            let longer = |other: &&str| {
-                other.len() > joint.len() && without_joint(&column.name, other) != column.name
-            };
-            without_joint(&column.name, joint) != column.name && !joints.iter().any(longer)
-        };
-        let of = columns.iter().copied().filter(has);
-        let with = of.map(|column| {
-            let bare = without_joint(&column.name, joint);
-            (penalty(&words(&bare), column.role), column)
-        });
-        let mut all: Vec<(i32, &LogColumn)> = with.collect();
-        all.sort_by_key(|(penalty, _)| *penalty);
-        let (first, column) = *all.first()?;
-        // two that are as good are no answer
-        let sure = all.get(1).is_none_or(|(second, _)| *second > first);
-        worst = worst.max(first);
-        sure.then_some(Some(column))
-    };
-    let columns = joints.iter().map(&mut own).collect::<Option<Vec<_>>>()?;
-    let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
-    let apart = names
-        .iter()
-        .collect::<std::collections::BTreeSet<_>>()
-        .len()
-        == names.len();
-    (apart && joints.len() > 1).then(|| Fitting {
-        rank: (worst, i32::MAX),
-        pattern: names.join(", "),
-        how: How::Fits,
-        columns,
-    })
-}
-
-/// The names of joints without the words that all of them begin with: `left/upper` is `upper`.
-fn without_common_head(joints: &[&str]) -> Vec<String> {
-    let all: Vec<Vec<Word>> = joints.iter().map(|joint| words(joint)).collect();
-    let common = |k: usize| {
-        let first = all.first().and_then(|spoken| spoken.get(k));
-        let same = |spoken: &Vec<Word>| {
-            spoken.len() > k + 1 && first.is_some_and(|first| spoken[k].text == first.text)
-        };
-        all.iter().all(same)
-    };
-    let head = (0..).take_while(|k| joints.len() > 1 && common(*k)).count();
-    let short = |(joint, spoken): (&&str, &Vec<Word>)| {
-        let from = spoken.get(head).map_or(0, |word| word.at.start);
-        joint[from..].to_owned()
-    };
-    // numbers alone are no names
-    let named = |spoken: &Vec<Word>| spoken[head..].iter().any(|word| word.number().is_none());
-    match all.iter().all(named) {
-        true => joints.iter().zip(&all).map(short).collect(),
-        false => joints.iter().map(|joint| (*joint).to_owned()).collect(),
-    }
-}
-
-/// The family of a role that fits the joints best, by their names, else by what is left of those without the words
-/// that all begin with.
-fn best<'a>(
-    columns: &'a [LogColumn],
-    role: ChannelRole,
-    commanded: bool,
-    joints: &[&str],
-    beside: Option<&str>,
-) -> Option<Taken<'a>> {
-    let whole = best_by(columns, role, commanded, joints, beside);
-    let short = without_common_head(joints);
-    let short: Vec<&str> = short.iter().map(String::as_str).collect();
-    if whole.as_ref().is_some_and(|taken| taken.how == How::Fits) || short == joints {
-        return whole;
-    }
-    let by_short = best_by(columns, role, commanded, &short, beside);
-    by_short.filter(|taken| taken.how == How::Fits).or(whole)
-}
-
-fn best_by<'a>(
-    columns: &'a [LogColumn],
-    role: ChannelRole,
-    commanded: bool,
-    joints: &[&str],
-    beside: Option<&str>,
-) -> Option<Taken<'a>> {
-    let of_role = |c: &&LogColumn| c.role == role && c.commanded == commanded;
-    let of_role: Vec<&LogColumn> = columns.iter().filter(of_role).collect();
-    let mut found: Vec<Fitting> = Vec::new();
-    for family in families(&of_role, joints) {
-        if let Some((how, columns)) = fit(&family, joints)
-            && columns.iter().any(Option::is_some)
-        {
-            let off = match how {
-                How::Fits => 0,
-                How::InOrder => 1,
-                How::InPart => 6,
-            };
-            let missing = columns.iter().filter(|c| c.is_none()).count() as i32;
-            let near = beside.map_or(0, |beside| shared_words(&family.pattern, beside));
-            found.push(Fitting {
-                rank: (off + family.penalty + missing, -near),
-                pattern: family.pattern,
-                how,
-                columns,
-            });
-        }
-    }
-    if let Some(named) = by_names(&of_role, joints) {
-        found.push(named);
-    }
-    // the first of equals
-    found.sort_by_key(|fitting| fitting.rank);
-    let mut found = found.into_iter();
-    let Fitting {
-        rank,
-        pattern,
-        how,
-        columns: given,
-    } = found.next()?;
-    let taken: Vec<&str> = given.iter().flatten().map(|c| c.name.as_str()).collect();
-    let (mut others, mut tie) = (Vec::new(), false);
-    let mut told: Vec<Vec<&str>> = Vec::new();
-    for other in found {
-        // another reading of the same columns is no other family
-        let same = |c: &&LogColumn| taken.contains(&c.name.as_str());
-        let mut known = |columns: &[Option<&'a LogColumn>]| {
-            let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
-            let known = told.contains(&names);
-            told.push(names);
-            known
-        };
-        if other.columns.iter().flatten().all(same)
-            || other.how == How::InPart
-            || known(&other.columns)
-            || others.contains(&other.pattern)
-        {
-            continue;
-        }
-        tie |= others.is_empty() && other.rank == rank;
-        others.push(other.pattern);
-    }
-    Some(Taken {
-        pattern,
-        how,
-        columns: given,
-        others,
-        tie,
-    })
 }
 
 /// Families that are offered where no name says what they are.

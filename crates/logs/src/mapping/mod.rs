@@ -16,6 +16,7 @@ mod column;
 mod content;
 mod error;
 mod family;
+mod fitting;
 mod look;
 mod units;
 

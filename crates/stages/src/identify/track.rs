@@ -15,7 +15,7 @@ use super::told::{Source, Told};
 use super::track_error::TrackError;
 use cft_ident_files::config::ModelFile;
 use cft_ident_fleet::track::{
-    ChangeKind, Course, Level, ParameterChange, ParameterEstimate, apart, follow_together,
+    ChangeKind, Course, Level, LogEstimate, ParameterChange, apart, follow_together,
 };
 use cft_ident_logs::log::Provenance;
 
@@ -375,11 +375,11 @@ fn followed(
     let level = ALARMS / groups.len().max(1) as f64;
     let (mut parameters, mut changes) = (Vec::new(), Vec::new());
     for keys in &groups {
-        let of_key = |key: &&Told| -> Vec<ParameterEstimate> {
+        let of_key = |key: &&Told| -> Vec<LogEstimate> {
             let each = told.iter().zip(times);
             each.map(|(source, time)| {
                 let own = source.told.iter().find(|t| t.is(key));
-                ParameterEstimate {
+                LogEstimate {
                     time: *time,
                     value: own.map_or(0.0, |t| t.value),
                     variance: own.map_or(f64::INFINITY, |t| t.variance),
@@ -387,8 +387,8 @@ fn followed(
             })
             .collect()
         };
-        let estimates: Vec<Vec<ParameterEstimate>> = keys.iter().map(of_key).collect();
-        let own: Vec<&[ParameterEstimate]> = estimates.iter().map(Vec::as_slice).collect();
+        let estimates: Vec<Vec<LogEstimate>> = keys.iter().map(of_key).collect();
+        let own: Vec<&[LogEstimate]> = estimates.iter().map(Vec::as_slice).collect();
         let courses = follow_together(&own, correlation(&told, keys).as_deref(), level);
         for ((key, estimates), course) in keys.iter().zip(&estimates).zip(&courses) {
             changes.extend(changed(key, course, &courses, times));
@@ -472,7 +472,7 @@ fn changed(key: &Told, course: &Course, together: &[Course], times: &[f64]) -> V
 fn tracked(
     key: &Told,
     course: &Course,
-    estimates: &[ParameterEstimate],
+    estimates: &[LogEstimate],
     times: &[f64],
 ) -> TrackedParameter {
     let known = |x: &[f64]| -> Vec<Option<f64>> {
@@ -481,8 +481,8 @@ fn tracked(
             .map(|(x, std)| std.is_finite().then_some(*x))
             .collect()
     };
-    let of_log = |of: fn(&ParameterEstimate) -> f64| -> Vec<Option<f64>> {
-        let told = |e: &ParameterEstimate| e.variance.is_finite().then(|| of(e));
+    let of_log = |of: fn(&LogEstimate) -> f64| -> Vec<Option<f64>> {
+        let told = |e: &LogEstimate| e.variance.is_finite().then(|| of(e));
         estimates.iter().map(told).collect()
     };
     TrackedParameter {

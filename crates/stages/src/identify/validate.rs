@@ -241,8 +241,8 @@ impl Beyond {
         }
     }
 
-    /// The joint whose torque the model makes impossibly large: after the filter too, for a single row is noise of the
-    /// acceleration.
+    /// The joint whose torque the model makes impossibly large: single rows are noise of the acceleration, but an rms
+    /// error above all that was measured is not.
     fn impossible(
         &self,
         errors: &TorqueErrors,
@@ -250,10 +250,9 @@ impl Beyond {
         logs: &[Log],
     ) -> Option<IdentifyError> {
         let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
-        let filtered = |j: usize| errors.joints.get(j).map_or(f64::NAN, |e| e.max_abs);
-        let mut off = pairs.filter(|(j, (m, r))| {
-            **m > 0.0 && r.0.min(filtered(*j)) > IMPOSSIBLE * **m && !filtered(*j).is_nan()
-        });
+        let rms = |j: usize| errors.joints.get(j).map_or(0.0, |e| e.rmse);
+        let mut off =
+            pairs.filter(|(j, (m, r))| **m > 0.0 && r.0 > IMPOSSIBLE * **m && rms(*j) > **m);
         let (j, (measured, (torque, t))) = off.next()?;
         let names: Vec<String> = logs.iter().map(Log::name).collect();
         Some(IdentifyError::Impossible {

@@ -148,7 +148,7 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
             "give the URDF of a whole robot",
         ));
     }
-    parts.impossible = possible::mended(&mut parts.links);
+    parts.impossible = possible::impossible(&parts.links);
     if let Some(root) = undeclared_root(&parts, &links) {
         parts.links.insert(0, root);
     }

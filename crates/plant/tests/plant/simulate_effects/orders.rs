@@ -314,7 +314,8 @@ fn effects_of_a_model_run_as_those_of_the_command_line_do() {
 
 #[test]
 fn faults_need_a_log_with_joint_channels() {
-    let text = std::fs::read_to_string(format!("{}/configs/cft.toml", cft_ident_support::ROOT)).expect("the robot file");
+    let text = std::fs::read_to_string(format!("{}/configs/cft.toml", cft_ident_support::ROOT))
+        .expect("the robot file");
     let text = text.replace("[log]\n", "[log]\nchannels = \"actuator\"\n");
     let Ok(raw) = RobotFile::parse("raw.toml", &text) else {
         panic!("a robot file with the motors' channels alone");
@@ -338,7 +339,8 @@ fn faults_need_a_log_with_joint_channels() {
 
 #[test]
 fn the_page_of_effects_says_what_the_simulator_takes() {
-    let page = std::fs::read_to_string(format!("{}/docs/effects.md", cft_ident_support::ROOT)).expect("docs/effects.md");
+    let page = std::fs::read_to_string(format!("{}/docs/effects.md", cft_ident_support::ROOT))
+        .expect("docs/effects.md");
     let rows: Vec<&str> = page
         .lines()
         .filter(|line| line.starts_with("| `"))
