@@ -297,7 +297,7 @@ fn the_examples_of_every_help_work_where_the_campaign_was_run() {
     }
     assert!(run >= 18, "{run}");
     let without_run = [
-        "convert", "diagnose", "export", "identify", "lsq", "generate", "new",
+        "convert", "diagnose", "export", "identify", "lsq", "generate", "new", "payload", "torque",
     ];
     assert!(
         parsed.iter().all(|c| without_run.contains(&c.as_str())),

@@ -253,11 +253,11 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     ] {
         assert!(headings.contains(&heading), "{headings:?}");
     }
-    // bars; cards of each effect, of the sketch, of friction, of the joint with something left, and of the residual
+    // bars; cards of each effect, of the sketch, of friction, of the joints with something left, and of the residual
     // joint by joint
     assert_eq!(page.matches("<figure>").count(), 1);
     let cards = page.matches("<figure class=\"card").count();
-    assert_eq!(cards, remedies + 2 + 1 + 4);
+    assert_eq!(cards, remedies + 2 + 2 + 4);
 }
 
 #[cfg(unix)]
