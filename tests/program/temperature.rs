@@ -152,7 +152,10 @@ fn found_by_its_formula(
     let found = done(at, &[&words[..], &own].concat());
     let steps = found["steps"].as_array().unwrap();
     let written: Vec<_> = steps.iter().filter(|s| s["written"] == true).collect();
-    assert!(written.len() == 1 && steps[0]["effect"] == name, "{steps:?}");
+    assert!(
+        written.len() == 1 && steps[0]["effect"] == name,
+        "{steps:?}"
+    );
     let floor = rms(at, "plain.csv", "truth.toml", number);
     let [without, with] = ["truth.toml", "refined.toml"].map(|m| rms(at, "unseen.csv", m, number));
     assert!(

@@ -195,7 +195,11 @@ pub fn lsq(
     }
     let (essential, essential_error) = essentials(&estimated)?;
     let resting = estimated.basis.sums.resting_shares();
-    let consistent = match settings.consistent {
+    // in amperes nothing says what a body can be
+    let in_si = machine.file.without_gains().is_empty()
+        && (0..machine.robot.joints())
+            .all(|j| machine.file.torque_unit(j) == machine.robot.joint_kind(j).torque_unit());
+    let consistent = match settings.consistent && in_si {
         true => {
             let fastest = match below_zero(&estimated) {
                 true => machine.fastest(logs, control)?,
