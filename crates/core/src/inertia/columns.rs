@@ -242,9 +242,9 @@ impl RegressorColumns {
         let (weighted, rest) = out.split_at_mut(torques + n);
         let (moving, plain) = rest.split_at_mut(n);
         let mut from = 0;
-        for j in 0..n {
+        for (j, moving) in moving.iter_mut().enumerate() {
             let (weight, rests) = (sample.weight[j], sample.rests[j]);
-            moving[j] = rest::movement(sample.v[j], self.rest_speed[j]);
+            *moving = rest::movement(sample.v[j], self.rest_speed[j]);
             let to = from + self.row_width(j);
             for place in (from..to).chain([torques + j]) {
                 plain[place] = if rests { weighted[place] } else { 0.0 };

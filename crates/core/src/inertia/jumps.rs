@@ -42,11 +42,10 @@ pub struct Jump {
 /// [`FitError`].
 pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
     let usable = |b: &&BlockFactor| b.span[1] > b.span[0] && b.scores.is_none();
-    let blocks: Vec<&BlockFactor> = factors.blocks.iter().filter(usable).collect();
-    if factors.columns.joints < 2 || blocks.len() < LIMITS.blocks {
+    let mut kept: Vec<BlockFactor> = factors.blocks.iter().filter(usable).cloned().collect();
+    if factors.columns.joints < 2 || kept.len() < LIMITS.blocks {
         return Ok(Vec::new());
     }
-    let mut kept: Vec<BlockFactor> = blocks.iter().map(|b| BlockFactor::clone(b)).collect();
     let mut ratios = Vec::new();
     for round in 0..=LIMITS.rounds {
         let part = BlockFactors {
