@@ -42,10 +42,11 @@ pub struct Jump {
 /// [`FitError`].
 pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
     let usable = |b: &&BlockFactor| b.span[1] > b.span[0] && b.scores.is_none();
-    let mut kept: Vec<BlockFactor> = factors.blocks.iter().filter(usable).cloned().collect();
-    if factors.columns.joints < 2 || kept.len() < LIMITS.blocks {
+    let blocks: Vec<&BlockFactor> = factors.blocks.iter().filter(usable).collect();
+    if factors.columns.joints < 2 || blocks.len() < LIMITS.blocks {
         return Ok(Vec::new());
     }
+    let mut kept: Vec<BlockFactor> = blocks.iter().copied().cloned().collect();
     let mut ratios = Vec::new();
     for round in 0..=LIMITS.rounds {
         let part = BlockFactors {
