@@ -111,7 +111,8 @@ fn alike(a: &IdentifiedDynamics, b: &IdentifiedDynamics) {
 fn any_order_and_any_grouping_of_reduced_logs_is_fitted_as_the_logs_are() {
     let machine = slide();
     let logs: Vec<Log> = (1..=3).map(|seed| log(seed, 40.0, &jump)).collect();
-    for estimator in [EstimatorKind::Wls] {
+    {
+        let estimator = EstimatorKind::Wls;
         let settings = LsqSettings {
             estimator,
             consistent: estimator == EstimatorKind::Wls,
