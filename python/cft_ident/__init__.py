@@ -211,7 +211,10 @@ class Model:
         import pandas
 
         columns = ["parameter", "joint", "value", "std", "in_use", "unit"]
-        return pandas.DataFrame(self._native.parameters, columns=columns)
+        frame = pandas.DataFrame(self._native.parameters, columns=columns)
+        # a link's parameter has no joint: None, which a frame of strings would turn into NaN
+        frame["joint"] = pandas.Series([row[1] for row in self._native.parameters], dtype=object)
+        return frame
 
     @property
     def covariance(self) -> Any:
