@@ -75,27 +75,34 @@ impl Words<'_> {
         let tied_with: Vec<Alternative> = tied.map(|change| self.said(change).entry).collect();
         let finding = |change: Change| {
             let said = self.said(&change);
-            let mut meaning = said.meaning + &self.missed(found);
+            let begin = if found.open {
+                "these data cannot tell: perhaps "
+            } else {
+                ""
+            };
+            let mut meaning = format!("{begin}{}{}", said.meaning, self.missed(found));
             if let Some(experiment) = experiment(found, |j| &self.names[j]) {
                 meaning += &experiment;
             }
             let values = [said.declared, said.entry.found];
             let remedy = said.entry.remedy;
+            let plain = Finding::new(
+                said.entry.kind,
+                said.entry.joint,
+                values,
+                meaning,
+                remedy,
+                found.sure,
+            );
             Finding {
                 channel: said.entry.channel,
+                severity: match found.open {
+                    true => FindingSeverity::Hint,
+                    false => plain.severity,
+                },
                 with: said.entry.with,
                 tied_with: tied_with.clone(),
-                ..self.with_errors(
-                    &found.errors,
-                    Finding::new(
-                        said.entry.kind,
-                        said.entry.joint,
-                        values,
-                        meaning,
-                        remedy,
-                        found.sure,
-                    ),
-                )
+                ..self.with_errors(&found.errors, plain)
             }
         };
         found.change.single().into_iter().map(finding).collect()

@@ -98,7 +98,12 @@ impl Free {
 }
 
 impl Estimate {
-    /// The mistakes that it may be, and whether it is no estimate.
+    /// Whether it is said where it is no mistake.
+    pub(super) fn is_told(&self) -> bool {
+        !matches!(self.free, Free::Begins(_))
+    }
+
+    /// The mistakes that it may be.
     pub(super) fn mistakes(&self, ratios: &[f64]) -> Vec<Change> {
         let of = |f: f64| match self.free {
             Free::Factor(Both, j) => Change::Gear(j, f),

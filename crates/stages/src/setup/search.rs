@@ -22,6 +22,8 @@ pub struct Found {
     pub errors: [Vec<f64>; 2],
     /// Beyond doubt: a fit refuses the logs.
     pub sure: bool,
+    /// Readings that fit alike are of other joints: these data cannot tell.
+    pub open: bool,
     /// Other readings that these data do not tell from it.
     pub tied: Vec<Change>,
     /// Joints of them that move in proportion.
@@ -156,7 +158,12 @@ impl Look<'_> {
             }
         }
         let mut found = self.decide(declared, &list, fitted.as_ref().map(|f| &f.1));
-        if found.as_ref().is_none_or(|f| !f.sure) && declared.is_some() {
+        // two mistakes are sure where one is: beside what is absurd
+        let absurd = declared.is_some_and(|d| {
+            let errors = d.trial.errors();
+            turned > 0 || errors.iter().any(|e| *e > LIMITS.unexplained)
+        });
+        if absurd && found.as_ref().is_none_or(|f| !f.sure) {
             let pairs = self.pairs(&list);
             let list = self.judged(base, pairs, (few.as_ref(), declared));
             let both = self.decide(declared, &list, None);
@@ -168,7 +175,7 @@ impl Look<'_> {
                 let before = &declared?.trial;
                 let compared = Compared::of(self.problem, before, &trial);
                 let clear = compared.confirmed && !compared.harms;
-                clear.then(|| (estimate, [before.errors(), trial.errors()]))
+                (clear && estimate.is_told()).then(|| (estimate, [before.errors(), trial.errors()]))
             });
         (found, told)
     }
@@ -277,6 +284,7 @@ impl Look<'_> {
         let repaired = absurd.iter().all(|j| after[*j] <= LIMITS.sound)
             && (!absurd.is_empty() || mended && turned(best) == 0);
         let alike = tied.iter().all(|other| same_line(&change, other));
+        let open = !tied.iter().all(|other| same_place(&change, other));
         let together = change.joints().into_iter().find_map(|j| {
             let (other, _) = proportion(self.problem, &everyone, j)?;
             Some([j, other])
@@ -286,6 +294,7 @@ impl Look<'_> {
             errors: [before, after],
             tied,
             change,
+            open,
             together,
         })
     }
@@ -339,6 +348,12 @@ fn own_gain(change: &Change, better: &[usize]) -> bool {
         Change::Reverse | Change::Gravity(_) => !better.is_empty(),
         one => one.joints().iter().all(|j| better.contains(j)),
     }
+}
+
+/// Whether two readings are about the same joints, or both about gravity.
+fn same_place(a: &Change, b: &Change) -> bool {
+    let (a, b) = (a.joints(), b.joints());
+    a.is_empty() && b.is_empty() || a.iter().any(|j| b.contains(j))
 }
 
 /// Whether two readings turn the same joint: which of its channels it is, a symmetric machine does not show.
