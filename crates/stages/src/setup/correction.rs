@@ -119,6 +119,16 @@ impl Change {
         }
     }
 
+    /// The same with its factor multiplied, where it has one.
+    pub(super) fn times(&self, by: f64) -> Option<Change> {
+        match self {
+            Self::Scale(_, _, -1.0) => None,
+            Self::Scale(channel, joints, f) => Some(Self::Scale(*channel, joints.clone(), f * by)),
+            Self::Gear(j, f) => Some(Self::Gear(*j, f * by)),
+            _ => None,
+        }
+    }
+
     /// Whether only torques change: the columns are those of the set-up as it is.
     pub(super) fn is_of_torques(&self) -> bool {
         match self {

@@ -87,7 +87,7 @@ pub struct SetupLimits {
 /// The numbers of the check.
 pub const LIMITS: SetupLimits = SetupLimits {
     unexplained: 0.5,
-    sound: 0.35,
+    sound: 0.25,
     doubtful: 0.1,
     floor: 0.5,
     far: 1.5,

@@ -157,6 +157,7 @@ impl Look<'_> {
                 }
             }
         }
+        list.retain(|judged| self.has_a_factor(base, judged, declared));
         let mut found = self.decide(declared, &list, fitted.as_ref().map(|f| &f.1));
         // two mistakes are sure where one is: beside what is absurd
         let absurd = declared.is_some_and(|d| {
@@ -165,7 +166,8 @@ impl Look<'_> {
         });
         if absurd && found.as_ref().is_none_or(|f| !f.sure) {
             let pairs = self.pairs(&list);
-            let list = self.judged(base, pairs, (few.as_ref(), declared));
+            let mut list = self.judged(base, pairs, (few.as_ref(), declared));
+            list.retain(|judged| self.has_a_factor(base, judged, declared));
             let both = self.decide(declared, &list, None);
             found = both.filter(|f| f.sure).or(found);
         }
@@ -205,6 +207,17 @@ impl Look<'_> {
         (chosen.par_iter())
             .filter_map(|i| self.whole(base, Some(&list[*i]), same))
             .collect()
+    }
+
+    /// Whether the data tell the factor of a hypothesis: any that is far off frees a joint from all others.
+    fn has_a_factor(&self, base: &Correction, judged: &Judged, declared: Option<&Judged>) -> bool {
+        let same = declared.map(|d| &d.trial);
+        let far = |by: f64| {
+            let other = judged.trial.change.as_ref().and_then(|c| c.times(by));
+            let other = other.and_then(|c| Trial::new(self.problem, (base, Some(&c)), 1, same));
+            other.is_none_or(|other| other.whole() > LIMITS.far * judged.trial.whole())
+        };
+        far(LIMITS.yardstick) && far(LIMITS.yardstick.recip())
     }
 
     /// The best of a list each with every other hypothesis.
@@ -250,12 +263,17 @@ impl Look<'_> {
         if let Some(d) = declared {
             let compared = Compared::of(self.problem, &d.trial, &best.trial);
             mended = turned(best) < turned(d);
-            let own = own_gain(&change, &compared.better);
+            before = d.trial.errors();
+            let absurd = compared
+                .better
+                .iter()
+                .any(|j| before[*j] > LIMITS.unexplained);
+            let own =
+                own_gain(&change, &compared.better) && (absurd || change.times(1.0).is_some());
             // the best one makes a joint worse: nothing on the list is it, and no lesser one takes its place
             if compared.harms || !(mended || compared.confirmed && own) {
                 return None;
             }
-            before = d.trial.errors();
             // physics alone tells where no error changes
             if !compared.better.is_empty() {
                 seen = compared.better;
@@ -285,12 +303,14 @@ impl Look<'_> {
             && (!absurd.is_empty() || mended && turned(best) == 0);
         let alike = tied.iter().all(|other| same_line(&change, other));
         let open = !tied.iter().all(|other| same_place(&change, other));
+        // no line mends it, and `inspect` knows it surely where the log has velocities
+        let velocity = matches!(change, Change::Velocity(..));
         let together = change.joints().into_iter().find_map(|j| {
             let (other, _) = proportion(self.problem, &everyone, j)?;
             Some([j, other])
         });
         Some(Found {
-            sure: repaired && alike && !beside && together.is_none(),
+            sure: repaired && alike && !beside && together.is_none() && !velocity,
             errors: [before, after],
             tied,
             change,

@@ -27,7 +27,7 @@ pub struct Undecided {
     pub cause: Cause,
 }
 
-/// The joints that miss more than those of sound machines.
+/// The joints that miss most of their torque.
 pub(super) fn undecided(problem: &Problem, declared: &Trial) -> Vec<Undecided> {
     let moving = problem.channels_that_move();
     let errors = declared.errors();
@@ -44,7 +44,10 @@ pub(super) fn undecided(problem: &Problem, declared: &Trial) -> Vec<Undecided> {
             Cause::Other
         }
     };
-    let missed = moving.iter().copied().filter(|j| errors[*j] > LIMITS.sound);
+    let missed = moving
+        .iter()
+        .copied()
+        .filter(|j| errors[*j] > LIMITS.unexplained);
     missed
         .map(|joint| Undecided {
             joint,
