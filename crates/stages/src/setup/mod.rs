@@ -88,7 +88,7 @@ pub struct SetupLimits {
 pub const LIMITS: SetupLimits = SetupLimits {
     unexplained: 0.5,
     sound: 0.25,
-    doubtful: 0.1,
+    doubtful: 0.05,
     floor: 0.5,
     far: 1.5,
     same: 0.1,

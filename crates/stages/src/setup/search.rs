@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::LIMITS;
+use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::estimate::{Estimate, estimates};
 use super::finding::ChannelKind::Torque;
@@ -176,7 +177,7 @@ impl Look<'_> {
             .and_then(|(estimate, trial)| {
                 let before = &declared?.trial;
                 let compared = Compared::of(self.problem, before, &trial);
-                let clear = compared.confirmed && !compared.harms;
+                let clear = compared.agreed >= NUMBERS.confirmed && !compared.harms;
                 (clear && estimate.is_told()).then(|| (estimate, [before.errors(), trial.errors()]))
             });
         (found, told)
@@ -259,19 +260,27 @@ impl Look<'_> {
         let change = best.trial.change.clone()?;
         let after = best.trial.errors();
         let (mut seen, mut before) = (everyone.clone(), vec![f64::NAN; after.len()]);
-        let mut mended = false;
+        let (mut mended, mut confirmed) = (false, true);
         if let Some(d) = declared {
             let compared = Compared::of(self.problem, &d.trial, &best.trial);
             mended = turned(best) < turned(d);
             before = d.trial.errors();
-            let absurd = compared
-                .better
-                .iter()
-                .any(|j| before[*j] > LIMITS.unexplained);
-            let own =
-                own_gain(&change, &compared.better) && (absurd || change.times(1.0).is_some());
+            let better = &compared.better;
+            let absurd = better.iter().any(|j| before[*j] > LIMITS.unexplained);
+            confirmed = compared.agreed >= NUMBERS.confirmed;
+            // what is not absurd is a factor, or next to all that is missed
+            let left = best.trial.square(better) / d.trial.square(better);
+            let likely = match absurd {
+                true => compared.agreed > 0.0,
+                false => {
+                    let plain = change.times(1.0).is_some() || left < LIMITS.same * LIMITS.same;
+                    confirmed && plain
+                }
+            };
+            // behind gears and linkages a motor is of several joints
+            let own = self.problem.channels.drive != Drive::Joints || own_gain(&change, better);
             // the best one makes a joint worse: nothing on the list is it, and no lesser one takes its place
-            if compared.harms || !(mended || compared.confirmed && own) {
+            if compared.harms || !(mended || likely && own) {
                 return None;
             }
             // physics alone tells where no error changes
@@ -310,7 +319,12 @@ impl Look<'_> {
             Some([j, other])
         });
         Some(Found {
-            sure: repaired && alike && !beside && together.is_none() && !velocity,
+            sure: repaired
+                && (confirmed || mended)
+                && alike
+                && !beside
+                && together.is_none()
+                && !velocity,
             errors: [before, after],
             tied,
             change,

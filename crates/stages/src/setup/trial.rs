@@ -139,8 +139,8 @@ pub(super) struct Compared {
     pub better: Vec<usize>,
     /// Whether that of a joint becomes larger so.
     pub harms: bool,
-    /// Whether all parts of the logs agree that it takes off what a mistake does.
-    pub confirmed: bool,
+    /// How far the parts of the logs agree that it takes off what a mistake does, 0..1.
+    pub agreed: f64,
 }
 
 impl Compared {
@@ -164,7 +164,7 @@ impl Compared {
         let beyond = before.gain(after, &better).is_beyond(NUMBERS.screen, None);
         Self {
             harms: everyone.iter().any(|j| changed(j, -1.0)),
-            confirmed: floor && beyond && parts.s >= NUMBERS.confirmed,
+            agreed: if floor && beyond { parts.s } else { 0.0 },
             better,
         }
     }
