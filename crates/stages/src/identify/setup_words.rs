@@ -373,6 +373,10 @@ impl Words<'_> {
                 ..hint(FindingKind::Scale, None, values, meaning)
             }];
         }
+        let some = self.some_off(all);
+        if !some.is_empty() {
+            return some;
+        }
         let meaning = match (off(-1.0), without) {
             (true, _) => format!(
                 "gravity is not in these torques, though the masses of the file ask for it: {}. A driver that takes it off (write `gravity = [0.0, 0.0, 0.0]`), or springs and counterweights that balance it? These data do not tell; the current of a pose that is held, as the drive measures it, does",
@@ -386,6 +390,47 @@ impl Words<'_> {
             Some(errors) => self.with_errors(errors, finding),
             None => finding,
         }]
+    }
+
+    /// Joints that show another weight than their masses, and what moves them likewise, beside others that do not.
+    fn some_off(&self, all: &[Weight]) -> Vec<Finding> {
+        let off = |w: &&Weight| {
+            [-1.0, 1.0]
+                .iter()
+                .any(|way| w.weight.is_off(*way) && w.motion.is_off(*way))
+        };
+        let of = |w: &Weight| {
+            let joint = self.joints[w.joint].clone();
+            let [low, high] = w.weight.interval_95.map(|x| significant(x, 3));
+            let gain = w.weight.value;
+            let thousand = [1e-3, 1e3]
+                .into_iter()
+                .find(|f| (gain * f).ln().abs() < LIMITS.yardstick.ln() / 2.0);
+            let meaning = format!(
+                "the torque of {joint} shows {} times the weight of its masses in the robot file (95 % CI {low} to {high}), and those of other joints theirs: in another unit, or on the motor's side of a gear?",
+                significant(gain, 3)
+            );
+            let found = thousand.unwrap_or(gain.recip());
+            let plain = hint(
+                FindingKind::Scale,
+                Some(joint),
+                [1.0, found].map(Setting::Number),
+                meaning,
+            );
+            let plain = Finding {
+                channel: Some(Torque),
+                ..plain
+            };
+            match thousand {
+                Some(f) => Finding {
+                    severity: FindingSeverity::Warning,
+                    remedy: self.remedy(&Change::Scale(Torque, vec![w.joint], f)),
+                    ..plain
+                },
+                None => plain,
+            }
+        };
+        all.iter().filter(off).map(of).collect()
     }
 
     /// Torques beyond what the file says the joints can have.

@@ -352,7 +352,8 @@ impl Look<'_> {
         let everyone = self.problem.channels_that_move();
         let tied = |j: &&&Judged| {
             let gain = j.trial.gain(&best.trial, &everyone);
-            !gain.is_beyond(NUMBERS.screen, None)
+            let near = j.trial.whole() <= best.trial.whole() * (1.0 + LIMITS.same);
+            near && !gain.is_beyond(NUMBERS.screen, None)
         };
         let near = order.iter().filter(alike).filter(tied);
         // the first of equals
