@@ -1,7 +1,8 @@
 //! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
-//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is, `standstill` whether rows at rest count, and
+//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is, with `repeats` where the
+//! residual comes back with the motion, `standstill` whether rows at rest count, and
 //! `by_speed` how far friction departs from its law. `robust`,
 //! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
 //! several times; `condense` makes of a log what a file of reduced logs holds, one R factor and `scores`; `essential`
@@ -22,6 +23,7 @@ pub mod instruments;
 pub mod jumps;
 pub mod law_start;
 pub mod refine;
+mod repeats;
 pub mod robust;
 pub mod scores;
 pub mod solution;
