@@ -1,12 +1,15 @@
 //! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
-//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is. `robust`,
+//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is, with `repeats` where the
+//! residual comes back with the motion, `standstill` whether rows at rest count, and
+//! `by_speed` how far friction departs from its law. `robust`,
 //! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
 //! several times; `condense` makes of a log what a file of reduced logs holds, one R factor and `scores`; `essential`
 //! and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque channel is at its joint.
 
 pub mod accumulate;
+pub mod by_speed;
 pub mod closed_loop;
 pub mod columns;
 mod condense;
@@ -20,10 +23,12 @@ pub mod instruments;
 pub mod jumps;
 pub mod law_start;
 pub mod refine;
+mod repeats;
 pub mod robust;
 pub mod scores;
 pub mod solution;
 pub mod solve;
+pub mod standstill;
 mod two_pass;
 pub mod verdict;
 
