@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
-use super::estimate::{Estimate, estimates};
+use super::estimate::{SetupEstimate, estimates};
 use super::finding::ChannelKind::Torque;
 use super::hypotheses::{self, oddity};
 use super::physics::{Broken, Driven};
@@ -40,7 +40,7 @@ pub struct Searched {
     /// Joints whose friction drives them, where no mistake explains it.
     pub driven: Vec<Driven>,
     /// A value that is on no list, with the errors as declared and with it.
-    pub estimate: Option<(Estimate, [Vec<f64>; 2])>,
+    pub estimate: Option<(SetupEstimate, [Vec<f64>; 2])>,
     /// Errors with gravity and without, where the torques hold none.
     pub without_gravity: Option<[Vec<f64>; 2]>,
     /// Gain of the measured weight over that of the file's own masses.
@@ -95,7 +95,7 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
     out
 }
 
-type Told = Option<(Estimate, [Vec<f64>; 2])>;
+type Told = Option<(SetupEstimate, [Vec<f64>; 2])>;
 
 struct Look<'a> {
     problem: &'a Problem<'a>,
@@ -140,7 +140,7 @@ impl Look<'_> {
         let few = self.quick(base, None, None);
         let all = hypotheses::all(self.problem);
         let mut list = self.judged(base, all, (few.as_ref(), declared));
-        let mut fitted: Option<(Estimate, Trial)> = None;
+        let mut fitted: Option<(SetupEstimate, Trial)> = None;
         if let (Some(few), Some(whole), true) = (&few, declared, moving.len() > 1) {
             let both = (few, &whole.trial);
             for estimate in estimates(self.problem, base, &doubt, both) {
@@ -306,7 +306,7 @@ impl Look<'_> {
             !own && near(f)
         });
         let absurd: Vec<usize> = (seen.iter().copied())
-            .filter(|j| !(before[*j] <= LIMITS.unexplained))
+            .filter(|j| before[*j].is_nan() || before[*j] > LIMITS.unexplained)
             .collect();
         let repaired = absurd.iter().all(|j| after[*j] <= LIMITS.sound)
             && (!absurd.is_empty() || mended && turned(best) == 0);
