@@ -137,7 +137,6 @@ fn the_filters_friction_curve_of_emps_is_the_published_one() {
 }
 
 #[test]
-#[ignore = "a motor that turns one way: weighed rows leave Coulomb friction and offset large and opposite, 8.2 % where 4.5 was"]
 fn the_bldc_log_is_predicted_where_its_compensation_is_off() {
     let Some(log) = shared("bldc-cogging/speed_test1.txt") else {
         return;

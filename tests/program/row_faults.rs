@@ -478,7 +478,12 @@ fn nanoseconds_since_1970_in_t_are_no_seconds() {
 }
 
 /// Errors of a model's joints on a log [%], and what was told.
-fn unseen(folder: &Path, robot: &str, fitted: &[String], log: &str) -> Option<(Vec<f64>, String)> {
+fn unseen(
+    folder: &Path,
+    robot: &str,
+    fitted: &[String],
+    (log, kind): (&str, &str),
+) -> Option<(Vec<f64>, String)> {
     let robot = Path::new(cft_ident_support::ROOT)
         .join("configs")
         .join(robot);
@@ -495,7 +500,7 @@ fn unseen(folder: &Path, robot: &str, fitted: &[String], log: &str) -> Option<(V
         &["validate", &path(log)?, "-m", "m.toml"].map(str::to_owned),
     );
     let joints = found["joints"].as_array().unwrap().iter();
-    let errors = joints.map(|j| 100.0 * j["relative_error"].as_f64().unwrap());
+    let errors = joints.map(|j| 100.0 * j[kind].as_f64().unwrap());
     let told = [fit["warnings"].to_string(), found["warnings"].to_string()].concat();
     Some((errors.collect(), told))
 }
@@ -504,7 +509,12 @@ fn unseen(folder: &Path, robot: &str, fitted: &[String], log: &str) -> Option<(V
 fn smooth_turning_points_of_a_heavy_arm_are_no_spikes() {
     let folder = tempfile::tempdir().unwrap();
     let fitted = ["kr300/A.csv", "kr300/B.csv"].map(str::to_owned);
-    let Some((errors, told)) = unseen(folder.path(), "kr300.toml", &fitted, "kr300/C.csv") else {
+    let Some((errors, told)) = unseen(
+        folder.path(),
+        "kr300.toml",
+        &fitted,
+        ("kr300/C.csv", "relative_error"),
+    ) else {
         return;
     };
     for (error, most) in errors.iter().zip([20.0, 18.0, 9.5, 32.0, 18.0, 21.0]) {
@@ -517,7 +527,6 @@ fn smooth_turning_points_of_a_heavy_arm_are_no_spikes() {
 }
 
 #[test]
-#[ignore = "q2 has 22.1 % where 21.5 is asked, since samples at a standstill weigh nothing"]
 fn the_free_swings_of_a_pendulum_are_data_and_a_dead_channel_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let logs = [
@@ -528,11 +537,12 @@ fn the_free_swings_of_a_pendulum_are_data_and_a_dead_channel_is_not() {
         folder.path(),
         "pendulum.toml",
         &fitted,
-        "pendulum/061157.csv",
+        ("pendulum/061157.csv", "relative_error_moving"),
     ) else {
         return;
     };
-    assert!(errors[0] < 12.0 && errors[1] < 21.5, "{errors:?}");
+    // samples at the turning points are not fitted; a fit of all samples has 11.7 and 20.9 % of these
+    assert!(errors[0] < 11.5 && errors[1] < 19.5, "{errors:?}");
     assert_eq!(
         told.matches("torques of 0 that are data").count(),
         4,

@@ -169,7 +169,12 @@ fn right_set_ups_of_measured_machines_say_nothing() {
             folder.path(),
             &["inspect", log.to_str().unwrap(), "-r", robot],
         );
-        assert_eq!(found["setup"], Value::Array(Vec::new()), "{log:?}");
+        let told = found["setup"].as_array().unwrap();
+        // the wrist of the TX40 is coupled, which is no mistake of the list: these data cannot tell, and say so
+        let open = |t: &Value| t["kind"] == "undecided" && t["severity"] == "hint";
+        let coupled = robot.contains("tx40");
+        assert!(told.iter().all(|t| coupled && open(t)), "{log:?} {told:?}");
+        assert!(!coupled || !told.is_empty(), "{log:?}");
     }
 }
 

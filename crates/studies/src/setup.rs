@@ -56,9 +56,11 @@ enum Mistake {
     WallMount,
     GravityTakenOff,
     VelocityAsPosition,
+    /// A factor that nobody writes: an estimate.
+    AnyFactor,
 }
 
-const MISTAKES: [(Mistake, &str); 16] = [
+const MISTAKES: [(Mistake, &str); 17] = [
     (Mistake::TorqueSign, "sign of a torque"),
     (Mistake::PositionSign, "sign of a position"),
     (Mistake::BothSigns, "both signs of a joint"),
@@ -75,12 +77,18 @@ const MISTAKES: [(Mistake, &str); 16] = [
     (Mistake::WallMount, "a base on the wall"),
     (Mistake::GravityTakenOff, "gravity taken off by the driver"),
     (Mistake::VelocityAsPosition, "a velocity column as position"),
+    (Mistake::AnyFactor, "a torque by any factor"),
 ];
 
-/// Gear ratios that are whole or half numbers.
-const RATIOS: [f64; 12] = [
-    1.5, 2.0, 3.0, 5.0, 7.5, 10.0, 25.0, 50.0, 80.0, 100.0, 121.0, 160.0,
-];
+/// Gear ratios: as many below ten as above, up to 200.
+fn ratio(chance: &mut Chance) -> f64 {
+    chance.ratio(1.5, 200.0)
+}
+
+/// One that is a whole or half number.
+fn round_ratio(chance: &mut Chance) -> f64 {
+    (2.0 * ratio(chance)).round() / 2.0
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Case {
@@ -135,7 +143,7 @@ pub fn cells() -> Vec<Cell> {
     right("friction wrists".into(), Right::FrictionWrists);
     right("zero rows".into(), Right::ZeroRows);
     for (k, member) in planted::members().iter().enumerate() {
-        for size in [6.0, 20.0] {
+        for size in [2.0, 6.0, 20.0] {
             right(member.cell(size), Right::Effect(k, size));
         }
     }
@@ -307,7 +315,8 @@ impl Mistake {
             | Self::TorquesExchanged
             | Self::MilliTorque
             | Self::KiloTorque
-            | Self::TorqueOfMotor => Some("torque"),
+            | Self::TorqueOfMotor
+            | Self::AnyFactor => Some("torque"),
             Self::PositionSign
             | Self::PositionsExchanged
             | Self::Degrees
@@ -364,12 +373,17 @@ impl Mistake {
                 return scaled(1e-3);
             }
             Self::TorqueOfMotor => {
-                let k = 1.0 / chance.pick(&RATIOS);
+                let k = 1.0 / round_ratio(chance);
+                scale(&mut run.tau, k);
+                return scaled(k);
+            }
+            Self::AnyFactor => {
+                let k = 1.0 / ratio(chance);
                 scale(&mut run.tau, k);
                 return scaled(k);
             }
             Self::PositionOfMotor => {
-                let k = chance.pick(&RATIOS);
+                let k = round_ratio(chance);
                 scale(&mut run.q, k);
                 return scaled(k);
             }
@@ -383,7 +397,7 @@ impl Mistake {
                 for (q, v) in run.q.iter_mut().zip(&run.speed) {
                     q[i] = v[i];
                 }
-                return (&[], vec![i], None);
+                return (&["order"], vec![i], None);
             }
         }
         match self {
@@ -394,54 +408,75 @@ impl Mistake {
 }
 
 impl Expected {
-    /// "named", "misnamed" or "silent"; a warning that names it counts.
+    /// "named" by a warning or a refusal; "told" as an estimate whose interval holds it or as what these data cannot tell;
+    /// "misnamed" or "silent".
     fn judged(&self, answer: &Answer) -> &'static str {
         let found = answer.list("setup");
+        let of_joint = |s: &Value| {
+            let is = |j: &String| s["joint"] == **j || s["with"] == **j;
+            self.joints.is_empty() || self.joints.iter().any(is)
+        };
         let right = |s: &Value| {
-            let kind = self.kinds.is_empty() || self.kinds.iter().any(|k| s["kind"] == *k);
-            let joint = self.joints.is_empty()
-                || self
-                    .joints
-                    .iter()
-                    .any(|j| s["joint"] == **j || s["with"] == **j);
+            let kind = self.kinds.iter().any(|k| s["kind"] == *k);
             let factor = self.factor.is_none_or(|k| {
                 // the document gives what the column is to be taken by, or its reciprocal
                 s["found"].as_f64().is_none_or(|f| {
-                    let off = |r: f64| (r - 1.0).abs() < 0.05;
+                    let within = match s["found_std"].as_f64() {
+                        Some(std) => 1.96 * std / f.abs(),
+                        None => 0.05,
+                    };
+                    let off = |r: f64| (r - 1.0).abs() < within;
                     off(f * k) || off(f / k)
                 })
             });
             let channel = self
                 .channel
                 .is_none_or(|c| s["channel"] == c || s["channel"] == "both");
-            kind && joint && channel && factor
+            kind && of_joint(s) && channel && factor
         };
-        let told = |s: &&Value| s["severity"] != "hint";
-        if found.iter().filter(told).any(right) {
+        let sure = |s: &&Value| s["severity"] != "hint";
+        let open = |s: &Value| s["kind"] == "undecided" && of_joint(s);
+        if found.iter().filter(sure).any(right) {
             "named"
-        } else if found.iter().any(|s| told(&s)) {
+        } else if found.iter().any(|s| sure(&s)) {
             "misnamed"
+        } else if found.iter().any(|s| right(s) || open(s)) {
+            "told"
         } else {
             "silent"
         }
     }
 }
 
+/// Whether the last words of a refusal are about the robot file.
+fn said_of_setup(row: &Value) -> bool {
+    let said = row["said"].as_str().unwrap_or_default();
+    ["as-declared", "robot file"]
+        .iter()
+        .any(|word| said.contains(word))
+}
+
 pub fn table(rows: &Rows) -> String {
     let mut text = String::from(
-        "| case | build | logs | refused | warned | named | misnamed | silent |\n| :-- | :-- | --: | --: | --: | --: | --: | --: |\n",
+        "| case | build | logs | refused | warned | named | told | misnamed | silent |\n| :-- | :-- | --: | --: | --: | --: | --: | --: | --: |\n",
     );
     let mut heads = Vec::new();
     for tool in rows.tools() {
         let mut right = [0, 0, 0];
-        let mut wrong = [0, 0, 0];
+        let mut wrong = [0, 0, 0, 0];
         for cell in cells() {
             let own: Vec<&Value> = rows.of(&tool, cell.name()).collect();
             if own.is_empty() {
                 continue;
             }
             let count = |of: &dyn Fn(&Value) -> bool| own.iter().filter(|r| of(r)).count();
-            let refused = count(&|r| r["exit"] == 3);
+            // a log may be refused for another reason, and then has no such entry
+            let of_setup = |r: &Value| {
+                let all = r["setup"].as_array().map_or(&[][..], Vec::as_slice);
+                let right = matches!(cell.case, Case::Right(_));
+                !right || all.is_empty() && said_of_setup(r) || all.iter().any(|s| s[5] == "error")
+            };
+            let refused = count(&|r| r["exit"] == 3 && of_setup(r));
             if matches!(cell.case, Case::Right(_)) {
                 let spoke = |r: &Value| {
                     let all = r["setup"].as_array().map_or(&[][..], Vec::as_slice);
@@ -450,16 +485,19 @@ pub fn table(rows: &Rows) -> String {
                 let warned = count(&spoke);
                 right = [right[0] + refused, right[1] + warned, right[2] + own.len()];
                 text += &format!(
-                    "| {} | {tool} | {} | {refused} | {warned} | | | |\n",
+                    "| {} | {tool} | {} | {refused} | {warned} | | | | |\n",
                     cell.name,
                     own.len()
                 );
             } else {
-                let [named, misnamed, silent] =
-                    ["named", "misnamed", "silent"].map(|a| count(&|r| r["answer"] == a));
-                wrong = [wrong[0] + named, wrong[1] + misnamed, wrong[2] + own.len()];
+                let [named, told, misnamed, silent] =
+                    ["named", "told", "misnamed", "silent"].map(|a| count(&|r| r["answer"] == a));
+                wrong[0] += named;
+                wrong[1] += told;
+                wrong[2] += misnamed;
+                wrong[3] += own.len();
                 text += &format!(
-                    "| {} | {tool} | {} | {refused} | | {named} | {misnamed} | {silent} |\n",
+                    "| {} | {tool} | {} | {refused} | | {named} | {told} | {misnamed} | {silent} |\n",
                     cell.name,
                     own.len()
                 );
@@ -470,14 +508,15 @@ pub fn table(rows: &Rows) -> String {
             format!("{hits} of {of} ({:.1}..{:.1} %)", 100.0 * low, 100.0 * high)
         };
         heads.push(format!(
-            "- {tool}: right files refused {}, warned {} (aim: none, and below {:.0} %); mistakes named {} (aim {:.0} %), misnamed {} \
-             (aim: below {:.0} %).",
+            "- {tool}: right files refused {}, warned {} (aim: none, and below {:.0} %); mistakes named {} (aim {:.0} %), told as an \
+             estimate or as undecidable {}, misnamed {} (aim: below {:.0} %).",
             said(right[0], right[2]),
             said(right[1], right[2]),
             100.0 * LIMITS.warned_on_right,
-            said(wrong[0], wrong[2]),
+            said(wrong[0], wrong[3]),
             100.0 * LIMITS.mistakes_named,
-            said(wrong[1], wrong[2]),
+            said(wrong[1], wrong[3]),
+            said(wrong[2], wrong[3]),
             100.0 * LIMITS.misnamed,
         ));
     }

@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+use super::by_speed::BySpeed;
 use super::columns::{GRADIENT, RegressorColumns};
 use super::scores::Scores;
 use crate::math::rfactor::RFactor;
@@ -49,6 +50,7 @@ pub struct Accumulator {
     moving: Vec<JointRows>,
     /// Those in which it rests.
     resting: Vec<(JointRows, RFactor)>,
+    by_speed: Vec<BySpeed>,
     rows: u64,
 }
 
@@ -85,6 +87,7 @@ impl Accumulator {
         Accumulator {
             moving: vec![JointRows::default(); columns.joints],
             resting,
+            by_speed: vec![BySpeed::default(); columns.joints],
             columns,
             open,
             open_rows: 0,
@@ -127,6 +130,7 @@ impl Accumulator {
             match self.columns.rests(channels, j) {
                 false => {
                     open.fold(&channels[at..at + c]);
+                    self.by_speed[j].add(&self.columns, j, &channels[at..at + c]);
                     self.moving[j].add(channels[torques + j]);
                 }
                 true => {
@@ -184,6 +188,7 @@ impl Accumulator {
             moving: self.moving,
             resting,
             at_rest: at_rest.iter().map(RFactor::r).collect(),
+            by_speed: self.by_speed,
             rows: self.rows,
         }
     }
@@ -261,6 +266,8 @@ pub struct BlockFactors {
     pub resting: Vec<JointRows>,
     /// Upper triangle of the rows in which each joint rests.
     pub at_rest: Vec<DMatrix<f64>>,
+    /// Mean rows of each joint by its speed; none of reduced logs.
+    pub by_speed: Vec<BySpeed>,
     /// Instants.
     pub rows: u64,
 }
@@ -276,6 +283,9 @@ impl BlockFactors {
             }
             b
         }));
+        for (own, other) in self.by_speed.iter_mut().zip(&other.by_speed) {
+            own.merge(other);
+        }
         for (j, r) in other.at_rest.iter().enumerate() {
             self.moving[j].merge(other.moving[j]);
             if other.resting[j].count > 0 {
@@ -342,6 +352,7 @@ impl BlockFactors {
             columns,
             moving: self.moving.clone(),
             resting: self.resting.clone(),
+            by_speed: Vec::new(),
             rows: self.rows,
         }
     }
@@ -355,6 +366,7 @@ impl BlockFactors {
             moving: self.moving.clone(),
             resting: self.resting.clone(),
             at_rest: self.at_rest.clone(),
+            by_speed: self.by_speed.clone(),
             rows: self.rows,
         }
     }
@@ -373,6 +385,7 @@ impl BlockFactors {
             moving: self.moving.clone(),
             resting: self.resting.clone(),
             at_rest: self.at_rest.clone(),
+            by_speed: self.by_speed.clone(),
             rows: self.rows,
         }
     }

@@ -1,17 +1,20 @@
 //! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
-//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is. `robust`,
+//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is, `standstill` whether rows at rest count, and
+//! `departure` how far friction departs from its law (from sums `by_speed`). `robust`,
 //! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
 //! several times; `condense` makes of a log what a file of reduced logs holds, one R factor and `scores`; `essential`
 //! and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque channel is at its joint.
 
 pub mod accumulate;
+pub mod by_speed;
 pub mod closed_loop;
 pub mod columns;
 mod condense;
 mod covariance;
 pub use covariance::bandwidth;
+pub mod departure;
 pub mod encoder;
 pub mod essential;
 pub mod feasible;
@@ -24,6 +27,7 @@ pub mod robust;
 pub mod scores;
 pub mod solution;
 pub mod solve;
+pub mod standstill;
 mod two_pass;
 pub mod verdict;
 

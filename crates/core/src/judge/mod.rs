@@ -8,7 +8,7 @@
 //!
 //! Nothing here knows an effect or a robot. Rows come as columns of a linear problem; a *term* is an unknown
 //! with the columns that it has in the rows of one joint or of several. Another hypothesis is other columns for
-//! the same blocks: [`compare`] sets the errors of two against each other.
+//! the same blocks: [`compare`] sets the errors of two against each other, [`agreement_on_share`] asks the parts.
 //!
 //! | file | does |
 //! |---|---|
@@ -29,7 +29,7 @@ mod tests;
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
 pub use left_out::{BlocksLeftOut, ErrorGain, compare};
-pub use parts::{Agreement, agreement};
+pub use parts::{Agreement, agreement, agreement_on_share};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 
 /// The numbers that decide.

@@ -43,6 +43,30 @@ pub fn agreement(
         }
         found.push((s, r));
     }
+    judged(found, numbers)
+}
+
+/// Whether the parts agree on the share of the squared error that another hypothesis takes off: errors
+/// `[block][joint]` of blocks that neither was fitted to, each joint in its weight.
+pub fn agreement_on_share(
+    (before, after): (&[Vec<f64>], &[Vec<f64>]),
+    weights: &[f64],
+    blocks: &Blocks,
+    numbers: &Numbers,
+) -> Agreement {
+    let sum = |errors: &[f64]| errors.iter().zip(weights).map(|(e, w)| e * w).sum::<f64>();
+    let mut found = vec![(DMatrix::zeros(1, 1), DVector::zeros(1)); blocks.parts];
+    for ((before, after), block) in before.iter().zip(after).zip(&blocks.list) {
+        let (s, r) = &mut found[block.part];
+        s[(0, 0)] += sum(before);
+        r[0] += sum(before) - sum(after);
+    }
+    judged(found, numbers)
+}
+
+/// What parts say together that each give the information on an amplitude and its pull.
+fn judged(mut found: Vec<(DMatrix<f64>, DVector<f64>)>, numbers: &Numbers) -> Agreement {
+    let k = found.first().map_or(0, |(_, r)| r.len());
     let total = found.iter().fold(DMatrix::zeros(k, k), |t, (s, _)| t + s);
     // what says nothing of the amplitude is no part that agrees
     let mean = total.trace() / found.len().max(1) as f64;

@@ -137,7 +137,8 @@ pub fn diagnose(
     check_candidates(&settings.candidates, machine, (name, file))?;
     let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
     let mut judged = file.parameters.iter().filter(judged).peekable();
-    if judged.peek().is_some() && !judged.any(|p| p.verdict == Some(Verdict::Identified)) {
+    let determined = |p: &Parameter| matches!(p.verdict, Some(Verdict::Identified | Verdict::Weak));
+    if judged.peek().is_some() && !judged.any(determined) {
         return Err(IdentifyError::NothingIdentified {
             model: name.to_owned(),
         });

@@ -11,6 +11,7 @@ use super::passes::{Passes, PositionFilter, SimulatedLoop};
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::add_processing;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
+use cft_ident_core::inertia::departure;
 use cft_ident_core::inertia::encoder::{GRIDS, add_scatter};
 use cft_ident_core::inertia::feasible::nearest;
 use cft_ident_core::inertia::instruments::{self, Instrumental};
@@ -19,6 +20,7 @@ use cft_ident_core::inertia::refine::{self, RefinedFit};
 use cft_ident_core::inertia::robust::{self, Robust, Weigher};
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::inertia::solve::{self, Fit, fit};
+use cft_ident_core::inertia::standstill;
 use cft_ident_core::math::descent::Ending;
 use cft_ident_files::config::campaign::EstimatorKind;
 
@@ -168,12 +170,19 @@ pub fn estimate(
     let (mut fit, sums, solver) = match estimator {
         EstimatorKind::Oe => refined(passes, &columns, law, told)?,
         EstimatorKind::Wls if law => refined(passes, &columns, law, told)?,
-        EstimatorKind::Irls => robust_regression(passes, &columns, told)?,
-        EstimatorKind::Iv => instrumental(passes, &columns, told)?,
+        EstimatorKind::Irls => {
+            first_reading(passes, &columns)?;
+            robust_regression(passes, &columns, told)?
+        }
+        EstimatorKind::Iv => {
+            first_reading(passes, &columns)?;
+            instrumental(passes, &columns, told)?
+        }
         EstimatorKind::Ols => linear(passes, &columns, solve::Weighting::Ols)?,
         EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,
     };
     widen(passes, &columns, &solver, &mut fit)?;
+    departure::widen_by_departure(&sums, &mut fit);
     let (columns, shift) = match &solver {
         Solver::Refined(refined) => (refined.columns.with_free_friction(), refined.shift()),
         _ => (columns, DVector::zeros(fit.theta.len())),
@@ -234,9 +243,34 @@ fn linear(
     columns: &RegressorColumns,
     estimator: solve::Weighting,
 ) -> Result<Found, IdentifyError> {
-    let sums = passes.read(PositionFilter::Declared, columns, None)?;
+    let sums = first_reading(passes, columns)?;
     let found = fit(&sums, estimator)?;
     Ok((found, sums.in_one_block(), Solver::Linear(estimator)))
+}
+
+/// Rows as the robot file says, with samples at standstill where they count.
+fn first_reading(
+    passes: &mut Passes,
+    columns: &RegressorColumns,
+) -> Result<BlockFactors, IdentifyError> {
+    let sums = passes.read(PositionFilter::Declared, columns, None)?;
+    if passes.plain {
+        return Ok(sums);
+    }
+    let without = fit(&sums, solve::Weighting::Wls)?;
+    let open = standstill::open_joints(columns, &without);
+    if open.is_empty() || !passes.count_rests(&open) {
+        return Ok(sums);
+    }
+    let all = passes.read(PositionFilter::Declared, columns, None)?;
+    let with = fit(&all, solve::Weighting::Wls)?;
+    let counted = standstill::counted(columns, open.clone(), [&without, &with]);
+    passes.count_rests(&counted);
+    match counted.len() {
+        0 => Ok(sums),
+        n if n == open.len() => Ok(all),
+        _ => passes.read(PositionFilter::Declared, columns, None),
+    }
 }
 
 /// The slopes of the friction law with all else.

@@ -60,6 +60,8 @@ pub struct Passes<'a> {
     pub(super) plain: bool,
     /// What each log calls for by itself; empty where the machine and the columns say it.
     own: Vec<OwnSettings>,
+    /// Joints whose samples at standstill count.
+    counted: Vec<usize>,
     /// Logs in the order of their checksums, by the first reading: sums do not depend on the order in which
     /// logs are given.
     order: Vec<usize>,
@@ -79,6 +81,7 @@ impl<'a> Passes<'a> {
             steps: Vec::new(),
             plain: false,
             own: Vec::new(),
+            counted: Vec::new(),
             order: Vec::new(),
         }
     }
@@ -89,11 +92,25 @@ impl<'a> Passes<'a> {
         Passes { own, ..self }
     }
 
+    /// Samples at standstill of these joints count from here on; not where logs were reduced without them.
+    pub(super) fn count_rests(&mut self, joints: &[usize]) -> bool {
+        let whole = !self.logs.iter().any(|log| matches!(log, Log::Reduced(_)));
+        if whole {
+            self.counted = joints.to_vec();
+        }
+        whole
+    }
+
     /// The columns of a log's rows.
     fn columns_of(&self, columns: &RegressorColumns, log: usize) -> RegressorColumns {
         let mut columns = columns.clone();
         if let Some(own) = self.own.get(log) {
             columns.rest_at(own.rest_speed.clone());
+        }
+        for joint in &self.counted {
+            if let Some(speed) = columns.rest_speed.get_mut(*joint) {
+                *speed = -1.0;
+            }
         }
         columns
     }

@@ -14,8 +14,9 @@ use super::error::IdentifyError;
 use super::gains;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::setup_file::Declared;
+use super::setup_words;
 use super::unknowns::columns;
-use super::{setup_file, setup_words};
 use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::correction::Edit;
 
@@ -142,7 +143,7 @@ fn sampled(
                     *x = sign(*x);
                 }
             },
-            &mut |row| thinner.add(index, row.filtered),
+            &mut |row| thinner.add(index, row.t, row.filtered),
         );
         run.map_err(|error| IdentifyError::of_run(&log.name(), error))?;
     }
@@ -150,18 +151,18 @@ fn sampled(
 }
 
 fn told(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
-    let report = setup_words::report(machine, problem, searched);
-    let motors = problem.channels.drive == Drive::Motors;
-    let Some(by) = &searched.correction else {
-        return CheckedSetup {
-            report,
-            ..CheckedSetup::default()
-        };
-    };
+    let declared = Declared::new(&machine.file, problem.channels.drive == Drive::Motors);
+    let edits = searched.correction.as_ref().map(|by| declared.edits(by));
+    let edits = edits.unwrap_or_default();
+    // what no line mends is refused and not put right
+    let by = searched
+        .correction
+        .as_ref()
+        .filter(|by| by.begins.iter().all(Option::is_none));
     CheckedSetup {
-        report,
-        corrected: Some(setup_file::corrected(&machine.file, by, motors)),
-        edits: setup_file::edits(&machine.file, by, motors),
+        report: setup_words::report(machine, problem, searched),
+        corrected: by.map(|by| declared.corrected(&edits, by)),
+        edits,
     }
 }
 

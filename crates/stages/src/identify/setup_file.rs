@@ -1,177 +1,203 @@
 //! A robot file under a correction of its set-up, and the lines by which it differs.
 
+use std::collections::BTreeMap;
+
 use crate::setup::Correction;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::COORDINATES;
 use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::correction::Edit;
-use cft_ident_logs::log::{ActuatorChannels, ColumnName, JointChannels, PositionUnit};
+use cft_ident_logs::log::PositionUnit;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use toml::{Table, Value};
 
-/// What the file says of a channel.
-pub(super) struct Declared {
-    pub torque_sign: f64,
-    pub torque_scale: f64,
-    pub position_sign: f64,
-    pub position_scale: f64,
-    pub offset: f64,
+/// The keys of a channel in `[log.joint]`, and of a motor in `[log.actuator]`.
+struct Keys {
+    table: &'static str,
+    torque: &'static str,
+    zero: &'static str,
 }
 
-impl Declared {
-    pub fn of(file: &RobotFile, name: &str, motors: bool) -> Self {
-        if motors {
-            let plain = ActuatorChannels::default();
-            let c = file.log.actuator.get(name).unwrap_or(&plain);
-            return Self {
-                torque_sign: c.volts_sign.unwrap_or(1.0),
-                torque_scale: c.volts_scale.unwrap_or(1.0),
-                position_sign: c.position_sign.unwrap_or(1.0),
-                position_scale: c.position_scale.unwrap_or(1.0),
-                offset: c.home.unwrap_or(0.0),
-            };
-        }
-        let plain = JointChannels::default();
-        let c = file.log.joint.get(name).unwrap_or(&plain);
-        Self {
-            torque_sign: c.torque_sign.unwrap_or(1.0),
-            torque_scale: c.torque_scale.unwrap_or(1.0),
-            position_sign: c.position_sign.unwrap_or(1.0),
-            position_scale: c.position_scale.unwrap_or(1.0),
-            offset: c.position_offset.unwrap_or(0.0),
+const JOINT: Keys = Keys {
+    table: "joint",
+    torque: "torque",
+    zero: "position_offset",
+};
+const MOTOR: Keys = Keys {
+    table: "actuator",
+    torque: "volts",
+    zero: "home",
+};
+
+/// The channels of a file as tables.
+pub(super) struct Declared<'a> {
+    file: &'a RobotFile,
+    motors: bool,
+}
+
+impl<'a> Declared<'a> {
+    pub fn new(file: &'a RobotFile, motors: bool) -> Self {
+        Self { file, motors }
+    }
+
+    pub fn names(&self) -> Vec<String> {
+        match self.motors {
+            true => COORDINATES.map(str::to_owned).to_vec(),
+            false => self.file.joint_names(),
         }
     }
-}
 
-/// The robot file under a correction.
-pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> RobotFile {
-    let mut out = file.clone();
-    out.robot.gravity = by.gravity.or(out.robot.gravity);
-    let names = match motors {
-        true => COORDINATES.map(str::to_owned).to_vec(),
-        false => file.joint_names(),
-    };
-    let robot = motors.then(|| file.robot());
-    let coordinate = |j: usize| robot.as_ref()?.transmission().coordinate_kind(j);
-    for (j, name) in names.iter().enumerate() {
-        let (p, t) = (by.position_from[j], by.torque_from[j]);
-        let (pf, tf) = (by.position_factor[j], by.torque_factor[j]);
-        if p == j && t == j && pf == 1.0 && tf == 1.0 && by.zero[j] == 0.0 {
-            continue;
+    fn keys(&self) -> Keys {
+        if self.motors { MOTOR } else { JOINT }
+    }
+
+    fn table(&self, name: &str) -> Table {
+        match self.motors {
+            true => keys_of(self.file.log.actuator.get(name)),
+            false => keys_of(self.file.log.joint.get(name)),
         }
-        let declared = Declared::of(file, name, motors);
-        if motors {
-            let of = |k: usize| {
-                file.log
-                    .actuator
-                    .get(&names[k])
-                    .cloned()
-                    .unwrap_or_default()
+    }
+
+    /// A number of a channel: `sign`, `scale` or `offset` of its torque or position.
+    pub fn number(&self, name: &str, torque: bool, of: &str) -> f64 {
+        let keys = self.keys();
+        let (key, plain) = match of {
+            "offset" => (keys.zero.to_owned(), 0.0),
+            of if torque => (format!("{}_{of}", keys.torque), 1.0),
+            of => (format!("position_{of}"), 1.0),
+        };
+        let value = self.table(name).remove(&key);
+        value.and_then(|value| value.as_float()).unwrap_or(plain)
+    }
+
+    fn kind(&self, j: usize) -> JointKind {
+        if !self.motors {
+            return self.file.joint_kind(j);
+        }
+        let kind = self.file.robot().transmission().coordinate_kind(j);
+        kind.unwrap_or(JointKind::Prismatic)
+    }
+
+    /// The lines that a correction asks for.
+    pub fn edits(&self, by: &Correction) -> Vec<Edit> {
+        let mut out = Vec::new();
+        if let Some(g) = by.gravity.filter(|g| Some(*g) != self.file.robot.gravity) {
+            out.push(Edit::new(&["robot", "gravity"], g.to_vec()));
+        }
+        let (names, keys) = (self.names(), self.keys());
+        for (j, name) in names.iter().enumerate() {
+            let mut set = |key: &str, value: Value| {
+                out.push(Edit::new(&["log", keys.table, name, key], value));
             };
-            let c = out.log.actuator.entry(name.clone()).or_default();
+            let (p, t) = (by.position_from[j], by.torque_from[j]);
+            let (pf, tf) = (by.position_factor[j], by.torque_factor[j]);
             if p != j {
-                c.position = of(p).position.or(Some(ColumnName(names[p].clone())));
-            }
-            if t != j {
-                c.volts = of(t).volts.or(Some(ColumnName(format!("u_{}", t + 1))));
-            }
-            if pf < 0.0 {
-                c.position_sign = Some(-declared.position_sign);
-            }
-            if pf.abs() != 1.0 {
-                let kind = coordinate(j).unwrap_or(JointKind::Prismatic);
-                match other_unit(c.position_unit, kind, pf.abs()) {
-                    Some(unit) => c.position_unit = Some(unit),
-                    None => c.position_scale = Some(declared.position_scale * pf.abs()),
+                let plain = match self.motors {
+                    true => names[p].clone(),
+                    false => format!("q_{}", names[p]),
+                };
+                let mut from = self.table(&names[p]);
+                set("position", from.remove("position").unwrap_or(plain.into()));
+                for key in ["velocity", "reference"] {
+                    if let Some(column) = from.remove(key) {
+                        set(key, column);
+                    }
                 }
             }
-            if tf < 0.0 {
-                c.volts_sign = Some(-declared.torque_sign);
+            if t != j {
+                let plain = match self.motors {
+                    true => format!("u_{}", t + 1),
+                    false => format!("tau_{}", names[t]),
+                };
+                let column = self.table(&names[t]).remove(keys.torque);
+                set(keys.torque, column.unwrap_or(plain.into()));
             }
-            if tf.abs() != 1.0 {
-                c.volts_scale = Some(declared.torque_scale * tf.abs());
+            if p != j && p == t && !self.motors {
+                let own = self.table(&names[p]).remove("name");
+                set("name", own.unwrap_or_else(|| names[p].clone().into()));
+            }
+            for (torque, factor) in [(false, pf), (true, tf)] {
+                let channel = if torque { keys.torque } else { "position" };
+                if factor < 0.0 {
+                    let sign = -self.number(name, torque, "sign");
+                    set(&format!("{channel}_sign"), sign.into());
+                }
+                if factor.abs() == 1.0 {
+                    continue;
+                }
+                match self.other_unit(j, factor.abs()).filter(|_| !torque) {
+                    Some(unit) => set("position_unit", unit.label().into()),
+                    None => {
+                        let scale = self.number(name, torque, "scale") * factor.abs();
+                        set(&format!("{channel}_scale"), scale.into());
+                    }
+                }
             }
             if by.zero[j] != 0.0 {
-                c.home = Some(declared.offset + by.zero[j]);
-            }
-            continue;
-        }
-        let of = |k: usize| file.log.joint.get(&names[k]).cloned().unwrap_or_default();
-        let column = |k: usize, prefix: &str| Some(ColumnName(format!("{prefix}_{}", names[k])));
-        let c = out.log.joint.entry(name.clone()).or_default();
-        if p != j {
-            c.position = of(p).position.or(column(p, "q"));
-            // one that the file does not name is optional, and the log may have none
-            c.velocity = of(p).velocity;
-            c.reference = of(p).reference;
-        }
-        if t != j {
-            c.torque = of(t).torque.or(column(t, "tau"));
-        }
-        if p != j && p == t {
-            c.name = of(p).name.or(Some(names[p].clone()));
-        }
-        if pf < 0.0 {
-            c.position_sign = Some(-declared.position_sign);
-        }
-        if pf.abs() != 1.0 {
-            match other_unit(c.position_unit, file.joint_kind(j), pf.abs()) {
-                Some(unit) => c.position_unit = Some(unit),
-                None => c.position_scale = Some(declared.position_scale * pf.abs()),
+                let offset = self.number(name, false, "offset") + by.zero[j];
+                set(keys.zero, offset.into());
             }
         }
-        if by.zero[j] != 0.0 {
-            c.position_offset = Some(declared.offset + by.zero[j]);
-        }
-        if tf < 0.0 {
-            c.torque_sign = Some(-declared.torque_sign);
-        }
-        if tf.abs() != 1.0 {
-            c.torque_scale = Some(declared.torque_scale * tf.abs());
-        }
+        out
     }
-    out
+
+    /// The unit that a position is in, where a factor is that of units.
+    fn other_unit(&self, j: usize, factor: f64) -> Option<PositionUnit> {
+        use PositionUnit::{Degree, Metre, Millimetre, Radian, Turn};
+        let length = self.kind(j) == JointKind::Prismatic;
+        let all = if length {
+            &[Metre, Millimetre][..]
+        } else {
+            &[Radian, Degree, Turn]
+        };
+        let mut table = self.table(&self.names()[j]);
+        let now = table
+            .remove("position_unit")
+            .map(|unit| unit.try_into().ok());
+        let now = now.unwrap_or(Some(all[0]))?;
+        let is = |unit: &&PositionUnit| (now.in_si() * factor / unit.in_si() - 1.0).abs() < 1e-9;
+        all.iter().filter(|_| all.contains(&now)).find(is).copied()
+    }
+
+    /// The robot file with these lines.
+    pub fn corrected(&self, edits: &[Edit], by: &Correction) -> RobotFile {
+        let mut out = self.file.clone();
+        out.robot.gravity = by.gravity.or(out.robot.gravity);
+        for edit in edits.iter().filter(|edit| edit.path.len() == 4) {
+            match self.motors {
+                true => set(&mut out.log.actuator, edit),
+                false => set(&mut out.log.joint, edit),
+            }
+        }
+        out
+    }
 }
 
-/// The unit that a position is in, where a factor is that of units.
-fn other_unit(now: Option<PositionUnit>, kind: JointKind, factor: f64) -> Option<PositionUnit> {
-    let near = |x: f64| (factor / x - 1.0).abs() < 1e-9;
-    let si = match kind {
-        JointKind::Revolute => PositionUnit::Radian,
-        JointKind::Prismatic => PositionUnit::Metre,
-    };
-    match now.unwrap_or(si) {
-        PositionUnit::Radian if near(1.0_f64.to_radians()) => Some(PositionUnit::Degree),
-        PositionUnit::Degree if near(1.0_f64.to_degrees()) => Some(PositionUnit::Radian),
-        PositionUnit::Metre if near(1e-3) => Some(PositionUnit::Millimetre),
-        PositionUnit::Millimetre if near(1e3) => Some(PositionUnit::Metre),
-        _ => None,
+fn set<T: Serialize + DeserializeOwned>(of: &mut BTreeMap<String, T>, edit: &Edit) {
+    let (name, key) = (&edit.path[2], &edit.path[3]);
+    let mut table = keys_of(of.get(name));
+    table.insert(key.clone(), edit.value.clone());
+    if let Ok(channels) = table.try_into() {
+        of.insert(name.clone(), channels);
     }
 }
 
-/// The keys by which the corrected file differs from the given one.
-pub(super) fn edits(file: &RobotFile, by: &Correction, motors: bool) -> Vec<Edit> {
-    let new = corrected(file, by, motors);
-    let mut out = Vec::new();
-    if let Some(g) = new.robot.gravity.filter(|g| Some(*g) != file.robot.gravity) {
-        out.push(Edit::new(&["robot", "gravity"], g.to_vec()));
-    }
-    differences("joint", &new.log.joint, &file.log.joint, &mut out);
-    differences("actuator", &new.log.actuator, &file.log.actuator, &mut out);
-    out
+fn keys_of<T: Serialize>(of: Option<&T>) -> Table {
+    of.and_then(|of| Table::try_from(of).ok())
+        .unwrap_or_default()
 }
 
-pub(super) fn differences<T: serde::Serialize>(
+/// The keys of channels by which two files differ.
+pub(super) fn differences<T: Serialize>(
     table: &str,
-    new: &std::collections::BTreeMap<String, T>,
-    old: &std::collections::BTreeMap<String, T>,
+    new: &BTreeMap<String, T>,
+    old: &BTreeMap<String, T>,
     out: &mut Vec<Edit>,
 ) {
-    let keys = |of: Option<&T>| -> toml::Table {
-        of.and_then(|of| toml::Table::try_from(of).ok())
-            .unwrap_or_default()
-    };
     for (name, channels) in new {
-        let before = keys(old.get(name));
-        for (key, value) in keys(Some(channels)) {
+        let before = keys_of(old.get(name));
+        for (key, value) in keys_of(Some(channels)) {
             if before.get(&key) != Some(&value) {
                 out.push(Edit::new(&["log", table, name, &key], value));
             }

@@ -1,44 +1,35 @@
 //! What a search of the set-up found, as the user reads it.
 
 use super::logged_robot::LoggedRobot;
-use super::setup_file::{Declared, edits};
+use super::setup_file::Declared;
 use crate::setup::{
-    Alternative, Change, ChannelKind, Correction, Drive, Factor, Finding, FindingKind,
+    Alternative, Cause, Change, ChannelKind, Correction, Drive, Estimate, Finding, FindingKind,
     FindingSeverity, Found, FrictionPower, LIMITS, Problem, Searched, Setting, SetupErrors,
-    SetupReport, Weight,
+    SetupReport, Undecided, Weight,
 };
-use cft_ident_core::number;
-use cft_ident_core::robot::cft::COORDINATES;
-use cft_ident_files::config::RobotFile;
+use ChannelKind::{Position, Torque};
+use cft_ident_core::number::{percent, significant};
 
 /// The entries of the key `setup`, and the joints whose friction drives them.
 pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> SetupReport {
     let motors = problem.channels.drive == Drive::Motors;
-    let joints = machine.robot.joint_names();
+    let declared = Declared::new(&machine.file, motors);
     let words = Words {
-        file: &machine.file,
-        joints,
-        names: match motors {
-            true => COORDINATES.map(str::to_owned).to_vec(),
-            false => joints.to_vec(),
-        },
-        motors,
+        joints: machine.robot.joint_names(),
+        names: declared.names(),
+        declared,
         gravity: machine.robot.tree().gravity(),
     };
-    let mut findings: Vec<Finding> = (searched.found.iter())
-        .flat_map(|found| words.findings(found))
-        .collect();
-    findings.extend(
-        searched
-            .factor
-            .iter()
-            .map(|(factor, errors)| words.factor(factor, errors)),
-    );
+    let found = searched.found.iter();
+    let mut findings: Vec<Finding> = found.flat_map(|found| words.findings(found)).collect();
+    let estimate = searched.estimate.as_ref();
+    findings.extend(estimate.map(|(estimate, errors)| words.estimate(estimate, errors)));
     findings.extend(words.weight(&searched.weights, searched.without_gravity.as_ref()));
-    findings.extend(words.limits(problem));
+    findings.extend(words.limits(problem).filter(|_| !motors));
+    findings.extend(searched.undecided.iter().map(|u| words.undecided(u)));
     let power = |driven: &crate::setup::Driven| {
         FrictionPower {
-        joint: joints[driven.joint].clone(),
+        joint: words.joints[driven.joint].clone(),
         power: driven.power,
         std: driven.std,
         unit: power_unit(machine, driven.joint),
@@ -46,8 +37,8 @@ pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Search
     }
     };
     SetupReport {
-        findings,
         friction_power: searched.driven.iter().map(power).collect(),
+        findings,
     }
 }
 
@@ -63,387 +54,467 @@ fn power_unit(machine: &LoggedRobot, joint: usize) -> String {
 }
 
 struct Words<'a> {
-    file: &'a RobotFile,
+    declared: Declared<'a>,
     joints: &'a [String],
     /// Channels.
     names: Vec<String>,
-    motors: bool,
     gravity: [f64; 3],
+}
+
+/// A single change as it is written.
+struct Said {
+    entry: Alternative,
+    declared: Setting,
+    meaning: String,
 }
 
 impl Words<'_> {
     /// One entry for each joint whose sign or scale is wrong.
     fn findings(&self, found: &Found) -> Vec<Finding> {
-        let split = |change: &Change| -> Vec<Change> {
-            match change {
-                Change::Sign(channel, joints) => (joints.iter())
-                    .map(|j| Change::Sign(*channel, vec![*j]))
-                    .collect(),
-                Change::Scale(channel, joints, f) => (joints.iter())
-                    .map(|j| Change::Scale(*channel, vec![*j], *f))
-                    .collect(),
-                other => vec![other.clone()],
-            }
-        };
-        let tied: Vec<Alternative> = found
-            .tied
-            .iter()
-            .take(3)
-            .map(|c| self.alternative(c))
-            .collect();
-        let [before, after] = found.errors.each_ref().map(|e| overall(e));
+        let tied = found.tied.iter().take(3);
+        let tied_with: Vec<Alternative> = tied.map(|change| self.said(change).entry).collect();
         let finding = |change: Change| {
-            let (kind, channel, joint, with) = self.place(&change);
-            let (declared, value) = self.values(&change);
+            let said = self.said(&change);
+            let begin = if found.open {
+                "these data cannot tell: perhaps "
+            } else {
+                ""
+            };
+            let mut meaning = format!("{begin}{}{}", said.meaning, self.missed(found));
+            if let Some(experiment) = experiment(found, |j| &self.names[j]) {
+                meaning += &experiment;
+            }
+            let values = [said.declared, said.entry.found];
+            let remedy = said.entry.remedy;
+            let plain = Finding::new(
+                said.entry.kind,
+                said.entry.joint,
+                values,
+                meaning,
+                remedy,
+                found.sure,
+            );
             Finding {
-                channel,
-                with,
-                error_before: before,
-                error_after: after,
-                joints: self.errors(&found.errors),
-                tied_with: tied.clone(),
-                ..Finding::new(
-                    kind,
-                    joint,
-                    [declared, value],
-                    self.meaning(&change, found),
-                    self.remedy(&change),
-                    found.sure,
-                )
-            }
-        };
-        let single = found.change.single();
-        single.into_iter().flat_map(split).map(finding).collect()
-    }
-
-    /// Errors of each joint that moves, rounded to what thinned rows resolve.
-    fn errors(&self, [before, after]: &[Vec<f64>; 2]) -> Vec<SetupErrors> {
-        let pairs = self.joints.iter().zip(before.iter().zip(after));
-        pairs
-            .filter(|(_, (_, after))| **after > 0.0)
-            .map(|(joint, (before, after))| SetupErrors {
-                joint: joint.clone(),
-                before: before.is_finite().then_some(*before),
-                // what no block bears out is no rise
-                after: match *after <= *before * (1.0 + LIMITS.same) {
-                    true => after.min(*before),
-                    false => *after,
+                channel: said.entry.channel,
+                severity: match found.open {
+                    true => FindingSeverity::Hint,
+                    false => plain.severity,
                 },
-            })
-            .collect()
-    }
-
-    /// A word on these data, which is no fault.
-    fn word(
-        &self,
-        (kind, channel, joint): (FindingKind, Option<ChannelKind>, Option<String>),
-        values: [Setting; 2],
-        meaning: String,
-        severity: FindingSeverity,
-    ) -> Finding {
-        Finding {
-            channel,
-            severity,
-            ..Finding::new(kind, joint, values, meaning, String::new(), false)
-        }
-    }
-
-    /// A factor that is on no list.
-    fn factor(&self, factor: &Factor, errors: &[Vec<f64>; 2]) -> Finding {
-        let joint = &self.names[factor.joint];
-        let [low, high] = factor.interval_95.map(|x| number::significant(x, 4));
-        let channel = match factor.channel {
-            ChannelKind::Both => "the position of a motor behind a gear and its torque, ratio",
-            channel => word(channel),
-        };
-        let [before, after] = errors.each_ref().map(|e| number::percent(e[factor.joint]));
-        let meaning = format!(
-            "{joint} fits {} times the {channel} (95 % CI {low} to {high}; error of {joint} {before} as declared, {after} with it): an estimate and no unit or ratio of a list; compare the gain of this channel with the machine",
-            number::significant(factor.value, 4)
-        );
-        let place = (
-            FindingKind::Scale,
-            Some(factor.channel),
-            Some(joint.clone()),
-        );
-        Finding {
-            found_std: Some((factor.interval_95[1] - factor.interval_95[0]) / 3.92),
-            error_before: overall(&errors[0]),
-            error_after: overall(&errors[1]),
-            joints: self.errors(errors),
-            ..self.word(
-                place,
-                [1.0, factor.value].map(Setting::Number),
-                meaning,
-                FindingSeverity::Hint,
-            )
-        }
-    }
-
-    /// What the file's own masses say of the torques, and whether they hold a weight at all.
-    fn weight(&self, weights: &[Weight], without: Option<&[Vec<f64>; 2]>) -> Vec<Finding> {
-        let told: Vec<&Weight> = weights
-            .iter()
-            .filter(|w| w.share > LIMITS.doubtful)
-            .collect();
-        let below = |w: &&&Weight| w.interval_95[1] * LIMITS.yardstick < 1.0;
-        let gravity = [self.gravity, [0.0; 3]].map(Setting::Vector);
-        let of_masses = !told.is_empty() && told.iter().filter(below).count() == told.len();
-        if let Some(errors) = without {
-            let none = told.iter().all(|w| w.gain.abs() * LIMITS.yardstick < 1.0);
-            let (severity, meaning) = match !told.is_empty() && none {
-                true => (
-                    FindingSeverity::Warning,
-                    "gravity is not in these torques, though the file's own masses ask for it: a driver that takes it off?",
-                ),
-                false if told.is_empty() => (
-                    FindingSeverity::Hint,
-                    "gravity hardly shows in these torques: balanced, or taken off by the driver; `gravity = [0.0, 0.0, 0.0]` fits as well with fewer parameters",
-                ),
-                false => return Vec::new(),
-            };
-            let mut finding = Finding {
-                error_before: overall(&errors[0]),
-                error_after: overall(&errors[1]),
-                joints: self.errors(errors),
-                ..self.word(
-                    (FindingKind::Gravity, None, None),
-                    gravity,
-                    meaning.to_owned(),
-                    severity,
-                )
-            };
-            if severity == FindingSeverity::Warning {
-                finding.remedy = self.remedy(&Change::Gravity([0.0; 3]));
+                with: said.entry.with,
+                tied_with: tied_with.clone(),
+                ..self.with_errors(&found.errors, plain)
             }
-            return vec![finding];
-        }
-        let above = |w: &&&Weight| w.interval_95[0] > LIMITS.yardstick;
-        let all_above = !told.is_empty() && told.iter().filter(above).count() == told.len();
-        if !of_masses && !all_above {
-            return Vec::new();
-        }
-        let of = |w: &&Weight| {
-            let [low, high] = w.interval_95.map(|x| number::significant(x, 3));
-            let gain = number::significant(w.gain, 3);
-            format!(
-                "{} {gain} times (95 % CI {low} to {high})",
-                self.joints[w.joint]
-            )
         };
-        let list: Vec<String> = told.iter().map(of).collect();
-        let meaning = format!(
-            "the torques show another weight than the masses of the robot file: {}; is the channel a current, a percentage, the motor's side of a gear, or in another unit?",
-            list.join(", ")
-        );
-        let mean = told.iter().map(|w| w.gain).sum::<f64>() / told.len() as f64;
-        let values = [1.0, mean].map(Setting::Number);
-        let place = (FindingKind::Scale, Some(ChannelKind::Torque), None);
-        vec![self.word(place, values, meaning, FindingSeverity::Warning)]
+        found.change.single().into_iter().map(finding).collect()
     }
 
-    /// Torques beyond what the file says the joints can have.
-    fn limits(&self, problem: &Problem) -> Option<Finding> {
-        let sample = &problem.sample;
-        let rms = sample.rms(&sample.tau);
-        let beyond = |j: &usize| {
-            let most = problem.known.torque.get(*j).copied().flatten();
-            !self.motors && most.is_some_and(|most| rms[*j] > LIMITS.yardstick * most)
+    /// An entry with the errors of each joint that moves; a rise that no block bears out is none.
+    fn with_errors(&self, [before, after]: &[Vec<f64>; 2], finding: Finding) -> Finding {
+        let pairs = self.joints.iter().zip(before.iter().zip(after));
+        let near = |b: f64, a: f64| {
+            if a <= b * (1.0 + LIMITS.same) {
+                a.min(b)
+            } else {
+                a
+            }
         };
-        let joints: Vec<usize> = (0..rms.len()).filter(beyond).collect();
-        let first = *joints.first()?;
-        let most = problem.known.torque[first]?;
-        let names: Vec<&str> = joints.iter().map(|j| self.names[*j].as_str()).collect();
-        let meaning = format!(
-            "the torque of {} is beyond its limit in the robot file ({}: {} on average, limit {}): another unit, such as mNm?",
-            names.join(", "),
-            names[0],
-            number::significant(rms[first], 3),
-            number::significant(most, 3)
-        );
-        let joint = (joints.len() == 1).then(|| names[0].to_owned());
-        let place = (FindingKind::Scale, Some(ChannelKind::Torque), joint);
-        Some(Finding {
-            remedy: self.remedy(&Change::Scale(ChannelKind::Torque, joints, 1e-3)),
-            ..self.word(
-                place,
-                [1.0, 1e-3].map(Setting::Number),
-                meaning,
-                FindingSeverity::Warning,
-            )
-        })
-    }
-
-    fn alternative(&self, change: &Change) -> Alternative {
-        let (kind, channel, joint, with) = self.place(change);
-        Alternative {
-            kind,
-            channel,
-            joint,
-            with,
-            found: self.values(change).1,
-            remedy: self.remedy(change),
+        let joints = pairs.filter(|(_, (_, after))| **after > 0.0);
+        let of = |(joint, (before, after)): (&String, (&f64, &f64))| SetupErrors {
+            joint: joint.clone(),
+            before: before.is_finite().then_some(*before),
+            after: near(*before, *after),
+        };
+        Finding {
+            error_before: overall(before),
+            error_after: overall(after),
+            joints: joints.map(of).collect(),
+            ..finding
         }
     }
 
-    fn place(
-        &self,
-        change: &Change,
-    ) -> (
-        FindingKind,
-        Option<ChannelKind>,
-        Option<String>,
-        Option<String>,
-    ) {
-        let name = |j: &usize| Some(self.names[*j].clone());
+    /// What is said of a change.
+    fn said(&self, change: &Change) -> Said {
+        let name = |j: &usize| self.names[*j].clone();
         let one = |joints: &[usize]| match joints {
-            [j] => name(j),
+            [j] => Some(name(j)),
             _ => None,
         };
-        match change {
-            Change::Sign(channel, joints) => (FindingKind::Sign, Some(*channel), one(joints), None),
-            Change::Scale(channel, joints, _) => {
-                (FindingKind::Scale, Some(*channel), one(joints), None)
+        let joints = |of: &[usize]| of.iter().map(name).collect::<Vec<_>>().join(", ");
+        let number = |j: &usize, channel: ChannelKind, of: &str| {
+            self.declared.number(&self.names[*j], channel == Torque, of)
+        };
+        let names = |of: [&usize; 2]| Setting::Names(of.map(name).to_vec());
+        use FindingKind::{Gravity, Order, Scale, Sign, Zero};
+        let both = Some(ChannelKind::Both);
+        let (kind, channel, joint, with, values, meaning) = match change {
+            Change::Scale(channel, of, f) => {
+                let sign = *f == -1.0;
+                let value = of.first().map_or(1.0, |j| {
+                    number(j, *channel, if sign { "sign" } else { "scale" })
+                });
+                let meaning = match sign {
+                    true => format!(
+                        "the {} of {} has the other sign",
+                        word(*channel),
+                        joints(of)
+                    ),
+                    false => format!(
+                        "the {} of {} is {} times what is declared",
+                        word(*channel),
+                        joints(of),
+                        significant(*f, 4)
+                    ),
+                };
+                let kind = if sign { Sign } else { Scale };
+                let values = [value, value * f].map(Setting::Number);
+                (kind, Some(*channel), one(of), None, values, meaning)
             }
             Change::Exchange(channel, a, b) => {
-                (FindingKind::Order, Some(*channel), name(a), name(b))
-            }
-            Change::Reverse => (FindingKind::Order, Some(ChannelKind::Both), None, None),
-            Change::Zero(j, _) => (
-                FindingKind::Zero,
-                Some(ChannelKind::Position),
-                name(j),
-                None,
-            ),
-            Change::Gravity(_) => (FindingKind::Gravity, None, None, None),
-            Change::Gear(j, _) => (FindingKind::Scale, Some(ChannelKind::Both), name(j), None),
-            Change::Two(a, _) => self.place(a),
-        }
-    }
-
-    /// As declared, and as found.
-    fn values(&self, change: &Change) -> (Setting, Setting) {
-        use ChannelKind::Torque;
-        let of = |j: usize| Declared::of(self.file, &self.names[j], self.motors);
-        match change {
-            Change::Sign(channel, joints) => {
-                let sign = joints.first().map_or(1.0, |j| match channel {
-                    Torque => of(*j).torque_sign,
-                    _ => of(*j).position_sign,
-                });
-                (Setting::Number(sign), Setting::Number(-sign))
-            }
-            Change::Scale(channel, joints, f) => {
-                let scale = joints.first().map_or(1.0, |j| match channel {
-                    Torque => of(*j).torque_scale,
-                    _ => of(*j).position_scale,
-                });
-                (Setting::Number(scale), Setting::Number(scale * f))
-            }
-            Change::Exchange(_, a, b) => {
-                let (a, b) = (self.names[*a].clone(), self.names[*b].clone());
+                let of = match channel {
+                    ChannelKind::Both => String::new(),
+                    channel => format!("the {}s of ", word(*channel)),
+                };
+                let meaning = format!("{of}{} and {} have changed places", name(a), name(b));
+                let values = [names([a, b]), names([b, a])];
                 (
-                    Setting::Names(vec![a.clone(), b.clone()]),
-                    Setting::Names(vec![b, a]),
+                    Order,
+                    Some(*channel),
+                    Some(name(a)),
+                    Some(name(b)),
+                    values,
+                    meaning,
                 )
             }
             Change::Reverse => {
                 let reversed = self.names.iter().rev().cloned().collect();
-                (Setting::Names(self.names.clone()), Setting::Names(reversed))
+                let values = [self.names.clone(), reversed].map(Setting::Names);
+                let meaning = "the joints are listed from the tip to the base".to_owned();
+                (Order, both, None, None, values, meaning)
             }
             Change::Zero(j, angle) => {
-                let offset = of(*j).offset;
-                (Setting::Number(offset), Setting::Number(offset + angle))
+                let offset = number(j, Position, "offset");
+                let meaning = format!(
+                    "the zero of {} is off by {} degrees",
+                    name(j),
+                    significant(angle.to_degrees(), 3)
+                );
+                let values = [offset, offset + angle].map(Setting::Number);
+                (Zero, Some(Position), Some(name(j)), None, values, meaning)
             }
-            Change::Gravity(g) => (Setting::Vector(self.gravity), Setting::Vector(*g)),
-            Change::Gear(_, ratio) => (Setting::Number(1.0), Setting::Number(*ratio)),
-            Change::Two(a, _) => self.values(a),
+            Change::Gear(j, ratio) => {
+                let meaning = format!(
+                    "{} is logged on the motor's side of a gear of {}, position and torque",
+                    name(j),
+                    significant(*ratio, 4)
+                );
+                (
+                    Scale,
+                    both,
+                    Some(name(j)),
+                    None,
+                    [1.0, *ratio].map(Setting::Number),
+                    meaning,
+                )
+            }
+            Change::Gravity(g) => {
+                let meaning = format!(
+                    "free fall is along ({}) in the base frame",
+                    g.map(|x| significant(x, 3)).join(", ")
+                );
+                (
+                    Gravity,
+                    None,
+                    None,
+                    None,
+                    [self.gravity, *g].map(Setting::Vector),
+                    meaning,
+                )
+            }
+            Change::Velocity(j, _) => {
+                let meaning = format!("the position of {} is its velocity", name(j));
+                let values = ["position", "velocity"].map(|of| Setting::Names(vec![of.to_owned()]));
+                (Order, Some(Position), Some(name(j)), None, values, meaning)
+            }
+            Change::Two(a, _) => return self.said(a),
+        };
+        let [declared, found] = values;
+        let remedy = self.remedy(change);
+        Said {
+            entry: Alternative {
+                kind,
+                channel,
+                joint,
+                with,
+                found,
+                remedy,
+            },
+            declared,
+            meaning,
         }
     }
 
     /// The lines to write into the robot file.
     fn remedy(&self, change: &Change) -> String {
-        let correction = Correction::none(self.names.len()).with(change);
-        let edits = edits(self.file, &correction, self.motors);
-        let lines: Vec<String> = edits
-            .iter()
-            .map(|edit| format!("`{}` in {}", edit.line(), edit.table()))
-            .collect();
-        lines.join(", ")
-    }
-
-    fn meaning(&self, change: &Change, found: &Found) -> String {
-        let joint = |j: &usize| self.names[*j].clone();
-        let joints = |of: &[usize]| of.iter().map(joint).collect::<Vec<_>>().join(", ");
-        let what = match change {
-            Change::Sign(channel, of) => {
-                format!(
-                    "the {} of {} has the other sign",
-                    word(*channel),
-                    joints(of)
-                )
-            }
-            Change::Scale(channel, of, f) => format!(
-                "the {} of {} is {} times what is declared",
-                word(*channel),
-                joints(of),
-                number::significant(*f, 4)
-            ),
-            Change::Exchange(ChannelKind::Both, a, b) => {
-                format!("{} and {} have changed places", joint(a), joint(b))
-            }
-            Change::Exchange(channel, a, b) => format!(
-                "the {}s of {} and {} have changed places",
-                word(*channel),
-                joint(a),
-                joint(b)
-            ),
-            Change::Reverse => "the joints are listed from the tip to the base".to_owned(),
-            Change::Zero(j, angle) => format!(
-                "the zero of {} is off by {} degrees",
-                joint(j),
-                number::significant(angle.to_degrees(), 3)
-            ),
-            Change::Gear(j, ratio) => format!(
-                "{} is logged on the motor's side of a gear of {}, position and torque",
-                joint(j),
-                number::significant(*ratio, 4)
-            ),
-            Change::Two(a, _) => return self.meaning(a, found),
-            Change::Gravity(g) => format!(
-                "free fall is along ({}) in the base frame",
-                g.map(|x| number::significant(x, 3)).join(", ")
-            ),
-        };
-        let [before, after] = found
-            .errors
-            .each_ref()
-            .map(|e| overall(e).map(number::percent));
-        match (before, after) {
-            (Some(before), Some(after)) => format!(
-                "{what}: as declared the model misses {before} of the torque, with that put right {after}{}",
-                self.by_joint(&found.errors)
-            ),
-            (_, after) => format!(
-                "{what}: as declared the positions belong to no pose of the robot, with that put right the model misses {} of the torque",
-                after.unwrap_or_default()
-            ),
+        if let Change::Velocity(j, _) = change {
+            return format!(
+                "the column of positions in `position = ..` in [log.joint.{}]",
+                self.names[*j]
+            );
         }
+        let edits = self
+            .declared
+            .edits(&Correction::none(self.names.len()).with(change));
+        let line = |edit: &cft_ident_files::config::correction::Edit| {
+            format!("`{}` in {}", edit.line(), edit.table())
+        };
+        edits.iter().map(line).collect::<Vec<_>>().join(", ")
     }
 
-    /// Errors of the joints that change.
-    fn by_joint(&self, [before, after]: &[Vec<f64>; 2]) -> String {
+    /// What the model misses, as declared and put right.
+    fn missed(&self, found: &Found) -> String {
+        let [before, after] = &found.errors;
+        let right = overall(after).map(percent).unwrap_or_default();
+        let Some(declared) = overall(before) else {
+            return format!(
+                ": as declared the positions belong to no pose of the robot, with that put right the model misses {right} of the torque"
+            );
+        };
         let pairs = self.joints.iter().zip(before.iter().zip(after));
         let changed = pairs.filter(|(_, (b, a))| **a < **b * (1.0 - LIMITS.same));
         let each: Vec<String> = changed
-            .map(|(joint, (b, a))| {
-                format!("{joint} {} -> {}", number::percent(*b), number::percent(*a))
-            })
+            .map(|(joint, (b, a))| format!("{joint} {} -> {}", percent(*b), percent(*a)))
             .collect();
-        match each.is_empty() {
+        let each = match each.is_empty() {
             true => ", and friction drives no joint any more".to_owned(),
             false => format!(" ({})", each.join(", ")),
+        };
+        format!(
+            ": as declared the model misses {} of the torque, with that put right {right}{each}",
+            percent(declared)
+        )
+    }
+
+    /// A value that is on no list.
+    fn estimate(&self, estimate: &Estimate, errors: &[Vec<f64>; 2]) -> Finding {
+        let said = self.said(&estimate.change);
+        let joint = said.entry.joint.clone();
+        let [before, after] = errors
+            .each_ref()
+            .map(|e| overall(e).map(percent).unwrap_or_default());
+        let angle = matches!(estimate.change, Change::Zero(..) | Change::Gravity(_));
+        let told = |x: f64| match angle {
+            true => format!("{} degrees", significant(x.to_degrees(), 3)),
+            false => significant(x, 4),
+        };
+        let value = told(estimate.value);
+        let what = match (&estimate.change, &joint) {
+            (Change::Gear(..), Some(joint)) => {
+                format!("{joint} fits a motor behind a gear of {value}, position and torque")
+            }
+            (Change::Zero(..), Some(joint)) => {
+                format!("{joint} fits a zero that is off by {value}")
+            }
+            (Change::Scale(channel, ..), Some(joint)) => {
+                format!("{joint} fits {value} times the {}", word(*channel))
+            }
+            _ => format!(
+                "the torques fit a base that leans by {value}, {}",
+                said.meaning
+            ),
+        };
+        let [low, high] = estimate.interval_95;
+        let meaning = format!(
+            "{what} (95 % CI {} to {}; error {before} as declared, {after} with it): an estimate and no mistake of a list; compare it with the machine",
+            told(low),
+            told(high)
+        );
+        let values = match angle {
+            true => [0.0, estimate.value],
+            false => [1.0, estimate.value],
+        };
+        Finding {
+            channel: said.entry.channel,
+            found_std: Some((high - low) / 3.92),
+            ..self.with_errors(
+                errors,
+                hint(said.entry.kind, joint, values.map(Setting::Number), meaning),
+            )
         }
+    }
+
+    /// What the file's own masses say of the torques, and whether they hold a weight at all.
+    fn weight(&self, all: &[Weight], without: Option<&[Vec<f64>; 2]>) -> Vec<Finding> {
+        let off = |way: f64| !all.is_empty() && all.iter().all(|w| w.weight.is_off(way));
+        let moves = |way: f64| all.iter().all(|w| w.motion.is_off(way));
+        let way = if off(-1.0) { -1.0 } else { 1.0 };
+        let list = |of: fn(&Weight) -> crate::setup::Gain| -> String {
+            let each = all.iter().map(|w| {
+                let gain = of(w);
+                let [low, high] = gain.interval_95.map(|x| significant(x, 3));
+                let value = significant(gain.value, 3);
+                format!(
+                    "{} {value} times (95 % CI {low} to {high})",
+                    self.joints[w.joint]
+                )
+            });
+            each.collect::<Vec<_>>().join(", ")
+        };
+        let gravity = [self.gravity, [0.0; 3]].map(Setting::Vector);
+        if off(way) && moves(way) {
+            let meaning = format!(
+                "the torques show another weight than the masses of the robot file: {}; is the channel a current, a percentage, the motor's side of a gear, or in another unit?",
+                list(|w| w.weight)
+            );
+            let mean = all.iter().map(|w| w.weight.value).sum::<f64>() / all.len() as f64;
+            let values = [1.0, mean].map(Setting::Number);
+            return vec![Finding {
+                channel: Some(Torque),
+                severity: FindingSeverity::Warning,
+                ..hint(FindingKind::Scale, None, values, meaning)
+            }];
+        }
+        let some = self.some_off(all);
+        if !some.is_empty() {
+            return some;
+        }
+        let meaning = match (off(-1.0), without) {
+            (true, _) => format!(
+                "gravity is not in these torques, though the masses of the file ask for it: {}. A driver that takes it off (write `gravity = [0.0, 0.0, 0.0]`), or springs and counterweights that balance it? These data do not tell; the current of a pose that is held, as the drive measures it, does",
+                list(|w| w.weight)
+            ),
+            (false, Some(_)) if all.is_empty() => "gravity hardly shows in these torques: balanced, or taken off by the driver; `gravity = [0.0, 0.0, 0.0]` fits as well with fewer parameters".to_owned(),
+            _ => return Vec::new(),
+        };
+        let finding = hint(FindingKind::Gravity, None, gravity, meaning);
+        vec![match without {
+            Some(errors) => self.with_errors(errors, finding),
+            None => finding,
+        }]
+    }
+
+    /// Joints that show another weight than their masses, and what moves them likewise, beside others that do not.
+    fn some_off(&self, all: &[Weight]) -> Vec<Finding> {
+        let off = |w: &&Weight| {
+            [-1.0, 1.0]
+                .iter()
+                .any(|way| w.weight.is_off(*way) && w.motion.is_off(*way))
+        };
+        let of = |w: &Weight| {
+            let joint = self.joints[w.joint].clone();
+            let [low, high] = w.weight.interval_95.map(|x| significant(x, 3));
+            let gain = w.weight.value;
+            let thousand = [1e-3, 1e3]
+                .into_iter()
+                .find(|f| (gain * f).ln().abs() < LIMITS.yardstick.ln() / 2.0);
+            let meaning = format!(
+                "the torque of {joint} shows {} times the weight of its masses in the robot file (95 % CI {low} to {high}), and those of other joints theirs: in another unit, or on the motor's side of a gear?",
+                significant(gain, 3)
+            );
+            let found = thousand.unwrap_or(gain.recip());
+            let plain = hint(
+                FindingKind::Scale,
+                Some(joint),
+                [1.0, found].map(Setting::Number),
+                meaning,
+            );
+            let plain = Finding {
+                channel: Some(Torque),
+                ..plain
+            };
+            match thousand {
+                Some(f) => Finding {
+                    severity: FindingSeverity::Warning,
+                    remedy: self.remedy(&Change::Scale(Torque, vec![w.joint], f)),
+                    ..plain
+                },
+                None => plain,
+            }
+        };
+        all.iter().filter(off).map(of).collect()
+    }
+
+    /// Torques beyond what the file says the joints can have.
+    fn limits(&self, problem: &Problem) -> Option<Finding> {
+        let rms = problem.sample.rms(|row| row.tau);
+        let most = |j: usize| problem.known.torque.get(j).copied().flatten();
+        let beyond = |j: &usize| most(*j).is_some_and(|most| rms[*j] > LIMITS.yardstick * most);
+        let joints: Vec<usize> = (0..rms.len()).filter(beyond).collect();
+        let first = *joints.first()?;
+        let names: Vec<&str> = joints.iter().map(|j| self.names[*j].as_str()).collect();
+        let meaning = format!(
+            "the torque of {} is beyond its limit in the robot file ({}: {} on average, limit {}): another unit, such as mNm?",
+            names.join(", "),
+            names[0],
+            significant(rms[first], 3),
+            significant(most(first)?, 3)
+        );
+        let joint = (joints.len() == 1).then(|| names[0].to_owned());
+        let values = [1.0, 1e-3].map(Setting::Number);
+        Some(Finding {
+            channel: Some(Torque),
+            severity: FindingSeverity::Warning,
+            remedy: self.remedy(&Change::Scale(Torque, joints, 1e-3)),
+            ..hint(FindingKind::Scale, joint, values, meaning)
+        })
+    }
+
+    /// A joint that misses much, and why these data do not say why.
+    fn undecided(&self, of: &Undecided) -> Finding {
+        let joint = &self.joints[of.joint];
+        let why = match of.cause {
+            Cause::Proportion(other, ratio) => apart([joint, &self.joints[other]], Some(ratio)),
+            Cause::Alone => "one axis alone does not show which of its channels is wrong: a log in which other joints move too, or one with a known weight, tells".to_owned(),
+            Cause::Friction(share) => format!(
+                "{} of it is friction, which hides signs, zeros and masses: faster motion or a known weight tells",
+                percent(share)
+            ),
+            Cause::Other => "an effect that the model lacks, such as a coupling of wrist gears (`diagnose` looks for it), or several mistakes: logs of each joint alone tell".to_owned(),
+        };
+        let meaning = format!(
+            "these data cannot tell whether the set-up of {joint} is right: the model misses {} of its torque, and no mistake of the list repairs it in all parts of the logs; {why}",
+            percent(of.error)
+        );
+        let values = [0.0, of.error].map(Setting::Number);
+        hint(FindingKind::Undecided, Some(joint.clone()), values, meaning)
+    }
+}
+
+/// What tells readings apart that fit alike.
+fn experiment<'a>(found: &Found, name: impl Fn(usize) -> &'a String) -> Option<String> {
+    if let Some([a, b]) = found.together {
+        return Some(format!("; {}", apart([name(a), name(b)], None)));
+    }
+    if found.sure || found.tied.is_empty() {
+        return None;
+    }
+    let scale = |c: &Change| {
+        matches!(c, Change::Scale(_, _, f) if *f != -1.0) || matches!(c, Change::Gear(..))
+    };
+    Some(match scale(&found.change) && found.tied.iter().all(scale) {
+        true => "; the data sheet of the gear tells which ratio it is".to_owned(),
+        false => "; a log in which these joints move one after the other, each through gravity, tells which reading is right".to_owned(),
+    })
+}
+
+fn apart([a, b]: [&String; 2], ratio: Option<f64>) -> String {
+    let how = ratio.map_or(String::new(), |r| {
+        format!(" ({a} = {} {b})", significant(r, 3))
+    });
+    format!(
+        "{a} and {b} move in proportion in these logs{how}, so that their signs, units and places cannot be told apart: a log in which they move apart tells"
+    )
+}
+
+/// A word on these data, which is no fault.
+fn hint(
+    kind: FindingKind,
+    joint: Option<String>,
+    values: [Setting; 2],
+    meaning: String,
+) -> Finding {
+    Finding {
+        severity: FindingSeverity::Hint,
+        ..Finding::new(kind, joint, values, meaning, String::new(), false)
     }
 }
 
@@ -456,8 +527,8 @@ fn overall(errors: &[f64]) -> Option<f64> {
 
 fn word(channel: ChannelKind) -> &'static str {
     match channel {
-        ChannelKind::Torque => "torque",
-        ChannelKind::Position => "position",
+        Torque => "torque",
+        Position => "position",
         ChannelKind::Both => "channel",
     }
 }

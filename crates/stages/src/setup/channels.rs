@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::correction::Correction;
 use super::sample::Row;
 use cft_ident_core::robot::Robot;
+use cft_ident_core::robot::friction::sign;
 
 /// What the channels of a log are of.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,12 +103,19 @@ impl Channels {
                 for j in 0..n {
                     let k = by.position_from[j];
                     let f = self.position_factor(by, j);
-                    out.q[j] = f * (row.q[k] - self.position_offset[k])
-                        + self.position_offset[j]
-                        + by.zero[j];
-                    out.v[j] = f * row.v[k];
-                    out.a[j] = f * row.a[k];
-                    out.sign[j] = f.signum() * row.sign[k];
+                    let (q, v, a, sign) = match by.begins[j] {
+                        Some(begins) => {
+                            (f * row.sum[k] + begins, row.q[k], row.v[k], sign(row.q[k]))
+                        }
+                        None => {
+                            let q = f * (row.q[k] - self.position_offset[k]);
+                            (q + self.position_offset[j], row.v[k], row.a[k], row.sign[k])
+                        }
+                    };
+                    out.q[j] = q + by.zero[j];
+                    out.v[j] = f * v;
+                    out.a[j] = f * a;
+                    out.sign[j] = f.signum() * sign;
                     out.tau[j * n..(j + 1) * n].copy_from_slice(row.tau);
                 }
                 true
@@ -120,7 +128,7 @@ impl Channels {
         }
     }
 
-    pub(super) fn position_factor(&self, by: &Correction, j: usize) -> f64 {
+    fn position_factor(&self, by: &Correction, j: usize) -> f64 {
         let k = by.position_from[j];
         by.position_factor[j] * self.position_gain[j] / self.position_gain[k]
     }
@@ -148,7 +156,7 @@ impl Channels {
             out.q[j] = times(position) + self.position_offset[j] + by.zero[j];
             out.v[j] = times(velocity);
             out.a[j] = times(acceleration);
-            out.sign[j] = cft_ident_core::robot::friction::sign(out.v[j]);
+            out.sign[j] = sign(out.v[j]);
         }
         for k in 0..n {
             let from = by.torque_from[k];
@@ -200,8 +208,8 @@ impl Channels {
                 out.tau[j * n + k] = *force;
             }
         }
-        for (sign, v) in out.sign.iter_mut().zip(&out.v) {
-            *sign = cft_ident_core::robot::friction::sign(*v);
+        for (to, v) in out.sign.iter_mut().zip(&out.v) {
+            *to = sign(*v);
         }
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         (finite(&out.q) && finite(&out.v) && finite(&out.a) && finite(&out.tau)).then_some(())
@@ -214,29 +222,6 @@ mod tests {
     use crate::setup::{Change, ChannelKind};
     use cft_ident_core::robot::cft::{Setup, Structure};
 
-    fn carried(channels: &Channels, robot: &Robot, row: [&[f64]; 4], by: &Correction) -> Carried {
-        let n = row[0].len();
-        let mut out = Carried::new(n);
-        let sign = vec![0.0; n];
-        let [q, v, a, tau] = row;
-        let row = Row {
-            q,
-            v,
-            a,
-            sign: &sign,
-            tau,
-        };
-        assert!(channels.carry(robot, row, by, &mut out));
-        out
-    }
-
-    fn torques(channels: &Channels, row: &Carried, by: &Correction) -> Vec<f64> {
-        let mix = channels.mix(by);
-        let of =
-            |(tau, mix): (&[f64], &DVector<f64>)| tau.iter().zip(mix).map(|(t, m)| t * m).sum();
-        row.tau.chunks_exact(mix.len()).zip(&mix).map(of).collect()
-    }
-
     const ROW: [[f64; 4]; 4] = [
         [0.35, 0.2, 0.9, 0.8],
         [0.1, -0.4, 0.3, 0.6],
@@ -247,15 +232,10 @@ mod tests {
     #[test]
     fn rows_are_as_declared_without_a_correction_and_motors_turn_joints_together() {
         let robot = Robot::cft(Setup::default(), Structure::Printed12);
-        let r = DMatrix::from_row_slice(
-            4,
-            4,
-            &[
-                2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.5, 1.0,
-            ],
-        );
-        let inverse = r.clone().try_inverse().unwrap();
-        for drive in [Drive::Joints, Drive::Gears(r, inverse), Drive::Motors] {
+        let mut r = DMatrix::from_diagonal(&DVector::from_vec(vec![2.0, 3.0, 1.0, 1.0]));
+        r[(3, 2)] = 0.5;
+        let gears = Drive::Gears(r.clone(), r.try_inverse().unwrap());
+        for (drive, least) in [(Drive::Joints, 1), (gears, 2), (Drive::Motors, 1)] {
             let channels = Channels {
                 drive,
                 ..Channels::of_joints(4)
@@ -269,32 +249,36 @@ mod tests {
                 drive.accelerations(q, v, a, &mut logged[2]);
                 drive.volts(q, tau, &mut logged[3]).unwrap();
             }
-            let row = logged.each_ref().map(|x| &x[..]);
-            let none = Correction::none(4);
-            let plain = carried(&channels, &robot, row, &none);
-            let found = torques(&channels, &plain, &none);
-            for j in 0..4 {
-                let pairs = [
-                    (plain.q[j], ROW[0][j]),
-                    (plain.v[j], ROW[1][j]),
-                    (plain.a[j], ROW[2][j]),
-                ];
-                for (x, y) in pairs.into_iter().chain([(found[j], ROW[3][j])]) {
-                    assert!((x - y).abs() < 1e-9, "{:?} {x} {y}", channels.drive);
-                }
-            }
-            let turned = none.with(&Change::Sign(ChannelKind::Torque, vec![3]));
-            let other = torques(&channels, &plain, &turned);
-            let changed = (0..4)
-                .filter(|j| (other[*j] - found[*j]).abs() > 1e-9)
-                .count();
-            // behind these gears the last motor turns two joints
-            let least = if matches!(channels.drive, Drive::Gears(..)) {
-                2
-            } else {
-                1
+            let [q, v, a, tau] = logged.each_ref().map(|x| &x[..]);
+            let (sign, sum) = (&[0.0; 4], &[0.0; 4]);
+            let row = Row {
+                q,
+                v,
+                a,
+                sign,
+                tau,
+                sum,
             };
-            assert!(changed >= least, "{:?} {changed}", channels.drive);
+            let none = Correction::none(4);
+            let mut carried = Carried::new(4);
+            assert!(channels.carry(&robot, row, &none, &mut carried));
+            let torques = |by: &Correction| -> Vec<f64> {
+                let of = |(tau, mix): (&[f64], &DVector<f64>)| {
+                    tau.iter().zip(mix).map(|(t, m)| t * m).sum()
+                };
+                let rows = carried.tau.chunks_exact(4);
+                rows.zip(&channels.mix(by)).map(of).collect()
+            };
+            let found = torques(&none);
+            let lists = [&carried.q, &carried.v, &carried.a, &found];
+            for (list, row) in lists.into_iter().zip(&ROW) {
+                let near = |(x, y): (&f64, &f64)| (x - y).abs() < 1e-9;
+                assert!(list.iter().zip(row).all(near), "{:?}", channels.drive);
+            }
+            // behind these gears the last motor turns two joints
+            let other = torques(&none.with(&Change::Scale(ChannelKind::Torque, vec![3], -1.0)));
+            let changed = (0..4).filter(|j| (other[*j] - found[*j]).abs() > 1e-9);
+            assert!(changed.count() >= least, "{:?}", channels.drive);
         }
     }
 }

@@ -1,25 +1,25 @@
 //! Changes of a set-up, and their sum.
 
-use super::finding::ChannelKind;
+use super::finding::ChannelKind::{self, Both, Position, Torque};
 
 /// One thing that may be wrong with a set-up, as what puts it right. Joints are channels where motors
 /// have coordinates of their own.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// These channels have the other sign.
-    Sign(ChannelKind, Vec<usize>),
+    /// These channels are to be multiplied by a factor, -1 for a sign.
+    Scale(ChannelKind, Vec<usize>, f64),
     /// Two channels have changed places.
     Exchange(ChannelKind, usize, usize),
     /// All joints are listed from the tip to the base.
     Reverse,
-    /// These channels are to be multiplied by a factor.
-    Scale(ChannelKind, Vec<usize>, f64),
     /// A channel that is on the motor's side of a gear of this ratio, position and torque.
     Gear(usize, f64),
     /// This is to be added to a joint's position \[m or rad\].
     Zero(usize, f64),
     /// Acceleration of free fall in the base frame \[m/s^2\].
     Gravity([f64; 3]),
+    /// What is taken for a joint's position is its velocity; the position where a log begins \[m or rad\].
+    Velocity(usize, f64),
     /// One mistake, then another.
     Two(Box<Change>, Box<Change>),
 }
@@ -33,6 +33,8 @@ pub struct Correction {
     pub position_factor: Vec<f64>,
     /// Of each joint, what is added to its position \[m or rad\].
     pub zero: Vec<f64>,
+    /// Of each joint whose position is a velocity, where it begins \[m or rad\].
+    pub begins: Vec<Option<f64>>,
     /// As for the positions.
     pub torque_from: Vec<usize>,
     pub torque_factor: Vec<f64>,
@@ -47,6 +49,7 @@ impl Correction {
             position_from: (0..joints).collect(),
             position_factor: vec![1.0; joints],
             zero: vec![0.0; joints],
+            begins: vec![None; joints],
             torque_from: (0..joints).collect(),
             torque_factor: vec![1.0; joints],
             gravity: None,
@@ -55,27 +58,20 @@ impl Correction {
 
     /// The same with one change more.
     pub fn with(&self, change: &Change) -> Self {
-        if let Change::Two(first, second) = change {
-            return self.with(first).with(second);
-        }
         let mut out = self.clone();
-        let (positions, torques) = match change {
-            Change::Sign(channel, _)
-            | Change::Exchange(channel, _, _)
-            | Change::Scale(channel, _, _) => (
-                *channel != ChannelKind::Torque,
-                *channel != ChannelKind::Position,
-            ),
-            _ => (true, true),
-        };
         match change {
-            Change::Sign(_, joints) => out.multiply(joints, -1.0, positions, torques),
-            Change::Scale(_, joints, factor) => out.multiply(joints, *factor, positions, torques),
-            Change::Exchange(_, a, b) => {
-                if positions {
+            Change::Two(first, second) => return self.with(first).with(second),
+            Change::Scale(channel, joints, factor) => {
+                for j in joints {
+                    out.multiply(*j, [*channel, *channel], [*factor; 2]);
+                }
+            }
+            Change::Gear(j, ratio) => out.multiply(*j, [Both; 2], [ratio.recip(), *ratio]),
+            Change::Exchange(channel, a, b) => {
+                if *channel != Torque {
                     out.position_from.swap(*a, *b);
                 }
-                if torques {
+                if *channel != Position {
                     out.torque_from.swap(*a, *b);
                 }
             }
@@ -83,25 +79,19 @@ impl Correction {
                 out.position_from.reverse();
                 out.torque_from.reverse();
             }
-            Change::Gear(j, ratio) => {
-                out.position_factor[*j] /= ratio;
-                out.torque_factor[*j] *= ratio;
-            }
             Change::Zero(joint, angle) => out.zero[*joint] += angle,
+            Change::Velocity(joint, begins) => out.begins[*joint] = Some(*begins),
             Change::Gravity(gravity) => out.gravity = Some(*gravity),
-            Change::Two(..) => {}
         }
         out
     }
 
-    fn multiply(&mut self, joints: &[usize], factor: f64, positions: bool, torques: bool) {
-        for j in joints {
-            if positions {
-                self.position_factor[*j] *= factor;
-            }
-            if torques {
-                self.torque_factor[*j] *= factor;
-            }
+    fn multiply(&mut self, j: usize, of: [ChannelKind; 2], [position, torque]: [f64; 2]) {
+        if of[0] != Torque {
+            self.position_factor[j] *= position;
+        }
+        if of[1] != Position {
+            self.torque_factor[j] *= torque;
         }
     }
 }
@@ -110,28 +100,39 @@ impl Change {
     /// Joints that it is about; none where it concerns all.
     pub fn joints(&self) -> Vec<usize> {
         match self {
-            Self::Sign(_, joints) | Self::Scale(_, joints, _) => joints.clone(),
+            Self::Scale(_, joints, _) => joints.clone(),
             Self::Exchange(_, a, b) => vec![*a, *b],
-            Self::Zero(joint, _) | Self::Gear(joint, _) => vec![*joint],
+            Self::Zero(joint, _) | Self::Gear(joint, _) | Self::Velocity(joint, _) => vec![*joint],
             Self::Reverse | Self::Gravity(_) => Vec::new(),
             Self::Two(a, b) => [a.joints(), b.joints()].concat(),
         }
     }
 
-    /// The mistakes that it is made of.
-    pub fn single(&self) -> Vec<&Change> {
+    /// The mistakes that it is made of, those of several joints one by one.
+    pub fn single(&self) -> Vec<Change> {
         match self {
-            Self::Two(a, b) => vec![a, b],
-            one => vec![one],
+            Self::Two(a, b) => [a.single(), b.single()].concat(),
+            Self::Scale(channel, joints, f) => (joints.iter())
+                .map(|j| Self::Scale(*channel, vec![*j], *f))
+                .collect(),
+            one => vec![one.clone()],
+        }
+    }
+
+    /// The same with its factor multiplied, where it has one.
+    pub(super) fn times(&self, by: f64) -> Option<Change> {
+        match self {
+            Self::Scale(_, _, -1.0) => None,
+            Self::Scale(channel, joints, f) => Some(Self::Scale(*channel, joints.clone(), f * by)),
+            Self::Gear(j, f) => Some(Self::Gear(*j, f * by)),
+            _ => None,
         }
     }
 
     /// Whether only torques change: the columns are those of the set-up as it is.
     pub(super) fn is_of_torques(&self) -> bool {
         match self {
-            Self::Sign(channel, _) | Self::Exchange(channel, ..) | Self::Scale(channel, ..) => {
-                *channel == ChannelKind::Torque
-            }
+            Self::Exchange(channel, ..) | Self::Scale(channel, ..) => *channel == Torque,
             Self::Two(a, b) => a.is_of_torques() && b.is_of_torques(),
             _ => false,
         }
@@ -145,13 +146,17 @@ mod tests {
     #[test]
     fn changes_add_up_and_undo_themselves() {
         let none = Correction::none(3);
-        let turned = Change::Sign(ChannelKind::Torque, vec![1]);
-        let moved = Change::Exchange(ChannelKind::Both, 0, 2);
+        let turned = Change::Scale(Torque, vec![1], -1.0);
+        let moved = Change::Exchange(Both, 0, 2);
         let both = none.with(&turned).with(&moved);
         assert_eq!(both.torque_factor, [1.0, -1.0, 1.0]);
         assert_eq!(both.position_from, [2, 1, 0]);
         assert_eq!(both.torque_from, [2, 1, 0]);
-        assert!(turned.is_of_torques() && !moved.is_of_torques());
         assert_eq!(both.with(&moved).with(&turned), none);
+        let geared = none.with(&Change::Gear(1, 4.0));
+        assert_eq!(
+            (geared.position_factor[1], geared.torque_factor[1]),
+            (0.25, 4.0)
+        );
     }
 }

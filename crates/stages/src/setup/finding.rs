@@ -23,6 +23,8 @@ pub enum FindingKind {
     Delay,
     /// Geometry that was rounded or misread.
     Geometry,
+    /// A joint that misses much, where no mistake repairs it.
+    Undecided,
 }
 
 impl FindingKind {
@@ -37,6 +39,7 @@ impl FindingKind {
             Self::Gains => "gains",
             Self::Delay => "delay",
             Self::Geometry => "geometry",
+            Self::Undecided => "undecided",
         }
     }
 }

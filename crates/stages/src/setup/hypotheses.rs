@@ -16,21 +16,20 @@ const THOUSANDS: [f64; 2] = [1e-3, 1e3];
 const FREE_FALL: f64 = 9.81;
 const SIDES: [ChannelKind; 3] = [Torque, Position, Both];
 /// Largest gear ratio of the list.
-const LARGEST: f64 = 200.0;
+pub(super) const LARGEST: f64 = 200.0;
 
 /// The list, the simplest first. One joint alone shows its signs and no factor.
 pub(super) fn all(problem: &Problem) -> Vec<Change> {
     let moving = problem.channels_that_move();
-    let alone = moving.len() < 2;
     let mut out = Vec::new();
     for side in SIDES {
-        out.extend(moving.iter().map(|j| Change::Sign(side, vec![*j])));
+        out.extend(moving.iter().map(|j| Change::Scale(side, vec![*j], -1.0)));
     }
-    if alone {
+    if moving.len() < 2 {
         return out;
     }
-    out.push(Change::Sign(Torque, moving.clone()));
-    out.push(Change::Sign(Position, moving.clone()));
+    out.push(Change::Scale(Torque, moving.clone(), -1.0));
+    out.push(Change::Scale(Position, moving.clone(), -1.0));
     for side in SIDES {
         let pairs = moving.iter().enumerate().flat_map(|(i, a)| {
             let others = moving[i + 1..].iter();
@@ -62,28 +61,27 @@ fn units(problem: &Problem, moving: &[usize]) -> Vec<Change> {
             JointKind::Prismatic => &THOUSANDS,
         }
     };
+    let scaled = |side, of: &[usize], f: &f64| Change::Scale(side, of.to_vec(), *f);
     for &j in moving {
-        out.extend(
-            factors(j)
-                .iter()
-                .map(|f| Change::Scale(Position, vec![j], *f)),
-        );
-        out.extend(THOUSANDS.map(|f| Change::Scale(Torque, vec![j], f)));
+        out.extend(factors(j).iter().map(|f| scaled(Position, &[j], f)));
+        out.extend(THOUSANDS.iter().map(|f| scaled(Torque, &[j], f)));
         let percent = problem.known.torque.get(j).copied().flatten();
-        out.extend(percent.map(|most| Change::Scale(Torque, vec![j], most / 100.0)));
+        out.extend(percent.map(|most| scaled(Torque, &[j], &(most / 100.0))));
     }
-    let alike: Vec<usize> = (moving.iter().copied())
-        .filter(|j| kind(*j) == kind(moving[0]))
-        .collect();
+    let alike = |j: &usize| kind(*j) == kind(moving[0]);
+    let alike: Vec<usize> = moving.iter().copied().filter(alike).collect();
     if alike.len() > 1 {
-        let same = factors(moving[0]).iter();
-        out.extend(same.map(|f| Change::Scale(Position, alike.clone(), *f)));
+        out.extend(
+            factors(moving[0])
+                .iter()
+                .map(|f| scaled(Position, &alike, f)),
+        );
     }
     out
 }
 
 fn zeros(problem: &Problem, moving: &[usize]) -> Vec<Change> {
-    if !problem.robot.knows_links() || problem.channels.drive == Drive::Motors {
+    if !problem.has_zeros() {
         return Vec::new();
     }
     let turns = |j: &&usize| problem.robot.joint_kind(**j) == JointKind::Revolute;
@@ -97,6 +95,7 @@ fn gravities(problem: &Problem) -> Vec<Change> {
         return Vec::new();
     }
     let now = problem.robot.tree().gravity();
+    let size = now.iter().map(|x| x * x).sum::<f64>().sqrt();
     let axes = (0..6).map(|k| {
         let mut g = [0.0; 3];
         g[2 - k / 2] = if k % 2 == 0 { -FREE_FALL } else { FREE_FALL };
@@ -104,9 +103,19 @@ fn gravities(problem: &Problem) -> Vec<Change> {
     });
     let along = |g: &[f64; 3]| {
         let dot: f64 = g.iter().zip(&now).map(|(a, b)| a * b).sum();
-        dot > 0.99 * FREE_FALL * now.iter().map(|x| x * x).sum::<f64>().sqrt() && dot > 0.0
+        dot > 0.99 * FREE_FALL * size && dot > 0.0
     };
     axes.filter(|g| !along(g)).map(Change::Gravity).collect()
+}
+
+/// How far from what people write a factor is: units and what stands in the robot file, then tens, fives, whole numbers.
+pub(super) fn oddity(factor: f64, ratios: &[f64]) -> u32 {
+    let ratio = factor.abs().max(factor.abs().recip());
+    let whole = |part: f64| (ratio / part - (ratio / part).round()).abs() < 1e-9;
+    if is_unit(factor) || ratios.iter().any(|r| (r / ratio - 1.0).abs() < 1e-9) {
+        return 0;
+    }
+    1 + [10.0, 5.0, 1.0].iter().take_while(|p| !whole(**p)).count() as u32
 }
 
 /// Whether a factor is that of two units.
@@ -142,5 +151,7 @@ mod tests {
         let near = round_numbers(Position, &[], [1.0 / 57.4, 1.0 / 57.2]);
         assert_eq!(near, [PI / 180.0]);
         assert!(round_numbers(Both, &[], [1.86, 1.88]).is_empty());
+        let odd = |f: f64| oddity(f, &[50.1]);
+        assert!(odd(1.0 / 50.1) < odd(50.0) && odd(50.0) < odd(51.0) && odd(51.0) < odd(50.5));
     }
 }

@@ -3,11 +3,13 @@
 //!
 //! ```text
 //! rows of the logs -> each hypothesis: other columns for the same blocks of time
-//!                  -> errors of every joint on blocks left out, and physics: friction brakes, inertia is positive
+//!                  -> errors of every joint on blocks left out, the same gain in all parts of the logs,
+//!                     and physics: friction brakes, inertia is positive
 //!                  -> the one mistake that repairs what the declared set-up cannot explain, or none
 //! ```
 //!
 //! A hypothesis is a mistake that a person makes, from a list. A factor that is on no list is an estimate and no fault.
+//! Blocks, parts and what counts as sure are those of the judge ([`cft_ident_core::judge`]).
 //!
 //! | file | holds |
 //! |---|---|
@@ -19,13 +21,14 @@
 //! | `problem` | sums of products under a correction, by block and joint |
 //! | `trial` | the fit of one hypothesis, its errors on blocks left out |
 //! | `physics` | what no machine does: friction that drives, inertia below zero |
-//! | `factor` | factors that are fitted: which round number they are, if any |
+//! | `estimate` | factors, zeros and directions that are fitted |
 //! | `weight` | the masses of the robot file as a yardstick of its torques |
+//! | `undecided` | why data cannot tell |
 //! | `search` | all of it |
 
 mod channels;
 mod correction;
-mod factor;
+mod estimate;
 mod finding;
 mod hypotheses;
 mod physics;
@@ -33,22 +36,24 @@ mod problem;
 mod sample;
 mod search;
 mod trial;
+mod undecided;
 mod weight;
 
 pub use channels::{Channels, Drive};
 pub use correction::{Change, Correction};
-pub use factor::Factor;
+pub use estimate::Estimate;
 pub use finding::{
     Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, Setting,
     SetupErrors, SetupReport,
 };
 pub use physics::Driven;
 pub use problem::{KnownBeforehand, Problem};
-pub use sample::{MOST_ROWS, Sample, Thinner};
+pub use sample::{Sample, Thinner};
 pub use search::{Found, Searched, search};
-pub use weight::Weight;
+pub use undecided::{Cause, Undecided};
+pub use weight::{Gain, Weight};
 
-/// The numbers that decide.
+/// The numbers that decide beside those of the judge.
 #[derive(Debug, Clone, Copy)]
 pub struct SetupLimits {
     /// A set-up is absurd where a joint's error is above this share of its torque. Half: machines of much friction are
@@ -57,13 +62,12 @@ pub struct SetupLimits {
     /// A repair leaves no more of the torque of such a joint, as sound machines do. Half: wrists are never repaired;
     /// twice: anything repairs.
     pub sound: f64,
-    /// Below this error of every joint nobody asks. Half: all machines are searched for nothing; twice: it is `sound`.
+    /// Below this error of every joint nobody asks. Half: all machines are searched for nothing; twice: ratios of two
+    /// are passed over.
     pub doubtful: f64,
-    /// Squared errors of blocks left out, all joints together, are at most this share of those as declared: the floor
-    /// of gain that a mistake makes. Half: exchanged neighbours are passed over; one: effects look like mistakes.
+    /// Squared errors of blocks left out are at most this share of those as declared, in the joints that gain: the
+    /// floor of gain that a mistake makes. Half: exchanged neighbours are passed over; one: effects look like mistakes.
     pub floor: f64,
-    /// A gain counts above so many standard errors of its blocks. Half: noise counts; twice: short logs say nothing.
-    pub sure: f64,
     /// Another reading is far where it leaves so many times the squared error. One: what chance prefers is certain;
     /// twice: readings of neighbouring joints hide each other.
     pub far: f64,
@@ -72,8 +76,10 @@ pub struct SetupLimits {
     pub same: f64,
     /// Torques of the robot file's own masses, and its limits of torque, are right within this factor.
     pub yardstick: f64,
-    /// Blocks of time, of which each is left out once.
-    pub blocks: usize,
+    /// A joint that travels less \[rad, m\], or is slower than this share of its rms speed, stands still.
+    pub still: f64,
+    /// Most rows that are kept of all logs, and of few a fifth.
+    pub rows: usize,
     /// Hypotheses that few rows pass on to all rows.
     pub short_list: usize,
 }
@@ -81,13 +87,13 @@ pub struct SetupLimits {
 /// The numbers of the check.
 pub const LIMITS: SetupLimits = SetupLimits {
     unexplained: 0.5,
-    sound: 0.35,
-    doubtful: 0.2,
+    sound: 0.25,
+    doubtful: 0.05,
     floor: 0.5,
-    sure: 3.0,
     far: 1.5,
     same: 0.1,
     yardstick: 3.0,
-    blocks: 24,
+    still: 0.01,
+    rows: 2000,
     short_list: 12,
 };

@@ -4,17 +4,10 @@ use nalgebra::DVector;
 
 use super::LIMITS;
 use super::channels::Carried;
-use super::problem::{Problem, own_column};
+use super::problem::Problem;
 use super::trial::Trial;
 use cft_ident_core::inertia::columns::Own;
-
-/// Rows whose poses stand for all of them.
-const POSES: usize = 60;
-/// Rows whose motion stands for all of them.
-const MOTIONS: usize = 500;
-
-/// A smaller share of its way in the other direction does not tell friction from a constant torque.
-const OTHER_WAY: f64 = 0.1;
+use cft_ident_core::judge::NUMBERS;
 
 /// A joint whose friction drives it, whichever block is left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,36 +22,29 @@ pub struct Driven {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Broken {
     pub friction: Vec<Driven>,
-    /// Joints whose inertia is below zero.
-    inertia: Vec<usize>,
+    /// Joints that are broken in both ways: a turned sign turns inertia and friction.
+    pub turned: Vec<usize>,
 }
 
 impl Broken {
     /// Of a trial.
     pub fn of(problem: &Problem, trial: &Trial) -> Self {
-        let joints: Vec<usize> = problem.channels_that_move();
-        let inertia = inertias(problem, trial);
-        let power = powers(problem, trial);
-        let driven = |j: &usize| {
-            let (power, std) = below(trial, power[*j].as_ref()?)?;
-            Some(Driven {
-                joint: *j,
-                power,
-                std,
-            })
+        let driven = |joint: usize| {
+            let (power, std) = below(trial, &friction_power(problem, trial, joint)?)?;
+            Some(Driven { joint, power, std })
         };
+        let joints = problem.channels_that_move();
+        let friction: Vec<Driven> = joints.into_iter().filter_map(driven).collect();
+        let inertia = match friction.is_empty() {
+            true => Vec::new(),
+            false => inertias(problem, trial),
+        };
+        let both = friction.iter().map(|driven| driven.joint);
+        let turned = both.filter(|j| below(trial, &inertia[*j]).is_some());
         Self {
-            friction: joints.iter().filter_map(driven).collect(),
-            inertia: (joints.iter().copied())
-                .filter(|j| below(trial, &inertia[*j]).is_some())
-                .collect(),
+            turned: turned.collect(),
+            friction,
         }
-    }
-
-    /// Joints that are broken in both ways: a turned sign turns inertia and friction.
-    pub fn turned(&self) -> Vec<usize> {
-        let both = self.friction.iter().map(|d| d.joint);
-        both.filter(|j| self.inertia.contains(j)).collect()
     }
 }
 
@@ -70,7 +56,7 @@ fn inertias(problem: &Problem, trial: &Trial) -> Vec<DVector<f64>> {
     let mut out = vec![DVector::zeros(trial.theta.len()); n];
     let (mut unit, still) = (vec![0.0; n], vec![0.0; n]);
     let (mut y, mut at_rest) = (vec![0.0; n * p], vec![0.0; n * p]);
-    for k in problem.sample.spread(POSES) {
+    for k in (0..problem.sample.len()).step_by(problem.few()) {
         if !(problem.channels).carry(robot, problem.sample.row(k), &trial.by, &mut carried) {
             continue;
         }
@@ -80,47 +66,52 @@ fn inertias(problem: &Problem, trial: &Trial) -> Vec<DVector<f64>> {
             robot.regressor(&carried.q, &still, &unit, &mut y);
             unit[j] = 0.0;
             for c in 0..p {
-                out[j][c] += (y[j * p + c] - at_rest[j * p + c]) / POSES as f64;
+                out[j][c] += y[j * p + c] - at_rest[j * p + c];
             }
         }
     }
     out
 }
 
-/// The mean power of each joint's friction, as weights of the unknowns; none of a joint that goes one way only.
-fn powers(problem: &Problem, trial: &Trial) -> Vec<Option<DVector<f64>>> {
-    let n = trial.robot.joints();
-    let mut carried = Carried::new(n);
-    let mut out = vec![DVector::zeros(trial.theta.len()); n];
-    let mut ways = vec![[0.0_f64; 2]; n];
-    let rows = problem.sample.spread(MOTIONS);
-    for &k in &rows {
-        if !(problem.channels).carry(&trial.robot, problem.sample.row(k), &trial.by, &mut carried) {
-            continue;
-        }
-        for j in 0..n {
-            let v = carried.v[j];
-            ways[j][usize::from(v > 0.0)] += v.abs();
-            let first = problem.first_own(&trial.robot, j);
-            for (i, own) in problem.columns.own[j].iter().enumerate() {
-                if *own != Own::Offset {
-                    out[j][first + i] += v * own_column(*own, &carried, j) / rows.len() as f64;
-                }
-            }
+/// The mean power of a joint's friction, as weights of the unknowns: the products of its columns with the speed; none of
+/// a joint that goes one way only, where friction and a constant torque are the same.
+fn friction_power(problem: &Problem, trial: &Trial, joint: usize) -> Option<DVector<f64>> {
+    let own = &problem.columns.own[joint];
+    let first = problem.first_own(&trial.robot, joint);
+    let sums = &trial.total[joint];
+    let column = |of: Own| {
+        let at = own.iter().position(|o| *o == of)?;
+        Some(sums.nrows() - 1 - own.len() + at)
+    };
+    let speed = column(Own::Viscous)?;
+    if let (Some(one), Some(sign)) = (column(Own::Offset), column(Own::Coulomb)) {
+        // the way there and back, and what of it is left
+        let (way, net) = (sums[(speed, sign)], sums[(speed, one)]);
+        if net.abs() > (1.0 - 2.0 * LIMITS.same) * way {
+            return None;
         }
     }
-    let both = |[a, b]: &[f64; 2]| a.min(*b) > OTHER_WAY * (a + b);
-    let pairs = out.into_iter().zip(&ways);
-    pairs.map(|(f, ways)| both(ways).then_some(f)).collect()
+    let mut out = DVector::zeros(trial.theta.len());
+    for (i, of) in own.iter().enumerate().filter(|(_, of)| **of != Own::Offset) {
+        out[first + i] = sums[(speed, column(*of)?)] / trial.rows.count as f64;
+    }
+    Some(out)
 }
 
 /// f' theta and its standard error where it is below zero whichever block is left out, and beyond doubt.
 fn below(trial: &Trial, f: &DVector<f64>) -> Option<(f64, f64)> {
     let values: Vec<f64> = trial.without.iter().map(|theta| f.dot(theta)).collect();
+    let (mean, std) = jackknife(&values);
+    let all = values.iter().all(|x| *x < 0.0);
+    // as sure as an agreement of parts
+    let beyond = mean * mean * (1.0 - NUMBERS.confirmed) > NUMBERS.doubt * std * std;
+    (all && beyond).then_some((mean, std))
+}
+
+/// Mean and standard error of values of which each leaves out one block.
+pub(super) fn jackknife(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let scatter: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
-    let std = (scatter * (count - 1.0) / count).sqrt();
-    let all = values.iter().all(|x| *x < 0.0);
-    (all && mean < -LIMITS.sure * std).then_some((mean, std))
+    (mean, (scatter * (count - 1.0) / count).sqrt())
 }

@@ -2,14 +2,13 @@
 
 use nalgebra::DMatrix;
 
+use super::LIMITS;
 use super::channels::{Carried, Channels, Drive};
 use super::correction::Correction;
 use super::sample::Sample;
 use cft_ident_core::inertia::columns::{Own, RegressorColumns};
-use cft_ident_core::robot::{JointKind, Robot};
-
-/// A joint that travels less stands still where others are moved \[rad, m\].
-const STILL: [f64; 2] = [0.01, 0.003];
+use cft_ident_core::judge::{Blocks, Bound, NUMBERS, Term, divide};
+use cft_ident_core::robot::Robot;
 
 /// What the robot file knows beside its channels.
 #[derive(Debug, Clone, Default)]
@@ -32,6 +31,7 @@ pub struct Problem<'a> {
     pub columns: &'a RegressorColumns,
     pub sample: Sample,
     pub known: KnownBeforehand,
+    pub(super) blocks: Blocks,
     /// Joints that move, and whose torques are not all zero.
     moving: Vec<bool>,
 }
@@ -39,9 +39,9 @@ pub struct Problem<'a> {
 /// Sums of products by block and joint: the joint's inertial parameters, its own terms, the torque of each channel.
 pub(super) struct Rows {
     pub blocks: Vec<Vec<DMatrix<f64>>>,
-    /// Of each joint, the unknowns that its columns are of.
-    pub places: Vec<Vec<usize>>,
-    pub unknowns: usize,
+    pub terms: Vec<Term>,
+    /// Rows that are poses of the robot.
+    pub count: usize,
 }
 
 impl<'a> Problem<'a> {
@@ -53,6 +53,7 @@ impl<'a> Problem<'a> {
         sample: Sample,
         known: KnownBeforehand,
     ) -> Self {
+        let blocks = divide(&sample.logs(), 1.0, &NUMBERS);
         let mut out = Self {
             robot,
             in_gravity,
@@ -60,6 +61,7 @@ impl<'a> Problem<'a> {
             columns,
             sample,
             known,
+            blocks,
             moving: Vec::new(),
         };
         out.moving = out.joints_that_move();
@@ -75,22 +77,25 @@ impl<'a> Problem<'a> {
     /// thousandths of its unit.
     fn joints_that_move(&self) -> Vec<bool> {
         let n = self.sample.joints;
-        let travels = |j: usize| {
-            let least = match self.robot.joint_kind(j) {
-                JointKind::Revolute => STILL[0],
-                JointKind::Prismatic => STILL[1],
-            };
-            self.sample.travel(j) > least
-        };
-        let moved: Vec<bool> = (0..n).map(travels).collect();
-        let alone = n > 1 && moved.iter().filter(|m| **m).count() == 1;
+        let moved = |j: &usize| self.sample.travel(*j) > LIMITS.still;
+        let alone = n > 1 && (0..n).filter(moved).count() == 1;
         // a motor behind a linkage is no joint
         let linked = self.channels.drive == Drive::Motors;
-        let torques = self.sample.rms(&self.sample.tau);
-        let speeds = self.sample.rms(&self.sample.v);
+        let torques = self.sample.rms(|row| row.tau);
+        let speeds = self.sample.rms(|row| row.v);
         let moving =
-            |j: usize| linked || torques[j] > 0.0 && speeds[j] > 0.0 && (moved[j] || !alone);
+            |j: usize| linked || torques[j] > 0.0 && speeds[j] > 0.0 && (moved(&j) || !alone);
         (0..n).map(moving).collect()
+    }
+
+    /// Every how many rows make few of them.
+    pub(super) fn few(&self) -> usize {
+        self.sample.len().div_ceil(LIMITS.rows / 5).max(1)
+    }
+
+    /// Whether the place of a joint's zero shows.
+    pub(super) fn has_zeros(&self) -> bool {
+        self.robot.knows_links() && self.channels.drive != Drive::Motors
     }
 
     /// Channels whose signs and units are asked for.
@@ -124,25 +129,21 @@ impl<'a> Problem<'a> {
         all.map(of).collect()
     }
 
-    /// Sums over the rows of these numbers, in `blocks` blocks; none where most of the rows are no pose of the robot.
-    pub(super) fn rows(
-        &self,
-        robot: &Robot,
-        by: &Correction,
-        rows: &[usize],
-        blocks: usize,
-    ) -> Option<Rows> {
+    /// Sums over every so many rows of each block; none where most of them are no pose of the robot.
+    pub(super) fn rows(&self, robot: &Robot, by: &Correction, every: usize) -> Option<Rows> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let places = self.places_of(robot);
         let widths: Vec<usize> = places.iter().map(|c| c.len() + n).collect();
         let mut carried = Carried::new(n);
         let mut y = vec![0.0; n * p];
-        let mut out: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(blocks);
+        let mut out: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(self.blocks.list.len());
         let mut data: Vec<Vec<f64>> = vec![Vec::new(); n];
-        let mut good = 0;
-        for block in 0..blocks {
+        let (mut good, mut all) = (0, 0);
+        for block in &self.blocks.list {
             data.iter_mut().for_each(Vec::clear);
-            for &k in &rows[block * rows.len() / blocks..(block + 1) * rows.len() / blocks] {
+            let rows = block.pieces.iter().flat_map(|(_, rows)| rows.clone());
+            for k in rows.filter(|k| k % every == 0) {
+                all += 1;
                 if !(self.channels).carry(robot, self.sample.row(k), by, &mut carried) {
                     continue;
                 }
@@ -159,20 +160,24 @@ impl<'a> Problem<'a> {
                     data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
                 }
             }
-            let gram = |(data, width): (&Vec<f64>, &usize)| match data.is_empty() {
-                true => DMatrix::zeros(*width, *width),
-                // columns of the transposed are rows
-                false => {
-                    let x = DMatrix::from_column_slice(*width, data.len() / width, data);
-                    &x * x.transpose()
-                }
+            // columns of the transposed are rows
+            let gram = |(data, width): (&Vec<f64>, &usize)| {
+                let x = DMatrix::from_column_slice(*width, data.len() / width, data);
+                &x * x.transpose()
             };
             out.push(data.iter().zip(&widths).map(gram).collect());
         }
-        (good > 0 && 2 * good >= rows.len()).then(|| Rows {
+        let term = |unknown: usize| {
+            let of = |j: usize| Some((j, places[j].iter().position(|u| *u == unknown)?));
+            Term {
+                columns: (0..n).filter_map(of).collect(),
+                bound: Bound::NONE,
+            }
+        };
+        (good > 0 && 2 * good >= all).then(|| Rows {
             blocks: out,
-            unknowns: self.first_own(robot, n),
-            places,
+            terms: (0..self.first_own(robot, n)).map(term).collect(),
+            count: good,
         })
     }
 }

@@ -1,36 +1,34 @@
 //! A bounded number of smoothed rows, spread over the logs.
 
-/// Most rows that are kept.
-pub const MOST_ROWS: usize = 2000;
+use super::LIMITS;
+use cft_ident_core::judge::LogRows;
 
-/// A joint rests below this share of its rms speed.
-const RESTING: f64 = 0.01;
+/// Numbers of a joint in a row.
+const OF_JOINT: usize = 6;
 
-/// Rows of smoothed motion and torque; each list holds n numbers a row. Of motors behind a linkage they are what the
-/// channels have: it is to be told which of them belong to no pose.
+/// Rows of smoothed motion and torque. Of motors behind a linkage they are what the channels have: it is to be told
+/// which of them belong to no pose.
 #[derive(Debug, Clone, Default)]
 pub struct Sample {
     pub joints: usize,
-    /// Positions [m or rad], velocities and accelerations, joint side as declared.
-    pub q: Vec<f64>,
-    pub v: Vec<f64>,
-    pub a: Vec<f64>,
-    /// Signs of the velocities, filtered as all others.
-    pub sign: Vec<f64>,
-    /// Torques [N or N m], joint side as declared.
-    pub tau: Vec<f64>,
     /// Of each row, its log.
-    pub log: Vec<usize>,
+    log: Vec<usize>,
+    rows: Vec<f64>,
 }
 
-/// One row.
+/// One row, joint side as declared.
 #[derive(Debug, Clone, Copy)]
 pub struct Row<'a> {
+    /// Positions [m or rad], velocities and accelerations.
     pub q: &'a [f64],
     pub v: &'a [f64],
     pub a: &'a [f64],
+    /// Signs of the velocities, filtered as all others.
     pub sign: &'a [f64],
+    /// Torques [N or N m].
     pub tau: &'a [f64],
+    /// Integrals of the positions over time since the log began.
+    pub sum: &'a [f64],
 }
 
 impl Sample {
@@ -46,89 +44,98 @@ impl Sample {
 
     /// Row k.
     pub fn row(&self, k: usize) -> Row<'_> {
-        let at = k * self.joints..(k + 1) * self.joints;
+        let n = self.joints;
+        let list = |i: usize| &self.rows[(k * OF_JOINT + i) * n..(k * OF_JOINT + i + 1) * n];
         Row {
-            q: &self.q[at.clone()],
-            v: &self.v[at.clone()],
-            a: &self.a[at.clone()],
-            sign: &self.sign[at.clone()],
-            tau: &self.tau[at],
+            q: list(0),
+            v: list(1),
+            a: list(2),
+            sign: list(3),
+            tau: list(4),
+            sum: list(5),
         }
     }
 
-    /// Root mean square of each column of one list.
-    pub fn rms(&self, of: &[f64]) -> Vec<f64> {
-        let mut sums = vec![0.0; self.joints];
-        for row in of.chunks_exact(self.joints.max(1)) {
-            for (sum, x) in sums.iter_mut().zip(row) {
-                *sum += x * x;
-            }
-        }
+    /// Sum over all rows of a product of two numbers of a joint.
+    pub fn product(&self, of: impl Fn(Row<'_>) -> f64) -> f64 {
+        (0..self.len()).map(|k| of(self.row(k))).sum()
+    }
+
+    /// Root mean square of a number of each joint.
+    pub fn rms(&self, of: impl Fn(Row<'_>) -> &[f64]) -> Vec<f64> {
         let rows = self.len().max(1) as f64;
-        sums.iter().map(|sum| (sum / rows).sqrt()).collect()
+        let of_joint = |j: usize| (self.product(|row| of(row)[j].powi(2)) / rows).sqrt();
+        (0..self.joints).map(of_joint).collect()
     }
 
     /// How far a joint travels \[m or rad\].
     pub(super) fn travel(&self, joint: usize) -> f64 {
-        let q = self.q.iter().skip(joint).step_by(self.joints.max(1));
-        let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
+        let q = (0..self.len()).map(|k| self.row(k).q[joint]);
+        let ends = |(l, h): (f64, f64), q: f64| (l.min(q), h.max(q));
         let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
         high - low
     }
 
+    /// The rows of each log, a row being the unit of time.
+    pub(super) fn logs(&self) -> Vec<LogRows> {
+        let speeds = self.rms(|row| row.v);
+        let mut out: Vec<LogRows> = Vec::new();
+        for (first, log) in self.log.iter().enumerate() {
+            if out.last().is_none_or(|last| last.log != *log) {
+                let rows = self.log[first..].iter().take_while(|l| *l == log).count();
+                let own = first..first + rows;
+                let fast = |j: usize| {
+                    let moves = |k: usize| self.row(k).v[j].abs() > LIMITS.still * speeds[j];
+                    own.clone().any(moves)
+                };
+                out.push(LogRows {
+                    log: *log,
+                    pieces: vec![(out.len(), own.clone())],
+                    step_s: 1.0,
+                    moves: (0..self.joints).map(fast).collect(),
+                });
+            }
+        }
+        out
+    }
+
     /// Leaves out the rows in which nothing moves: static friction takes any torque there.
     fn without_rests(&mut self) {
-        let n = self.joints;
-        let speeds = self.rms(&self.v);
-        let moves = |v: &[f64]| {
-            v.iter()
-                .zip(&speeds)
-                .any(|(v, rms)| v.abs() > RESTING * rms)
+        let speeds = self.rms(|row| row.v);
+        let moves = |k: &usize| {
+            let pairs = self.row(*k).v.iter().zip(&speeds);
+            pairs
+                .into_iter()
+                .any(|(v, rms)| v.abs() > LIMITS.still * rms)
         };
-        let kept: Vec<usize> = (0..self.len())
-            .filter(|k| moves(&self.v[k * n..(k + 1) * n]))
-            .collect();
-        if kept.len() < self.len() / 4 {
-            return;
+        let kept: Vec<usize> = (0..self.len()).filter(moves).collect();
+        if kept.len() >= self.len() / 4 {
+            self.keep(&kept);
         }
-        self.keep(&kept);
     }
 
     /// Keeps these rows, in order.
     fn keep(&mut self, kept: &[usize]) {
-        let n = self.joints;
-        for list in [
-            &mut self.q,
-            &mut self.v,
-            &mut self.a,
-            &mut self.sign,
-            &mut self.tau,
-        ] {
-            for (to, from) in kept.iter().enumerate() {
-                list.copy_within(from * n..(from + 1) * n, to * n);
-            }
-            list.truncate(kept.len() * n);
-        }
+        let width = OF_JOINT * self.joints;
         for (to, from) in kept.iter().enumerate() {
+            self.rows
+                .copy_within(from * width..(from + 1) * width, to * width);
             self.log[to] = self.log[*from];
         }
+        self.rows.truncate(kept.len() * width);
         self.log.truncate(kept.len());
-    }
-
-    /// About `most` rows of these, evenly spread.
-    pub fn spread(&self, most: usize) -> Vec<usize> {
-        let step = self.len().div_ceil(most.max(1)).max(1);
-        (0..self.len()).step_by(step).collect()
     }
 }
 
-/// Takes rows as they come and keeps at most [`MOST_ROWS`], every so many: twice as rarely each time that
+/// Takes rows as they come and keeps at most [`LIMITS`]`.rows`, every so many: twice as rarely each time that
 /// there are too many.
 #[derive(Debug, Clone)]
 pub struct Thinner {
     sample: Sample,
     every: u64,
     seen: u64,
+    /// Log, time, positions and their integrals of the row before.
+    last: Option<(usize, f64, Vec<f64>, Vec<f64>)>,
 }
 
 impl Thinner {
@@ -141,28 +148,37 @@ impl Thinner {
             },
             every: 1,
             seen: 0,
+            last: None,
         }
     }
 
-    /// Adds a row of a log: positions, velocities, accelerations, signs of the velocities and torques, one after the
-    /// other.
-    pub fn add(&mut self, log: usize, channels: &[f64]) {
+    /// Adds a row of a log at time t \[s\]: positions, velocities, accelerations, signs of the velocities and torques,
+    /// one after the other.
+    pub fn add(&mut self, log: usize, t: f64, channels: &[f64]) {
         let n = self.sample.joints;
-        let take = self.seen.is_multiple_of(self.every);
-        self.seen += 1;
-        if !take || channels.len() != 5 * n || channels.iter().any(|x| !x.is_finite()) {
+        if channels.len() != (OF_JOINT - 1) * n || channels.iter().any(|x| !x.is_finite()) {
             return;
         }
-        let s = &mut self.sample;
-        let lists = [&mut s.q, &mut s.v, &mut s.a, &mut s.sign, &mut s.tau];
-        for (list, x) in lists.into_iter().zip(channels.chunks_exact(n)) {
-            list.extend_from_slice(x);
+        let q = &channels[..n];
+        let sum = match self.last.take() {
+            Some((of, last, before, sum)) if of == log => {
+                let step = t - last;
+                let pairs = sum.iter().zip(q.iter().zip(&before));
+                pairs.map(|(s, (q, b))| s + 0.5 * step * (q + b)).collect()
+            }
+            _ => vec![0.0; n],
+        };
+        if self.seen.is_multiple_of(self.every) {
+            self.sample.rows.extend_from_slice(channels);
+            self.sample.rows.extend_from_slice(&sum);
+            self.sample.log.push(log);
         }
-        s.log.push(log);
-        if s.len() > MOST_ROWS {
+        self.seen += 1;
+        self.last = Some((log, t, q.to_vec(), sum));
+        if self.sample.len() > LIMITS.rows {
             self.every *= 2;
-            let kept: Vec<usize> = (0..s.len()).step_by(2).collect();
-            s.keep(&kept);
+            let kept: Vec<usize> = (0..self.sample.len()).step_by(2).collect();
+            self.sample.keep(&kept);
         }
     }
 
@@ -178,31 +194,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_log_is_thinned_evenly() {
+    fn a_long_log_is_thinned_evenly_and_rows_in_which_nothing_moves_are_left_out() {
         let mut thinner = Thinner::new(1);
         for k in 0..30_000 {
             let x = f64::from(k);
-            thinner.add(k as usize / 10_000, &[x, 1.0, x, x, x]);
+            let v = if k < 100 { 0.0 } else { 1.0 };
+            thinner.add(k as usize / 10_000, 0.5 * x, &[x, v, x, x, x]);
         }
         let sample = thinner.finish();
-        assert!((MOST_ROWS / 2..=MOST_ROWS).contains(&sample.len()));
-        let steps: Vec<f64> = sample.q.windows(2).map(|w| w[1] - w[0]).collect();
-        assert!(steps.iter().all(|s| *s == steps[0]), "{steps:?}");
-        assert_eq!(sample.log[sample.len() - 1], 2);
-    }
-
-    #[test]
-    fn rows_in_which_nothing_moves_are_left_out() {
-        let mut thinner = Thinner::new(2);
-        for k in 0..100 {
-            let (v, w) = if k % 4 == 0 { (0.0, 0.0) } else { (0.0, 1.0) };
-            let q = f64::from(k);
-            let row = [q, q, v, w, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0];
-            thinner.add(0, &row);
-        }
-        let sample = thinner.finish();
-        assert_eq!(sample.len(), 75);
-        let kept = sample.q.iter().step_by(2);
-        assert!(kept.clone().all(|q| q % 4.0 != 0.0) && sample.tau.len() == 150);
+        assert!((LIMITS.rows / 2..=LIMITS.rows).contains(&sample.len()));
+        let step = |k: usize| sample.row(k + 1).q[0] - sample.row(k).q[0];
+        assert!((0..sample.len() - 1).all(|k| step(k) == step(0)));
+        assert!(sample.row(0).q[0] >= 100.0 && sample.logs().len() == 3);
+        let first = sample.row(0);
+        assert_eq!(first.sum[0], 0.25 * first.q[0] * first.q[0]);
     }
 }

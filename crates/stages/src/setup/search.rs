@@ -3,22 +3,17 @@
 use rayon::prelude::*;
 
 use super::LIMITS;
+use super::channels::Drive;
 use super::correction::{Change, Correction};
-use super::factor::{Factor, factors};
+use super::estimate::{Estimate, estimates};
 use super::finding::ChannelKind::Torque;
-use super::hypotheses;
+use super::hypotheses::{self, oddity};
 use super::physics::{Broken, Driven};
 use super::problem::Problem;
-use super::trial::{Trial, compared, gain};
+use super::trial::{Compared, Trial};
+use super::undecided::{Undecided, proportion, undecided};
 use super::weight::{Weight, weights};
-
-/// Rows that hypotheses are chosen by, and their blocks.
-const FEW: usize = 400;
-const FEW_BLOCKS: usize = 6;
-/// Mistakes in one file: the second is looked for when the first is put right.
-const MISTAKES: usize = 2;
-/// Mistakes to which each other one is joined.
-const FIRST: usize = 3;
+use cft_ident_core::judge::NUMBERS;
 
 /// A mistake, with the errors of every joint on blocks left out.
 #[derive(Debug, Clone)]
@@ -28,8 +23,12 @@ pub struct Found {
     pub errors: [Vec<f64>; 2],
     /// Beyond doubt: a fit refuses the logs.
     pub sure: bool,
+    /// Readings that fit alike are of other joints: these data cannot tell.
+    pub open: bool,
     /// Other readings that these data do not tell from it.
     pub tied: Vec<Change>,
+    /// Joints of them that move in proportion.
+    pub together: Option<[usize; 2]>,
 }
 
 /// What a search found.
@@ -40,12 +39,14 @@ pub struct Searched {
     pub correction: Option<Correction>,
     /// Joints whose friction drives them, where no mistake explains it.
     pub driven: Vec<Driven>,
-    /// A factor that is no round number: an estimate.
-    pub factor: Option<(Factor, [Vec<f64>; 2])>,
+    /// A value that is on no list, with the errors as declared and with it.
+    pub estimate: Option<(Estimate, [Vec<f64>; 2])>,
     /// Errors with gravity and without, where the torques hold none.
     pub without_gravity: Option<[Vec<f64>; 2]>,
     /// Gain of the measured weight over that of the file's own masses.
     pub weights: Vec<Weight>,
+    /// Joints that miss much, and no mistake that repairs them.
+    pub undecided: Vec<Undecided>,
 }
 
 /// A reading with all that decides on it.
@@ -54,23 +55,23 @@ struct Judged {
     broken: Broken,
 }
 
-/// Looks for what is wrong with the set-up. `stopped` ends it early with what is found so far.
+/// Looks for what is wrong with the set-up: one mistake, and a second one when the first is put right. `stopped` ends it
+/// early with what is found so far.
 pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searched {
     let n = problem.robot.joints();
     let mut out = Searched::default();
-    let moving = problem.channels_that_move();
     let least = 4 * problem.robot.parameters().len() / n.max(1) + 40;
-    if moving.is_empty() || problem.sample.len() < least {
+    if problem.channels_that_move().is_empty() || problem.sample.len() < least {
         return out;
     }
-    let look = Look::new(problem, stopped);
+    let look = Look { problem, stopped };
     let mut base = Correction::none(n);
-    for _ in 0..MISTAKES {
+    for _ in 0..2 {
         let declared = look.whole(&base, None, None);
-        let round = look.round(&base, declared.as_ref());
+        let (found, estimate) = look.round(&base, declared.as_ref());
         out.driven = declared.map_or_else(Vec::new, |d| d.broken.friction);
-        out.factor = round.factor.filter(|_| out.found.is_empty());
-        let Some(found) = round.found else { break };
+        out.estimate = estimate.filter(|_| out.found.is_empty());
+        let Some(found) = found else { break };
         let sure = found.sure;
         if sure {
             base = base.with(&found.change);
@@ -86,43 +87,29 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
         && let Some(declared) = look.whole(&base, None, None)
     {
         out.without_gravity = look.without_gravity(&declared.trial);
-        out.weights = weights(problem, &look.all);
+        out.weights = weights(problem);
+        if out.estimate.is_none() {
+            out.undecided = undecided(problem, &declared.trial);
+        }
     }
     out
 }
 
-/// What one round found.
-#[derive(Default)]
-struct Round {
-    found: Option<Found>,
-    factor: Option<(Factor, [Vec<f64>; 2])>,
-}
+type Told = Option<(Estimate, [Vec<f64>; 2])>;
 
 struct Look<'a> {
     problem: &'a Problem<'a>,
-    few: Vec<usize>,
-    all: Vec<usize>,
     stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl<'a> Look<'a> {
-    fn new(problem: &'a Problem<'a>, stopped: &'a (dyn Fn() -> bool + Sync)) -> Self {
-        Self {
-            problem,
-            few: problem.sample.spread(FEW),
-            all: (0..problem.sample.len()).collect(),
-            stopped,
-        }
-    }
-
+impl Look<'_> {
     fn whole(
         &self,
         base: &Correction,
         change: Option<&Change>,
         same: Option<&Trial>,
     ) -> Option<Judged> {
-        let rows = (&self.all[..], LIMITS.blocks);
-        let trial = Trial::new(self.problem, (base, change), rows, same)?;
+        let trial = Trial::new(self.problem, (base, change), 1, same)?;
         let broken = Broken::of(self.problem, &trial);
         Some(Judged { trial, broken })
     }
@@ -135,51 +122,65 @@ impl<'a> Look<'a> {
     ) -> Option<Trial> {
         match (self.stopped)() {
             true => None,
-            false => Trial::new(self.problem, (base, change), (&self.few, FEW_BLOCKS), same),
+            false => Trial::new(self.problem, (base, change), self.problem.few(), same),
         }
     }
 
-    fn round(&self, base: &Correction, declared: Option<&Judged>) -> Round {
+    fn round(&self, base: &Correction, declared: Option<&Judged>) -> (Option<Found>, Told) {
         let moving = self.problem.channels_that_move();
-        let doubt = match declared {
-            None => moving.clone(),
-            Some(d) => {
-                let errors = d.trial.errors();
-                (moving.iter().copied())
-                    .filter(|j| errors[*j] > LIMITS.doubtful)
-                    .collect()
-            }
-        };
-        let turned = declared.map_or_else(Vec::new, |d| d.broken.turned());
-        if doubt.is_empty() && turned.is_empty() {
-            return Round::default();
+        let (mut doubt, mut turned) = (moving.clone(), 0);
+        if let Some(d) = declared {
+            let errors = d.trial.errors();
+            doubt.retain(|j| errors[*j] > LIMITS.doubtful);
+            turned = d.broken.turned.len();
+        }
+        if doubt.is_empty() && turned == 0 {
+            return (None, None);
         }
         let few = self.quick(base, None, None);
-        let mut list = self.judged(
-            base,
-            hypotheses::all(self.problem),
-            (few.as_ref(), declared),
-        );
-        let mut fitted = None;
+        let all = hypotheses::all(self.problem);
+        let mut list = self.judged(base, all, (few.as_ref(), declared));
+        let mut fitted: Option<(Estimate, Trial)> = None;
         if let (Some(few), Some(whole), true) = (&few, declared, moving.len() > 1) {
-            fitted = self.fitted(base, &doubt, (few, whole), &mut list);
+            let both = (few, &whole.trial);
+            for estimate in estimates(self.problem, base, &doubt, both) {
+                let mistakes = estimate.mistakes(&self.problem.known.ratios);
+                let known = |c: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(c));
+                let new: Vec<Change> = mistakes.into_iter().filter(|c| !known(c)).collect();
+                let of = |c: &Change| self.whole(base, Some(c), Some(&whole.trial));
+                list.extend(new.iter().filter_map(of));
+                if let Some(judged) = of(&estimate.change)
+                    && fitted
+                        .as_ref()
+                        .is_none_or(|f| judged.trial.whole() < f.1.whole())
+                {
+                    fitted = Some((estimate, judged.trial));
+                }
+            }
         }
+        list.retain(|judged| self.has_a_factor(base, judged, declared));
         let mut found = self.decide(declared, &list, fitted.as_ref().map(|f| &f.1));
-        if found.as_ref().is_none_or(|f| !f.sure) && declared.is_some() {
+        // two mistakes are sure where one is: beside what is absurd
+        let absurd = declared.is_some_and(|d| {
+            let errors = d.trial.errors();
+            turned > 0 || errors.iter().any(|e| *e > LIMITS.unexplained)
+        });
+        if absurd && found.as_ref().is_none_or(|f| !f.sure) {
             let pairs = self.pairs(&list);
-            let list = self.judged(base, pairs, (few.as_ref(), declared));
+            let mut list = self.judged(base, pairs, (few.as_ref(), declared));
+            list.retain(|judged| self.has_a_factor(base, judged, declared));
             let both = self.decide(declared, &list, None);
             found = both.filter(|f| f.sure).or(found);
         }
-        let factor = fitted
+        let told = fitted
             .filter(|_| found.is_none())
-            .and_then(|(factor, trial)| {
+            .and_then(|(estimate, trial)| {
                 let before = &declared?.trial;
-                let (better, no_worse) = compared(before, &trial);
-                let clear = no_worse && gain(before, &trial, &better) > LIMITS.sure;
-                clear.then(|| (factor, [before.errors(), trial.errors()]))
+                let compared = Compared::of(self.problem, before, &trial);
+                let clear = compared.agreed >= NUMBERS.confirmed && !compared.harms;
+                (clear && estimate.is_told()).then(|| (estimate, [before.errors(), trial.errors()]))
             });
-        Round { found, factor }
+        (found, told)
     }
 
     /// The hypotheses of a list that few rows like best, fitted to all rows; with them those that turn what drives.
@@ -189,16 +190,15 @@ impl<'a> Look<'a> {
         list: Vec<Change>,
         (few, declared): (Option<&Trial>, Option<&Judged>),
     ) -> Vec<Judged> {
-        let everyone: Vec<usize> = (0..self.problem.robot.joints()).collect();
-        let score = |change: &Change| Some(self.quick(base, Some(change), few)?.square(&everyone));
+        let score = |change: &Change| Some(self.quick(base, Some(change), few)?.whole());
         let scores: Vec<f64> = (list.par_iter())
             .map(|change| score(change).unwrap_or(f64::INFINITY))
             .collect();
         let mut order: Vec<usize> = (0..list.len()).filter(|i| scores[*i].is_finite()).collect();
         order.sort_by(|a, b| scores[*a].total_cmp(&scores[*b]));
-        let turned = declared.map_or_else(Vec::new, |d| d.broken.turned());
+        let turned = declared.map_or(&[][..], |d| &d.broken.turned);
         let turns = |i: &usize| match &list[*i] {
-            Change::Sign(_, joints) => joints.iter().any(|j| turned.contains(j)),
+            Change::Scale(_, joints, -1.0) => joints.iter().any(|j| turned.contains(j)),
             _ => false,
         };
         let (best, rest) = order.split_at(LIMITS.short_list.min(order.len()));
@@ -210,137 +210,154 @@ impl<'a> Look<'a> {
             .collect()
     }
 
-    /// Factors of the joints in doubt: those that may be mistakes join the list, the best one that is none is returned.
-    fn fitted(
-        &self,
-        base: &Correction,
-        doubt: &[usize],
-        (few, whole): (&Trial, &Judged),
-        list: &mut Vec<Judged>,
-    ) -> Option<(Factor, Trial)> {
-        let rows = [(&self.few[..], FEW_BLOCKS), (&self.all[..], LIMITS.blocks)];
-        let found = factors(self.problem, base, doubt, (few, &whole.trial), rows);
-        let mut estimates: Vec<(Factor, Trial)> = Vec::new();
-        for factor in found {
-            let (own, round) = factor.changes(&self.problem.known.ratios);
-            let known =
-                |change: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(change));
-            let new: Vec<Change> = round.into_iter().filter(|c| !known(c)).collect();
-            list.extend(
-                new.iter()
-                    .filter_map(|c| self.whole(base, Some(c), Some(&whole.trial))),
-            );
-            if let Some(judged) = self.whole(base, Some(&own), Some(&whole.trial)) {
-                estimates.push((factor, judged.trial));
-            }
-        }
-        let everyone: Vec<usize> = (0..self.problem.robot.joints()).collect();
-        estimates
-            .into_iter()
-            .min_by(|a, b| a.1.square(&everyone).total_cmp(&b.1.square(&everyone)))
+    /// Whether the data tell the factor of a hypothesis: any that is far off frees a joint from all others.
+    fn has_a_factor(&self, base: &Correction, judged: &Judged, declared: Option<&Judged>) -> bool {
+        let same = declared.map(|d| &d.trial);
+        let far = |by: f64| {
+            let other = judged.trial.change.as_ref().and_then(|c| c.times(by));
+            let other = other.and_then(|c| Trial::new(self.problem, (base, Some(&c)), 1, same));
+            other.is_none_or(|other| other.whole() > LIMITS.far * judged.trial.whole())
+        };
+        far(LIMITS.yardstick) && far(LIMITS.yardstick.recip())
     }
 
     /// The best of a list each with every other hypothesis.
     fn pairs(&self, list: &[Judged]) -> Vec<Change> {
-        let everyone: Vec<usize> = (0..self.problem.robot.joints()).collect();
-        let mut best: Vec<&Judged> = list.iter().collect();
-        best.sort_by(|a, b| {
-            a.trial
-                .square(&everyone)
-                .total_cmp(&b.trial.square(&everyone))
-        });
-        let firsts: Vec<&Change> = best
-            .iter()
-            .take(FIRST)
-            .filter_map(|j| j.trial.change.as_ref())
-            .collect();
+        let mut best: Vec<&Trial> = list.iter().map(|j| &j.trial).collect();
+        best.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
+        let firsts = best.iter().take(LIMITS.short_list / 4);
         let all = hypotheses::all(self.problem);
         let with = |first: &Change| -> Vec<Change> {
-            let own = first.joints();
             let other = |c: &&Change| {
-                **c != *first && !(c.joints() == own && c.is_of_torques() == first.is_of_torques())
+                let alike = c.is_of_torques() == first.is_of_torques();
+                **c != *first && !(c.joints() == first.joints() && alike)
             };
             let pair = |c: &Change| Change::Two(Box::new(first.clone()), Box::new(c.clone()));
             all.iter().filter(other).map(pair).collect()
         };
-        firsts.into_iter().flat_map(with).collect()
+        firsts
+            .filter_map(|trial| trial.change.as_ref())
+            .flat_map(with)
+            .collect()
     }
 
-    /// The reading of the list that is told, if any. `fitted` is the best factor that is no round number.
+    /// The reading of the list that is told, if any. `fitted` is the best value that is on no list.
     fn decide(
         &self,
         declared: Option<&Judged>,
         list: &[Judged],
         fitted: Option<&Trial>,
     ) -> Option<Found> {
-        let n = self.problem.robot.joints();
-        let everyone: Vec<usize> = (0..n).collect();
-        let turned = declared.map_or_else(Vec::new, |d| d.broken.turned());
+        let everyone = self.problem.channels_that_move();
         // what physics breaks counts first, then the error; the simplest of equals is first in the list
-        let broken = |j: &Judged| j.broken.turned().len();
+        let turned = |j: &Judged| j.broken.turned.len();
         let mut order: Vec<&Judged> = list.iter().collect();
         order.sort_by(|a, b| {
-            let errors = (a.trial.square(&everyone)).total_cmp(&b.trial.square(&everyone));
-            broken(a).cmp(&broken(b)).then(errors)
+            let errors = a.trial.whole().total_cmp(&b.trial.whole());
+            turned(a).cmp(&turned(b)).then(errors)
         });
-        let best = plainer(&order, &everyone)?;
+        let best = self.plainer(&order)?;
+        let change = best.trial.change.clone()?;
         let after = best.trial.errors();
-        let whole = broken(best) < turned.len();
-        let (better, before) = match declared {
-            Some(d) => {
-                // the best one makes a joint worse: nothing on the list is it, and no lesser one takes its place
-                let (better, no_worse) = compared(&d.trial, &best.trial);
-                if !no_worse {
-                    return None;
+        let (mut seen, mut before) = (everyone.clone(), vec![f64::NAN; after.len()]);
+        let (mut mended, mut confirmed) = (false, true);
+        if let Some(d) = declared {
+            let compared = Compared::of(self.problem, &d.trial, &best.trial);
+            mended = turned(best) < turned(d);
+            before = d.trial.errors();
+            let better = &compared.better;
+            let absurd = better.iter().any(|j| before[*j] > LIMITS.unexplained);
+            confirmed = compared.agreed >= NUMBERS.confirmed;
+            // what is not absurd is a factor, or next to all that is missed
+            let left = best.trial.square(better) / d.trial.square(better);
+            let likely = match absurd {
+                true => compared.agreed > 0.0,
+                false => {
+                    let plain = change.times(1.0).is_some() || left < LIMITS.same * LIMITS.same;
+                    confirmed && plain
                 }
-                (better, d.trial.errors())
+            };
+            // behind gears and linkages a motor is of several joints
+            let own = self.problem.channels.drive != Drive::Joints || own_gain(&change, better);
+            // the best one makes a joint worse: nothing on the list is it, and no lesser one takes its place
+            if compared.harms || !(mended || likely && own) {
+                return None;
             }
-            None => (self.problem.channels_that_move(), vec![f64::NAN; n]),
-        };
-        let of_errors = declared.is_none_or(|d| {
-            best.trial.square(&better) <= LIMITS.floor * d.trial.square(&better)
-                && gain(&d.trial, &best.trial, &better) > LIMITS.sure
-        });
-        if !of_errors && !whole {
+            // physics alone tells where no error changes
+            if !compared.better.is_empty() {
+                seen = compared.better;
+            }
+        }
+        if fitted.is_some_and(|f| f.square(&seen) * LIMITS.far < best.trial.square(&seen)) {
             return None;
         }
-        // physics alone tells where no error changes
-        let seen = if better.is_empty() {
-            &everyone
-        } else {
-            &better
-        };
         let near = |j: &Trial| {
-            let (own, other) = (best.trial.square(seen), j.square(seen));
-            other < LIMITS.far * own || gain(j, &best.trial, seen) < LIMITS.sure
+            j.square(&seen) < LIMITS.far * best.trial.square(&seen)
+                || !j.gain(&best.trial, &seen).is_beyond(NUMBERS.screen, None)
         };
-        let is_best = |j: &&&Judged| j.trial.change == best.trial.change;
-        let others = (order.iter().filter(|j| !is_best(j)))
-            .filter(|j| broken(j) <= broken(best) && near(&j.trial));
+        let others = order.iter().filter(|j| j.trial.change != best.trial.change);
+        let others = others.filter(|j| turned(j) <= turned(best) && near(&j.trial));
         let tied: Vec<Change> = others.filter_map(|j| j.trial.change.clone()).collect();
-        let change = best.trial.change.clone()?;
-        let alike = tied.iter().all(|other| same_line(&change, other));
         let beside = fitted.is_some_and(|f| {
             let own = f
                 .change
                 .as_ref()
                 .is_some_and(|c| c.joints() == change.joints());
-            !own && near(f) || f.square(seen) * LIMITS.far < best.trial.square(seen)
+            !own && near(f)
         });
-        let absurd: Vec<usize> = match declared {
-            None => self.problem.channels_that_move(),
-            Some(_) => (better.iter().copied())
-                .filter(|j| before[*j] > LIMITS.unexplained)
-                .collect(),
-        };
+        let absurd: Vec<usize> = (seen.iter().copied())
+            .filter(|j| !(before[*j] <= LIMITS.unexplained))
+            .collect();
         let repaired = absurd.iter().all(|j| after[*j] <= LIMITS.sound)
-            && (!absurd.is_empty() || whole && broken(best) == 0);
+            && (!absurd.is_empty() || mended && turned(best) == 0);
+        let alike = tied.iter().all(|other| same_line(&change, other));
+        let open = !tied.iter().all(|other| same_place(&change, other));
+        // no line mends it, and `inspect` knows it surely where the log has velocities
+        let velocity = matches!(change, Change::Velocity(..));
+        let together = change.joints().into_iter().find_map(|j| {
+            let (other, _) = proportion(self.problem, &everyone, j)?;
+            Some([j, other])
+        });
         Some(Found {
-            sure: repaired && alike && !beside,
+            sure: repaired
+                && (confirmed || mended)
+                && alike
+                && !beside
+                && together.is_none()
+                && !velocity,
             errors: [before, after],
             tied,
             change,
+            open,
+            together,
         })
+    }
+
+    /// The first reading, or another factor of its channel that the blocks do not tell from it and that people write
+    /// more often.
+    fn plainer<'j>(&self, order: &[&'j Judged]) -> Option<&'j Judged> {
+        let best = *order.first()?;
+        let ratios = &self.problem.known.ratios;
+        let odd = |j: &Judged| match &j.trial.change {
+            Some(Change::Scale(_, _, f) | Change::Gear(_, f)) => oddity(*f, ratios),
+            _ => 0,
+        };
+        let alike = |j: &&&Judged| match (&best.trial.change, &j.trial.change) {
+            (Some(Change::Scale(a, of, _)), Some(Change::Scale(b, other, _))) => {
+                a == b && of == other
+            }
+            (Some(Change::Gear(a, _)), Some(Change::Gear(b, _))) => a == b,
+            _ => false,
+        };
+        let everyone = self.problem.channels_that_move();
+        let tied = |j: &&&Judged| {
+            let gain = j.trial.gain(&best.trial, &everyone);
+            let near = j.trial.whole() <= best.trial.whole() * (1.0 + LIMITS.same);
+            near && !gain.is_beyond(NUMBERS.screen, None)
+        };
+        let near = order.iter().filter(alike).filter(tied);
+        // the first of equals
+        Some(near.min_by_key(|j| odd(j)).copied().unwrap_or(best))
     }
 
     /// Errors with gravity and without, where the fit needs none: fewer parameters, and no joint is worse.
@@ -349,34 +366,35 @@ impl<'a> Look<'a> {
             return None;
         }
         let base = Correction::none(self.problem.robot.joints());
-        let none = self
-            .whole(&base, Some(&Change::Gravity([0.0; 3])), None)?
-            .trial;
+        let none = Change::Gravity([0.0; 3]);
+        let none = self.whole(&base, Some(&none), None)?.trial;
         let fewer = none.robot.parameters().len() < declared.robot.parameters().len();
         let sound = none.errors().iter().all(|e| *e <= LIMITS.unexplained);
-        let (_, no_worse) = compared(declared, &none);
-        (fewer && sound && no_worse).then(|| [declared.errors(), none.errors()])
+        let harms = Compared::of(self.problem, declared, &none).harms;
+        (fewer && sound && !harms).then(|| [declared.errors(), none.errors()])
     }
 }
 
-/// The first reading, or a unit of its channel that the blocks do not tell from it: units are mistaken more often than
-/// ratios next to them.
-fn plainer<'j>(order: &[&'j Judged], joints: &[usize]) -> Option<&'j Judged> {
-    let best = *order.first()?;
-    let unit = |j: &&&Judged| match (&best.trial.change, &j.trial.change) {
-        (Some(Change::Scale(a, of, _)), Some(Change::Scale(b, other, f))) => {
-            let alike = a == b && of == other && hypotheses::is_unit(*f);
-            alike && gain(&j.trial, &best.trial, joints) < LIMITS.sure
-        }
-        _ => false,
-    };
-    Some(order.iter().find(unit).copied().unwrap_or(best))
+/// Whether the joints of a change gain by it themselves: each mistake of it shows where it was made.
+fn own_gain(change: &Change, better: &[usize]) -> bool {
+    match change {
+        Change::Two(a, b) => own_gain(a, better) && own_gain(b, better),
+        Change::Exchange(_, a, b) => better.contains(a) && better.contains(b),
+        Change::Reverse | Change::Gravity(_) => !better.is_empty(),
+        one => one.joints().iter().all(|j| better.contains(j)),
+    }
+}
+
+/// Whether two readings are about the same joints, or both about gravity.
+fn same_place(a: &Change, b: &Change) -> bool {
+    let (a, b) = (a.joints(), b.joints());
+    a.is_empty() && b.is_empty() || a.iter().any(|j| b.contains(j))
 }
 
 /// Whether two readings turn the same joint: which of its channels it is, a symmetric machine does not show.
 fn same_line(a: &Change, b: &Change) -> bool {
     match (a, b) {
-        (Change::Sign(_, a), Change::Sign(_, b)) => a == b,
+        (Change::Scale(_, a, -1.0), Change::Scale(_, b, -1.0)) => a == b,
         (Change::Scale(c, a, unit), Change::Scale(d, b, _)) => {
             c == d && a == b && hypotheses::is_unit(*unit)
         }

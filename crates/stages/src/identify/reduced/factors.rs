@@ -165,6 +165,7 @@ impl Factors {
             moving: head.moving.clone(),
             resting: head.resting.clone(),
             at_rest,
+            by_speed: Vec::new(),
             rows: head.rows,
         })
     }

@@ -1,0 +1,115 @@
+//! Sums of a joint's rows by its direction and speed.
+
+use nalgebra::DVector;
+
+use super::columns::{Own, RegressorColumns};
+
+/// How speeds are parted.
+struct Limits {
+    /// Upper end of the first class, over the speed up to which the joint rests (a hundredth of its rms speed).
+    first: f64,
+    /// Classes in each octave of speed; half or twice as many change no share of the coverage study.
+    per_octave: f64,
+    /// Classes of each direction.
+    classes: usize,
+}
+
+const LIMITS: Limits = Limits {
+    first: 12.5,
+    per_octave: 2.0,
+    classes: 12,
+};
+
+/// Products of a joint's rows with its Coulomb column, by direction and class of speed; empty where its friction is not
+/// viscous and Coulomb.
+#[derive(Debug, Clone, Default)]
+pub struct BySpeed {
+    classes: Vec<Class>,
+}
+
+#[derive(Debug, Clone, Default)]
+pub(super) struct Class {
+    /// Of the Coulomb column with itself.
+    pub square: f64,
+    /// Of the Coulomb column with the unknowns' columns and the target.
+    pub product: Vec<f64>,
+}
+
+impl BySpeed {
+    /// Adds a row of joint j.
+    pub(super) fn add(&mut self, columns: &RegressorColumns, j: usize, row: &[f64]) {
+        let Some(place) = Place::of(columns, j) else {
+            return;
+        };
+        let (speed, level) = (row[place.viscous], row[place.coulomb]);
+        let octaves = (speed.abs() / (LIMITS.first * place.rest_speed)).log2();
+        let class = ((1.0 + LIMITS.per_octave * octaves).max(0.0) as usize).min(LIMITS.classes - 1);
+        let side = usize::from(level < 0.0) * LIMITS.classes;
+        self.classes.resize_with(2 * LIMITS.classes, Class::default);
+        let class = &mut self.classes[side + class];
+        class.square += level * level;
+        class.product.resize(row.len(), 0.0);
+        let sums = class.product.iter_mut().zip(row);
+        sums.for_each(|(sum, x)| *sum += level * x);
+    }
+
+    pub(super) fn merge(&mut self, other: &BySpeed) {
+        let most = self.classes.len().max(other.classes.len());
+        self.classes.resize_with(most, Class::default);
+        for (own, other) in self.classes.iter_mut().zip(&other.classes) {
+            own.square += other.square;
+            let most = own.product.len().max(other.product.len());
+            own.product.resize(most, 0.0);
+            let sums = own.product.iter_mut().zip(&other.product);
+            sums.for_each(|(a, b)| *a += b);
+        }
+    }
+
+    /// The classes that hold rows.
+    pub(super) fn filled(&self) -> impl Iterator<Item = &Class> {
+        self.classes.iter().filter(|class| class.square > 0.0)
+    }
+
+    /// Mean square of the residual's level in the classes, beyond what noise of this variance of a row makes of it
+    /// \[N^2 or (Nm)^2\].
+    pub(super) fn departure(&self, theta: &DVector<f64>, noise: f64) -> f64 {
+        let (mut rows, mut sum) = (0.0, 0.0);
+        for class in self.filled() {
+            let fitted: f64 = class
+                .product
+                .iter()
+                .zip(theta.iter())
+                .map(|(x, p)| x * p)
+                .sum();
+            let residual = class.product.last().copied().unwrap_or(0.0) - fitted;
+            rows += class.square;
+            sum += residual * residual / class.square - noise;
+        }
+        if rows > 0.0 {
+            (sum / rows).max(0.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Where a joint's speed and its Coulomb term stand in its row.
+pub(super) struct Place {
+    viscous: usize,
+    pub coulomb: usize,
+    rest_speed: f64,
+}
+
+impl Place {
+    pub(super) fn of(columns: &RegressorColumns, j: usize) -> Option<Place> {
+        let place = |wanted: Own| {
+            let place = columns.own[j].iter().position(|own| *own == wanted)?;
+            Some(columns.shared + place)
+        };
+        Some(Place {
+            viscous: place(Own::Viscous)?,
+            coulomb: place(Own::Coulomb)?,
+            rest_speed: *columns.rest_speed.get(j).filter(|speed| **speed > 0.0)?,
+        })
+    }
+}

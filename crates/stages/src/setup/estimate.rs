@@ -1,0 +1,189 @@
+//! Factors, zeros and directions that are fitted. One that is a ratio or a unit of the list is a mistake; any other is an
+//! estimate and no fault.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+
+use super::LIMITS;
+use super::correction::{Change, Correction};
+use super::finding::ChannelKind::{self, Both, Position, Torque};
+use super::hypotheses::{LARGEST, round_numbers};
+use super::problem::Problem;
+use super::trial::Trial;
+use super::weight::TWO_SIDED;
+
+/// Step of the grid of factors, by their logarithm, and of angles \[rad\].
+const STEP: f64 = 0.2;
+/// Newton steps to the best value.
+const STEPS: usize = 4;
+
+/// What is free.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Free {
+    Factor(ChannelKind, usize),
+    Zero(usize),
+    /// The base leans about this axis.
+    Lean(usize),
+    /// The position where a velocity begins that is taken for it.
+    Begins(usize),
+}
+
+/// A value by the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// The change of the set-up that it stands for.
+    pub change: Change,
+    /// A factor, or an angle \[rad\].
+    pub value: f64,
+    pub interval_95: [f64; 2],
+    free: Free,
+}
+
+impl Free {
+    fn joint(self) -> Option<usize> {
+        match self {
+            Self::Factor(_, j) | Self::Zero(j) | Self::Begins(j) => Some(j),
+            Self::Lean(_) => None,
+        }
+    }
+
+    fn change(self, problem: &Problem, x: f64) -> Change {
+        match self {
+            Self::Factor(Both, j) => Change::Gear(j, x.exp()),
+            Self::Factor(channel, j) => Change::Scale(channel, vec![j], x.exp()),
+            Self::Zero(j) => Change::Zero(j, x),
+            Self::Begins(j) => Change::Velocity(j, x),
+            Self::Lean(axis) => {
+                let mut g = problem.robot.tree().gravity();
+                let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+                (g[a], g[b]) = (
+                    x.cos() * g[a] - x.sin() * g[b],
+                    x.sin() * g[a] + x.cos() * g[b],
+                );
+                Change::Gravity(g)
+            }
+        }
+    }
+
+    /// Where it is looked for: torques have factors both ways, positions on a motor's side are too large.
+    fn range(self) -> [f64; 2] {
+        let widest = LARGEST.ln() + 2.0 * STEP;
+        match self {
+            Self::Factor(Torque, _) => [-widest, widest],
+            Self::Factor(Position, _) => [-widest, 2.0],
+            Self::Factor(Both, _) => [0.0, widest],
+            _ => [-PI, PI],
+        }
+    }
+
+    /// What these joints may have beside the list.
+    fn all(problem: &Problem, joints: &[usize], errors: &[f64]) -> Vec<Free> {
+        let mut out = Vec::new();
+        let zeros = problem.has_zeros();
+        for &j in joints {
+            out.push(Self::Factor(Torque, j));
+            // a position that is none leaves nothing explained
+            if errors[j] > LIMITS.sound {
+                out.extend([Position, Both].map(|side| Self::Factor(side, j)));
+                out.push(Self::Begins(j));
+                out.extend(zeros.then_some(Self::Zero(j)));
+            }
+        }
+        let leans =
+            problem.in_gravity.is_some() && joints.iter().any(|j| errors[*j] > LIMITS.sound);
+        out.extend([0, 1].into_iter().filter(|_| leans).map(Self::Lean));
+        out
+    }
+}
+
+impl Estimate {
+    /// Whether it is said where it is no mistake.
+    pub(super) fn is_told(&self) -> bool {
+        !matches!(self.free, Free::Begins(_))
+    }
+
+    /// The mistakes that it may be.
+    pub(super) fn mistakes(&self, ratios: &[f64]) -> Vec<Change> {
+        let of = |f: f64| match self.free {
+            Free::Factor(Both, j) => Change::Gear(j, f),
+            Free::Factor(channel, j) => Change::Scale(channel, vec![j], f),
+            _ => self.change.clone(),
+        };
+        match self.free {
+            Free::Factor(channel, _) => {
+                let round = round_numbers(channel, ratios, self.interval_95);
+                round.into_iter().map(of).collect()
+            }
+            Free::Begins(_) => vec![self.change.clone()],
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// The best values for some joints, where they take off what a mistake does.
+pub(super) fn estimates(
+    problem: &Problem,
+    base: &Correction,
+    joints: &[usize],
+    (few, whole): (&Trial, &Trial),
+) -> Vec<Estimate> {
+    let cases = Free::all(problem, joints, &whole.errors());
+    let of = |free: &Free| best(problem, base, *free, (few, whole));
+    cases.par_iter().filter_map(of).collect()
+}
+
+fn best(
+    problem: &Problem,
+    base: &Correction,
+    free: Free,
+    (few, whole): (&Trial, &Trial),
+) -> Option<Estimate> {
+    let at = |x: f64, every: usize, same: &Trial| {
+        let change = free.change(problem, x);
+        Trial::new(problem, (base, Some(&change)), every, Some(same))
+    };
+    let [low, high] = free.range();
+    let count = ((high - low) / STEP).ceil();
+    let grid = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
+    let (mut x, found) = grid
+        .filter_map(|x| Some((x, at(x, problem.few(), few)?)))
+        .min_by(|a, b| a.1.whole().total_cmp(&b.1.whole()))?;
+    let own: Vec<usize> = free
+        .joint()
+        .map_or_else(|| problem.channels_that_move(), |j| vec![j]);
+    let turns = (low, high) == (-PI, PI);
+    let at_end = !turns && (x <= low || x >= high);
+    if at_end || found.square(&own) > LIMITS.floor * few.square(&own) {
+        return None;
+    }
+    let (mut std, mut h) = (0.0, 0.2 * STEP);
+    for _ in 0..STEPS {
+        let of = |x: f64| -> Option<Vec<f64>> {
+            let fitted = at(x, 1, whole)?.fitted;
+            Some(fitted.iter().map(|block| block.iter().sum()).collect())
+        };
+        let (below, here, above) = (of(x - h)?, of(x)?, of(x + h)?);
+        let scores = below.iter().zip(&above).map(|(b, a)| (a - b) / (2.0 * h));
+        let sum = |of: &[f64]| of.iter().sum::<f64>();
+        let curvature = (sum(&below) + sum(&above) - 2.0 * sum(&here)) / (h * h);
+        let score = (sum(&above) - sum(&below)) / (2.0 * h);
+        if curvature <= 0.0 {
+            x -= h * score.signum();
+            continue;
+        }
+        std = scores.map(|s| s * s).sum::<f64>().sqrt() / curvature;
+        x -= (score / curvature).clamp(-STEP, STEP);
+        h = std.clamp(1e-4, 0.2 * STEP);
+    }
+    let told = |x: f64| match free {
+        Free::Factor(..) => x.exp(),
+        _ => x,
+    };
+    (std > 0.0).then(|| Estimate {
+        change: free.change(problem, x),
+        value: told(x),
+        interval_95: [-TWO_SIDED, TWO_SIDED].map(|k| told(x + k * std)),
+        free,
+    })
+}
