@@ -30,7 +30,7 @@ pub struct FoundEffect {
     /// With the amplitude of the joint fit of all effects whose parts agree; of one that is seen alone, of the fit with
     /// all that was found.
     pub estimate: Added,
-    /// Covariance of its (shape, linear), row-major; shapes stand on a grid and have none.
+    /// Covariance of its (shape, linear), row-major; a shape that is not refined has none.
     pub covariance: Vec<f64>,
     /// Its place in the effects of the judge's model; none where the parts do not agree.
     pub judged: Option<usize>,

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::departure::departure;
 use super::excitation::{FrictionError, Speeds, speeds};
 use super::inputs::Inputs;
 pub use super::joint_estimate::{
@@ -124,7 +125,9 @@ fn assemble(
     let maximum = steeper_first(maximum);
     let p = &maximum.parameters;
     let law = problem.friction(p);
-    let covariance = covariance(problem, &maximum);
+    let mut covariance = covariance(problem, &maximum);
+    // the level of friction is known no better than the law follows it over the speed
+    covariance[1][1] += departure(prepared, p, &|v| law.torque(v));
     let [_, fastest] = speeds.covered;
     let next = fastest + (BEYOND - 1.0) * fastest / BEYOND_STEPS as f64;
     let (rmse, relative_error) = residual(prepared, p, &law);

@@ -73,30 +73,37 @@ pub fn missed(plateaus: &[Plateau], curve: &dyn Fn(f64) -> f64) -> Vec<Missed> {
     out
 }
 
-/// Plateaus of all records at the estimate `p`.
-pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
+/// Speed and torque less the nuisance of every row, record by record, at the estimate `p`.
+pub(super) fn net_torques<'a>(
+    prepared: &'a Prepared,
+    p: &'a [f64],
+) -> impl Iterator<Item = (&'a [f64], Vec<f64>)> {
     let problem = &prepared.problem;
     let eta = &p[FRICTION..];
     let e = problem.nuisance;
-    let mut out = Vec::new();
     let mut first = 0;
-    for record in &problem.records {
-        let n = record.tau.len();
+    problem.records.iter().map(move |record| {
         let v = &prepared.velocity[first..first + record.t.len()];
         let a = &prepared.acceleration[first..first + record.t.len()];
-        let net = |k: usize| {
-            let m: f64 = record.m[k * e..(k + 1) * e]
-                .iter()
-                .zip(eta)
-                .map(|(x, y)| x * y)
-                .sum();
-            let h: f64 = record.h[k * e..(k + 1) * e]
-                .iter()
-                .zip(eta)
-                .map(|(x, y)| x * y)
-                .sum();
-            record.tau[k] - m * 0.5 * (a[k] + a[k + 1]) - h
+        first += record.t.len();
+        let of = |x: &[f64], k: usize| -> f64 {
+            let row = &x[k * e..(k + 1) * e];
+            row.iter().zip(eta).map(|(x, y)| x * y).sum()
         };
+        let net = |k: usize| {
+            record.tau[k] - of(&record.m, k) * 0.5 * (a[k] + a[k + 1]) - of(&record.h, k)
+        };
+        (v, (0..record.tau.len()).map(net).collect())
+    })
+}
+
+/// Plateaus of all records at the estimate `p`.
+pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
+    let problem = &prepared.problem;
+    let mut out = Vec::new();
+    for (record, (v, torques)) in problem.records.iter().zip(net_torques(prepared, p)) {
+        let n = record.tau.len();
+        let net = |k: usize| torques[k];
         let mut k = 0;
         while k < n {
             let speed = v[k].abs();
@@ -129,7 +136,6 @@ pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
                 k += ((end - k) / 4).max(1);
             }
         }
-        first += record.t.len();
     }
     out
 }

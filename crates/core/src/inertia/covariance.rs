@@ -10,7 +10,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
 use super::columns::GRADIENT;
-use super::repeats::repeats;
 use super::solution::{FitInputs, WeightedSolution};
 use crate::math::long_run::long_run;
 
@@ -53,16 +52,13 @@ pub(super) fn covariance(
 
     // score of every block, summed over joints: residuals of joints are correlated with one another
     let scores = scores(factors, &solution.theta, weights);
-    let lag = bandwidth(&scores, u, factors.block_seconds);
-    let sandwich =
-        &solution.inverse * (long_run(&scores, u, lag) + known) * &solution.inverse * freedom;
+    let sandwich = &solution.inverse
+        * (long_run(&scores, u, bandwidth(&scores, u, factors.block_seconds)) + known)
+        * &solution.inverse
+        * freedom;
     // Correlation can only take certainty away here: where the estimate of the middle comes out
     // below the textbook's, the latter is the better one.
     let sandwich = at_least(sandwich, &textbook);
-    let repeated = repeats(&scores, &solution.inverse, lag);
-    let sandwich = DMatrix::from_fn(u, u, |a, b| {
-        sandwich[(a, b)] * (repeated[a] * repeated[b]).sqrt()
-    });
 
     let mut total = sandwich.clone();
     let mut sensitivity = Vec::with_capacity(columns.joints);

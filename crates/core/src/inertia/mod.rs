@@ -1,9 +1,8 @@
 //! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
-//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is, with `repeats` where the
-//! residual comes back with the motion, `standstill` whether rows at rest count, and
-//! `by_speed` how far friction departs from its law. `robust`,
+//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is, `standstill` whether rows at rest count, and
+//! `departure` how far friction departs from its law (from sums `by_speed`). `robust`,
 //! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
 //! several times; `condense` makes of a log what a file of reduced logs holds, one R factor and `scores`; `essential`
 //! and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque channel is at its joint.
@@ -15,6 +14,7 @@ pub mod columns;
 mod condense;
 mod covariance;
 pub use covariance::bandwidth;
+pub mod departure;
 pub mod encoder;
 pub mod essential;
 pub mod feasible;
@@ -23,7 +23,6 @@ pub mod instruments;
 pub mod jumps;
 pub mod law_start;
 pub mod refine;
-mod repeats;
 pub mod robust;
 pub mod scores;
 pub mod solution;

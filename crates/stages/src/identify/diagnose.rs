@@ -137,7 +137,8 @@ pub fn diagnose(
     check_candidates(&settings.candidates, machine, (name, file))?;
     let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
     let mut judged = file.parameters.iter().filter(judged).peekable();
-    if judged.peek().is_some() && !judged.any(|p| p.verdict == Some(Verdict::Identified)) {
+    let determined = |p: &Parameter| matches!(p.verdict, Some(Verdict::Identified | Verdict::Weak));
+    if judged.peek().is_some() && !judged.any(determined) {
         return Err(IdentifyError::NothingIdentified {
             model: name.to_owned(),
         });
@@ -344,14 +345,7 @@ impl Diagnosed {
     pub fn told(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
         let effect = &step.estimate;
         let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
-        let mut numbers = effect.numbers(&machine.robot, unit, Some(&step.covariance));
-        // a shape stands on a grid
-        let on_grid = |n: &&mut EffectNumber| effect.law.shape.contains(&n.key.as_str());
-        numbers
-            .iter_mut()
-            .filter(on_grid)
-            .for_each(|n| n.std = None);
-        numbers
+        effect.numbers(&machine.robot, unit, Some(&step.covariance))
     }
 
     /// The refined model, where `file` is the one that was given: that file itself where nothing was added.

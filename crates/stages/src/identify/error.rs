@@ -94,7 +94,7 @@ pub enum IdentifyError {
     )]
     OnlyNoise { left: f64 },
     #[error(
-        "{model}: none of its parameters is identified, so that nothing can be said of effects beside it; fit it to data that determine it"
+        "{model}: its data determine none of its parameters, so that nothing can be said of effects beside it; fit it to data that determine it"
     )]
     NothingIdentified { model: String },
     #[error(

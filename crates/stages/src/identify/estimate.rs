@@ -10,8 +10,8 @@ use super::logged_robot::LoggedRobot;
 use super::passes::{Passes, PositionFilter, SimulatedLoop};
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::add_processing;
-use cft_ident_core::inertia::by_speed;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
+use cft_ident_core::inertia::departure;
 use cft_ident_core::inertia::encoder::{GRIDS, add_scatter};
 use cft_ident_core::inertia::feasible::nearest;
 use cft_ident_core::inertia::instruments::{self, Instrumental};
@@ -182,7 +182,7 @@ pub fn estimate(
         EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,
     };
     widen(passes, &columns, &solver, &mut fit)?;
-    by_speed::widen_by_departure(&sums, &mut fit);
+    departure::widen_by_departure(&sums, &mut fit);
     let (columns, shift) = match &solver {
         Solver::Refined(refined) => (refined.columns.with_free_friction(), refined.shift()),
         _ => (columns, DVector::zeros(fit.theta.len())),

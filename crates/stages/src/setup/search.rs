@@ -316,7 +316,7 @@ impl Look<'_> {
             !own && near(f)
         });
         let absurd: Vec<usize> = (seen.iter().copied())
-            .filter(|j| !(before[*j] <= LIMITS.unexplained))
+            .filter(|j| before[*j].is_nan() || before[*j] > LIMITS.unexplained)
             .collect();
         let repaired = absurd.iter().all(|j| after[*j] <= LIMITS.sound)
             && (!absurd.is_empty() || mended && turned(best) == 0);

@@ -1,0 +1,99 @@
+//! How far friction departs from viscous and Coulomb terms, and what that does to all else.
+//!
+//! The scatter of a residual says how sure parameters are while the law is right. Where friction bends over the speed,
+//! the residual has a mean at each speed: the level of friction is only known to within that departure, and inertias
+//! take up a part of it. A fit with a level of friction of its own in each class of speed shows which part.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::accumulate::{BlockFactors, JointFactor};
+use super::by_speed::Place;
+use super::columns::Own;
+use super::solve::{Fit, weights_of};
+
+/// Ridge of the fit with free levels, over the diagonal: rounding alone.
+const RIDGE: f64 = 1e-9;
+
+/// Adds to a fit's covariance how far friction departs from its law: that departure to the variance of each Coulomb
+/// term, and to the parameters that joints share what a fit with free levels of friction changes in them.
+pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
+    let columns = &sums.columns;
+    let correlated = fit.rows as f64 / fit.effective_rows.max(1.0);
+    for (j, by_speed) in sums.by_speed.iter().enumerate() {
+        let Some(place) = Place::of(columns, j) else {
+            continue;
+        };
+        let noise = fit.residual_std[j].powi(2) * correlated;
+        let own = sums.own_unknowns(&fit.theta, j);
+        let unknown = columns.unknown(j, place.coulomb);
+        fit.covariance[(unknown, unknown)] += by_speed.departure(&own, noise);
+    }
+    if let Some(change) = change_by_levels(sums, fit, correlated) {
+        fit.covariance.ger(1.0, &change, &change, 1.0);
+    }
+}
+
+/// What levels of friction of their own in each class of speed change in the shared parameters, beyond what noise alone
+/// changes; none where there are no classes.
+fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<DVector<f64>> {
+    let columns = &sums.columns;
+    let u = columns.unknowns();
+    let weights = weights_of(sums, &fit.residual_std);
+    let mut normal = DMatrix::<f64>::zeros(u, u);
+    let mut target = DVector::<f64>::zeros(u);
+    let mut levels = vec![false; u];
+    for (j, by_speed) in sums.by_speed.iter().enumerate() {
+        let own = columns.unknowns_of(j);
+        let r = sums.joint(j);
+        let (mut n, mut b) = products(&sums.parts(&r, j), own);
+        for class in by_speed.filled() {
+            let x = DVector::from_column_slice(&class.product[..own]);
+            n.ger(-1.0 / class.square, &x, &x, 1.0);
+            b.axpy(-class.product.last()? / class.square, &x, 1.0);
+        }
+        let w = weights[j] * weights[j];
+        for a in 0..own {
+            target[columns.unknown(j, a)] += w * b[a];
+            for c in 0..own {
+                normal[(columns.unknown(j, a), columns.unknown(j, c))] += w * n[(a, c)];
+            }
+        }
+        let spanned = by_speed.filled().next().is_some();
+        let of_friction = columns.own[j].iter().enumerate();
+        for (k, _) in of_friction.filter(|(_, own)| spanned && **own != Own::Viscous) {
+            levels[columns.first_own(j) + k] = true;
+        }
+    }
+    let kept: Vec<usize> = (0..u)
+        .filter(|i| !levels[*i] && normal[(*i, *i)] > 0.0)
+        .collect();
+    if kept.len() == u {
+        return None;
+    }
+    let scale: Vec<f64> = kept.iter().map(|i| normal[(*i, *i)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(kept.len(), kept.len(), |a, b| {
+        normal[(kept[a], kept[b])] / (scale[a] * scale[b]) + if a == b { RIDGE } else { 0.0 }
+    });
+    let inverse = scaled.cholesky()?.inverse();
+    let right = DVector::from_fn(kept.len(), |a, _| target[kept[a]] / scale[a]);
+    let solved = &inverse * right;
+    let mut change = DVector::zeros(u);
+    for (a, &i) in kept
+        .iter()
+        .enumerate()
+        .filter(|(_, i)| **i < columns.shared)
+    {
+        let moved = solved[a] / scale[a] - fit.theta[i];
+        let by_noise = (inverse[(a, a)] / (scale[a] * scale[a]) - fit.textbook[(i, i)]).max(0.0);
+        let beyond = (moved * moved - by_noise * correlated).max(0.0);
+        change[i] = beyond.sqrt().copysign(moved);
+    }
+    Some(change)
+}
+
+/// X'X and X't of a joint.
+fn products(factor: &JointFactor, unknowns: usize) -> (DMatrix<f64>, DVector<f64>) {
+    let x = factor.r.columns(0, unknowns);
+    let t = factor.r.column(factor.r.ncols() - 1);
+    (x.tr_mul(&x), x.tr_mul(&t))
+}
