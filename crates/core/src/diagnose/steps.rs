@@ -10,7 +10,7 @@ use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, value};
 use super::search::{Chosen, Field};
 use super::searched::SearchedCase;
-use super::tables::{self, Estimates, Verified};
+use super::tables::{self, Estimates, TermPlaces, Verified};
 use super::watch::UNWATCHED;
 use crate::effect::{Added, AugmentedModel};
 use crate::judge::{Numbers, Terms};
@@ -308,15 +308,11 @@ impl Judging<'_> {
 }
 
 /// Covariance of (shape, linear) of an effect that stands at some places; a shape that is not refined has none.
-fn covariance(
-    effect: &Added,
-    all: &DMatrix<f64>,
-    (first, shapes): &(usize, Vec<(usize, usize)>),
-) -> Vec<f64> {
+fn covariance(effect: &Added, all: &DMatrix<f64>, places: &TermPlaces) -> Vec<f64> {
     let (count, size) = (effect.shape.len(), effect.parameters());
     let place = |k: usize| match k.checked_sub(count) {
-        Some(linear) => Some(first + linear),
-        None => (shapes.iter().find(|(shape, _)| *shape == k)).map(|(_, place)| *place),
+        Some(linear) => Some(places.first + linear),
+        None => (places.shapes.iter().find(|(shape, _)| *shape == k)).map(|(_, place)| *place),
     };
     let of = |k: usize| {
         let (row, column) = (k / size, k % size);

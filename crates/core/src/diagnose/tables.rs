@@ -16,6 +16,14 @@ pub struct Verified {
     pub amplitude: Vec<f64>,
 }
 
+/// Where the terms of an effect stand.
+pub struct TermPlaces {
+    /// The first of its coefficients.
+    pub first: usize,
+    /// Shape parameters that are refined, and the place of each.
+    pub shapes: Vec<(usize, usize)>,
+}
+
 /// The joint fit of declared terms and effects.
 pub struct Estimates {
     /// Values of the declared unknowns, about the fitted model, then of every effect's coefficients.
@@ -24,7 +32,7 @@ pub struct Estimates {
     /// coefficients and shape.
     pub covariance: DMatrix<f64>,
     /// Where the coefficients of each effect begin in it, and where its shapes stand.
-    pub places: Vec<(usize, Vec<(usize, usize)>)>,
+    pub places: Vec<TermPlaces>,
 }
 
 /// Places of the coefficients of each effect behind `declared` unknowns.
@@ -107,11 +115,7 @@ impl Estimates {
 }
 
 /// Terms of declared unknowns and effects, each with the slopes by its shape, and where these stand.
-fn with_shapes(
-    field: &Field,
-    declared: &Terms,
-    effects: &[Chosen],
-) -> (Terms, Vec<(usize, Vec<(usize, usize)>)>) {
+fn with_shapes(field: &Field, declared: &Terms, effects: &[Chosen]) -> (Terms, Vec<TermPlaces>) {
     let mut terms = declared.clone();
     let mut places = Vec::new();
     for c in effects {
@@ -125,7 +129,7 @@ fn with_shapes(
                 terms.list.push(term.clone());
             }
         }
-        places.push((first, shapes));
+        places.push(TermPlaces { first, shapes });
     }
     (terms, places)
 }
