@@ -96,10 +96,15 @@ impl<'a> PreparedCase<'a> {
         Ok(fit(start, self.declared, data, Some(&self.fitted.weights))?.model)
     }
 
-    /// Whether the declared numbers, fitted to these data, gain on blocks left out over those that were given.
-    pub fn is_refit_better(&self) -> Result<bool, MotionError> {
-        let given = self.summed(self.case.given.clone(), &[], &[])?;
-        let fitted = self.summed(self.fitted.model.clone(), &[], &[])?;
+    /// Whether the declared numbers of a model that was fitted to these data gain on blocks left out over those of
+    /// another.
+    pub fn is_better(
+        &self,
+        fitted: &AugmentedModel,
+        other: &AugmentedModel,
+    ) -> Result<bool, MotionError> {
+        let given = self.summed(other.clone(), &[], &[])?;
+        let fitted = self.summed(fitted.clone(), &[], &[])?;
         let weights = &fitted.declared.weights;
         let nothing = DVector::zeros(self.unknowns.len());
         let as_given = given.sums.blocks.iter();

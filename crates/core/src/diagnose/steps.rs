@@ -42,15 +42,16 @@ struct Way {
 /// [`DiagnoseError`].
 pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
     let summed = &searched.summed;
-    let work = Judging {
+    let mut work = Judging {
         prepared,
         field: prepared.field(&searched.candidates, summed, UNWATCHED),
         declared: &summed.declared,
         about: &summed.about,
-        refit: prepared.is_refit_better()?,
+        refit: true,
     };
     let mut ways = work.ways(searched)?;
     work.settle(&mut ways)?;
+    work.refit = work.wants_other_numbers(&ways)?;
     let judge = work.written(&ways, true)?;
     work.look(&mut ways)?;
     let written = match ways.iter().any(|w| w.vetoed) {
@@ -146,7 +147,7 @@ impl Judging<'_> {
         match effects.iter().any(|w| w.amplitude.is_some()) {
             true => {
                 let fitted = self.prepared.refit(&self.fitted(&effects))?;
-                Ok(self.as_given(fitted))
+                Ok(self.based(fitted))
             }
             false => Ok(self.prepared.case.given.clone()),
         }
@@ -154,20 +155,34 @@ impl Judging<'_> {
 
     /// A model with effects, its declared numbers as given but for what the effects change: where these data do not ask
     /// for others, those of other data stay.
-    fn as_given(&self, mut model: AugmentedModel) -> AugmentedModel {
-        if !self.refit {
-            let unknowns = &self.prepared.unknowns;
-            let (given, fitted) = (&self.prepared.case.given, &self.prepared.fitted.model);
-            let off = |u: &Unknown| value(given, *u) - value(fitted, *u);
-            let off: Vec<f64> = unknowns.list.iter().map(off).collect();
-            super::problem::unknowns::step(&mut model, unknowns, &off);
+    fn based(&self, model: AugmentedModel) -> AugmentedModel {
+        match self.refit {
+            true => model,
+            false => self.as_given(model),
         }
+    }
+
+    /// Whether these data ask for declared numbers other than the given ones with what the effects change.
+    fn wants_other_numbers(&self, ways: &[Way]) -> Result<bool, DiagnoseError> {
+        let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
+        let fitted = self.prepared.refit(&self.fitted(&effects))?;
+        let kept = self.as_given(fitted.clone());
+        Ok(self.prepared.is_better(&fitted, &kept)?)
+    }
+
+    /// A fitted model with its declared numbers moved by as much as the given ones are from those fitted alone.
+    fn as_given(&self, mut model: AugmentedModel) -> AugmentedModel {
+        let unknowns = &self.prepared.unknowns;
+        let (given, fitted) = (&self.prepared.case.given, &self.prepared.fitted.model);
+        let off = |u: &Unknown| value(given, *u) - value(fitted, *u);
+        let off: Vec<f64> = unknowns.list.iter().map(off).collect();
+        super::problem::unknowns::step(&mut model, unknowns, &off);
         model
     }
 
     /// The model with some effects as it would be written, by the sums of products.
     fn with(&self, ways: &[&Way]) -> AugmentedModel {
-        self.as_given(self.fitted(ways))
+        self.based(self.fitted(ways))
     }
 
     fn fitted(&self, ways: &[&Way]) -> AugmentedModel {

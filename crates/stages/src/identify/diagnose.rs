@@ -356,7 +356,14 @@ impl Diagnosed {
         }
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
-        model.forget_consistent();
+        // inertial parameters that are kept are as consistent as they were
+        let kept = !diagnosis
+            .unknowns
+            .iter()
+            .any(|u| matches!(u, Unknown::Theta(_)));
+        if !kept {
+            model.forget_consistent();
+        }
         model.friction_prior.clone_from(&self.friction_prior);
         // beside a part of an effect the declared numbers take up the rest, and are no estimates
         let whole = self.is_whole();
@@ -413,7 +420,7 @@ impl Diagnosed {
             }
         }
         self.held.write_into(&mut model);
-        if file.is_consistent() && project(&mut model).is_err() {
+        if !kept && file.is_consistent() && project(&mut model).is_err() {
             model.forget_consistent();
         }
         model
