@@ -102,6 +102,8 @@ pub struct Diagnosis {
     /// Unknowns of the declared model, and their covariance with every effect of the estimates, by the block jackknife.
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
+    /// Information matrix of those unknowns beside fixed effects, in independent rows.
+    pub information: DMatrix<f64>,
     /// The declared parameters of the joint fit with every effect whose parts agree, unshrunk.
     pub estimates: AugmentedModel,
     pub steps: Vec<FoundEffect>,

@@ -119,6 +119,7 @@ impl PreparedCase<'_> {
             model: judged.written,
             estimates: judged.estimates,
             covariance: judged.covariance,
+            information: judged.information,
             steps: judged.steps,
             unknowns: self.unknowns.list.clone(),
             before,

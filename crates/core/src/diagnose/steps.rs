@@ -24,6 +24,7 @@ pub struct Judged {
     pub written: AugmentedModel,
     pub estimates: AugmentedModel,
     pub covariance: DMatrix<f64>,
+    pub information: DMatrix<f64>,
 }
 
 /// One effect on its way.
@@ -281,6 +282,7 @@ impl Judging<'_> {
         Ok(Judged {
             estimates: moved(self.about, unknowns, &estimates.values),
             covariance: estimates.covariance,
+            information: estimates.information,
             steps,
             judge,
             written,

@@ -31,6 +31,9 @@ pub struct Estimates {
     /// By the block jackknife, and of what is known beforehand: of the declared unknowns, then of each effect's
     /// coefficients and shape.
     pub covariance: DMatrix<f64>,
+    /// What the fitted rows and what is known beforehand say of the declared unknowns beside fixed effects, counted
+    /// in independent rows.
+    pub information: DMatrix<f64>,
     /// Where the coefficients of each effect begin in it, and where its shapes stand.
     pub places: Vec<TermPlaces>,
 }
@@ -109,6 +112,7 @@ impl Estimates {
         Some(Estimates {
             values,
             covariance,
+            information: declared.information(&total) / rows_per_independent,
             places,
         })
     }

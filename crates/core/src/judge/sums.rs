@@ -149,6 +149,14 @@ impl Terms {
         }
     }
 
+    /// Information matrix of the terms: that of joints' sums and of what is known beforehand, in weighted rows.
+    pub fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
+        let (mut normal, mut right) = self.normal(sums);
+        let diagonal: Vec<f64> = normal.diagonal().iter().copied().collect();
+        self.firm(&mut normal, &mut right, &diagonal);
+        normal
+    }
+
     /// What the fit has of its prior: the covariance of its values by that of the prior, over the squared unit in which
     /// information counts.
     pub fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {

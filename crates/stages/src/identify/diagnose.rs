@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::consistent::project;
+use super::consistent::project_by;
 use super::contact::contacts;
 use super::control::{Control, Progress};
 use super::error::IdentifyError;
@@ -420,8 +420,16 @@ impl Diagnosed {
             }
         }
         self.held.write_into(&mut model);
-        if !kept && file.is_consistent() && project(&mut model).is_err() {
-            model.forget_consistent();
+        if !kept && file.is_consistent() {
+            let key = |unknown: &Unknown| match fitted(&diagnosis.model, *unknown) {
+                Some((name, Some(joint), _)) => format!("{name}:{joint}"),
+                Some((name, None, _)) => name,
+                None => String::new(),
+            };
+            let unknowns: Vec<String> = diagnosis.unknowns.iter().map(key).collect();
+            if project_by(&mut model, &unknowns, &diagnosis.information).is_err() {
+                model.forget_consistent();
+            }
         }
         model
     }
