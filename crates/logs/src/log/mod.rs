@@ -27,6 +27,7 @@ mod source;
 mod spec;
 mod stale;
 mod stream;
+mod table;
 mod tape;
 mod temperatures;
 mod text;
