@@ -62,4 +62,5 @@ pub use columns::unit_of;
 pub use content::unpacked;
 pub use layout::channel;
 pub use names::{did_you_mean, is_hidden, list};
+pub(crate) use pass::round_within;
 pub use source::{bytes, named_beside, named_beside_of, remedy, sha256_of_bytes, shown};
