@@ -321,7 +321,6 @@ fn parameters(folder: &Path, file: &str) -> Vec<(String, f64, f64)> {
 }
 
 #[test]
-#[ignore = "the jackknife over blocks does not carry the deviation of friction that is held"]
 fn friction_that_is_held_stays_to_the_last_bit_and_its_deviation_reaches_what_goes_with_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -32,7 +32,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("diagnose", "math robot block motion effect judge"),
     ("validate", "math robot block motion verdict"),
     ("inspect", "math number block log"),
-    ("setup", "math robot motion inertia"),
+    ("setup", "math robot motion inertia judge"),
     ("mapping", "robot log inspect"),
     ("simulate", "math number robot log config effect"),
     ("excite", "math number robot log config inertia simulate"),

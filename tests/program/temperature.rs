@@ -166,7 +166,6 @@ fn found_by_its_formula(
 }
 
 #[test]
-#[ignore = "the shape of a formula stands on a grid: c is 87.9 +- 1.1 where 80 is true"]
 fn grease_that_thins_is_seen_in_what_is_left_and_found_by_its_formula() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -1,13 +1,11 @@
 //! Everything that a model may lack, each shape of it a candidate with columns of its own.
 
 use super::problem::case::Case;
+pub use super::problem::pass::Candidate;
 use crate::effect::{
     Added, AugmentedModel, Cover, Family, LAWS, Law, Number, Place, Role, Search, Seen,
 };
 use crate::judge::Bound;
-
-/// An effect at a place in one shape, with bounds of its coefficients.
-pub type Candidate = (Added, Vec<Bound>);
 
 /// Whether two effects may not both be added: one shape per family and place, and one wave per order.
 pub fn exclude(a: &Added, b: &Added) -> bool {
@@ -133,7 +131,32 @@ fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> O
         .map(|key| bound(&effect, key, seen))
         .collect();
     let linear = vec![0.0; law.linear.len()];
-    Some((Added { linear, ..effect }, bounds))
+    Some(Candidate {
+        effect: Added { linear, ..effect },
+        bounds,
+        slopes: Vec::new(),
+    })
+}
+
+/// Shapes that are refined, with how far each may go from where it is.
+pub fn refined_shapes(
+    model: &AugmentedModel,
+    case: &Case,
+    cover: &Cover,
+    effect: &Added,
+) -> Vec<(usize, Bound)> {
+    let law = effect.law;
+    let seen = seen(model, cover, case, effect.place);
+    let limits = law.limits_on(cover, effect.place);
+    let of = |(k, [least, most]): (usize, [f64; 2])| {
+        let (known, here) = (bound(effect, law.shape[k], &seen), effect.shape[k]);
+        let bound = Bound {
+            least: (known.least.max(least) - here).min(0.0),
+            most: (known.most.min(most) - here).max(0.0),
+        };
+        (k, bound)
+    };
+    limits.into_iter().enumerate().map(of).collect()
 }
 
 /// Values that a coefficient can have.

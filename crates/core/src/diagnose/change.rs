@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use super::outcome::FrictionChange;
-use super::prepared::{PreparedCase, SearchedCase};
+use super::prepared::PreparedCase;
 use super::problem::unknowns::Unknown;
+use super::searched::SearchedCase;
 use super::watch::UNWATCHED;
 use crate::judge::BlocksLeftOut;
 
@@ -13,9 +14,8 @@ const TOLD: f64 = 3.0;
 
 /// The greatest change of each joint, where it is beyond doubt. It is told as a change, and no law of it is fitted.
 pub fn friction_changes(prepared: &PreparedCase, searched: &SearchedCase) -> Vec<FrictionChange> {
-    let parts = (&searched.candidates[..], &searched.layout);
-    let field = prepared.field(parts, &searched.sums, UNWATCHED);
-    let declared = prepared.terms(&searched.layout);
+    let field = prepared.field(&searched.candidates, &searched.summed, UNWATCHED);
+    let declared = &searched.summed.declared;
     let terms = declared.with(&field.terms_of(&searched.chosen));
     let Some(left_out) = BlocksLeftOut::new(field.sums, field.judging, &terms) else {
         return Vec::new();

@@ -19,7 +19,8 @@
 //! | `steps`, `tables`, `held_out` | the parts' verdict, estimates and predictions, held-out data |
 //! | `change` | friction that changes from a time on |
 //! | `unexplained` | errors, the noise floor, and what is above it |
-//! | `prepared` | the declared model fitted, and the search over the candidates |
+//! | `prepared` | the declared model fitted, and the data divided |
+//! | `searched`, `polish` | what is chosen of the candidates, in its best shape |
 //! | `run` | the loop over all of these |
 
 mod candidates;
@@ -29,10 +30,12 @@ mod held_out;
 mod memory;
 mod orders;
 mod outcome;
+mod polish;
 mod prepared;
 mod problem;
 mod run;
 mod search;
+mod searched;
 mod steps;
 mod tables;
 mod unexplained;

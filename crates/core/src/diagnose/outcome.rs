@@ -30,7 +30,7 @@ pub struct FoundEffect {
     /// With the amplitude of the joint fit of all effects whose parts agree; of one that is seen alone, of the fit with
     /// all that was found.
     pub estimate: Added,
-    /// Covariance of its (shape, linear), row-major; shapes stand on a grid and have none.
+    /// Covariance of its (shape, linear), row-major; a shape that is not refined has none.
     pub covariance: Vec<f64>,
     /// Its place in the effects of the judge's model; none where the parts do not agree.
     pub judged: Option<usize>,
@@ -102,6 +102,8 @@ pub struct Diagnosis {
     /// Unknowns of the declared model, and their covariance with every effect of the estimates, by the block jackknife.
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
+    /// Information matrix of those unknowns beside fixed effects, in independent rows.
+    pub information: DMatrix<f64>,
     /// The declared parameters of the joint fit with every effect whose parts agree, unshrunk.
     pub estimates: AugmentedModel,
     pub steps: Vec<FoundEffect>,

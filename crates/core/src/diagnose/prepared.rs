@@ -1,9 +1,8 @@
 //! The declared model fitted, one pass over the rows with every candidate, and what the search chose.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, NotTried, candidates, is_friction_law};
 use super::error::DiagnoseError;
 use super::held_out::HeldOutRows;
 use super::memory::memory_s;
@@ -11,14 +10,12 @@ use super::orders;
 use super::outcome::SplitErrors;
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole, Piece};
-use super::problem::fit::{Declared, Fitted, determines_some, fit};
-use super::problem::pass::{ColumnLayout, Data, pass};
+use super::problem::fit::{Declared, Fitted, fit};
+use super::problem::pass::Data;
 use super::problem::unknowns::{Unknowns, step};
-use super::search::{Chosen, Field, Looked};
 use super::unexplained::errors::{self, Counted, Errors};
-use super::watch::Watch;
 use crate::effect::{AugmentedModel, Cover};
-use crate::judge::{BlockSums, Blocks, BlocksLeftOut, Terms, TimeBlock, compare, divide};
+use crate::judge::{Blocks, BlocksLeftOut, TimeBlock, compare, divide};
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
@@ -37,20 +34,6 @@ pub struct PreparedCase<'a> {
     pub all_blocks: Vec<TimeBlock>,
     /// Neighbouring pieces of the split that a bootstrap draws together.
     pub together: usize,
-}
-
-/// What the search came to.
-pub struct SearchedCase {
-    pub candidates: Vec<Candidate>,
-    pub not_tried: Vec<NotTried>,
-    pub layout: ColumnLayout,
-    pub sums: BlockSums,
-    pub chosen: Vec<Chosen>,
-    pub looked: Vec<Looked>,
-    /// Squared error of blocks left out by all that was chosen, in the weights of the joints.
-    pub error: f64,
-    /// Whether the declared model explains more of blocks left out than no torque does.
-    pub determined: bool,
 }
 
 impl<'a> PreparedCase<'a> {
@@ -107,96 +90,32 @@ impl<'a> PreparedCase<'a> {
         self.all_blocks.len() - self.blocks.list.len()
     }
 
-    fn sums(
-        &self,
-        candidates: &[Candidate],
-        layout: &ColumnLayout,
-        model: &AugmentedModel,
-    ) -> Result<BlockSums, MotionError> {
-        let columns = (&self.unknowns, candidates);
-        pass(model, columns, layout, &self.data, &self.all_blocks)
-    }
-
-    /// What is searched, by sums of products.
-    pub fn field<'b>(
-        &'b self,
-        (candidates, layout): (&'b [Candidate], &'b ColumnLayout),
-        sums: &'b BlockSums,
-        watch: Watch<'b>,
-    ) -> Field<'b> {
-        Field {
-            candidates,
-            terms: &layout.candidates,
-            sums,
-            judging: self.judging(),
-            numbers: &self.case.numbers,
-            watch,
-        }
-    }
-
-    /// The declared terms about the fitted model.
-    pub fn terms(&self, layout: &ColumnLayout) -> Terms {
-        let mut terms = (self.declared).terms(&self.unknowns, layout, &self.fitted.model);
-        terms.weights.clone_from(&self.fitted.weights);
-        terms
-    }
-
-    /// Chooses what gains; once more about the friction laws that it chose, where they change what a direction is.
-    pub fn search(&self, watch: Watch) -> Result<SearchedCase, DiagnoseError> {
-        let (candidates, not_tried) = candidates(&self.fitted.model, self.case, &self.cover);
-        let layout = ColumnLayout::of(&self.unknowns, &candidates);
-        let mut model = self.fitted.model.clone();
-        let mut sums = self.sums(&candidates, &layout, &model)?;
-        let declared = self.terms(&layout);
-        let nothing = DiagnoseError::NothingDetermined {
-            unknowns: self.unknowns.len(),
-        };
-        if !determines_some(&sums, &declared) && !self.case.keep {
-            return Err(nothing);
-        }
-        let numbers = &self.case.numbers;
-        let parts = (&candidates[..], &layout);
-        let Some(alone) = BlocksLeftOut::new(&sums, self.judging(), &declared) else {
-            return Err(nothing);
-        };
-        let errors = alone.errors();
-        let determined = compare(&torque_squares(&sums, &layout), &errors, &declared.weights)
-            .is_beyond(numbers.screen, None);
-        let search = |sums: &BlockSums| match self.blocks.parts >= numbers.parts {
-            false => Some((Vec::new(), Vec::new())),
-            true => self.field(parts, sums, watch).search(&declared),
-        };
-        let Some((mut chosen, mut looked)) = search(&sums) else {
-            return Err(nothing);
-        };
-        // what goes by a joint's direction goes by its friction law
-        let smooth = chosen.iter().map(|c| &candidates[c.candidate].0);
-        let smooth: Vec<_> = smooth
-            .filter(|e| is_friction_law(e) && e.law.direction.is_some())
-            .cloned()
-            .collect();
-        if !smooth.is_empty() {
-            model.effects.extend(smooth);
-            sums = self.sums(&candidates, &layout, &model)?;
-            (chosen, looked) = search(&sums).ok_or(nothing)?;
-        }
-        let error = errors.iter().flat_map(|e| e.iter().zip(&declared.weights));
-        Ok(SearchedCase {
-            error: error.map(|(e, w)| e * w).sum(),
-            determined,
-            candidates,
-            not_tried,
-            layout,
-            sums,
-            chosen,
-            looked,
-        })
-    }
-
     /// The declared model fitted anew beside effects that are held.
     pub fn refit(&self, start: &AugmentedModel) -> Result<AugmentedModel, MotionError> {
         let data = (&self.data, self.blocks.list.as_slice());
         Ok(fit(start, self.declared, data, Some(&self.fitted.weights))?.model)
+    }
+
+    /// Whether the declared numbers of a model that was fitted to these data gain on blocks left out over those of
+    /// another.
+    pub fn is_better(
+        &self,
+        fitted: &AugmentedModel,
+        other: &AugmentedModel,
+    ) -> Result<bool, MotionError> {
+        let given = self.summed(other.clone(), &[], &[])?;
+        let fitted = self.summed(fitted.clone(), &[], &[])?;
+        let weights = &fitted.declared.weights;
+        let nothing = DVector::zeros(self.unknowns.len());
+        let as_given = given.sums.blocks.iter();
+        let as_given: Vec<_> = as_given
+            .map(|block| given.declared.squares(block, &nothing))
+            .collect();
+        let left_out = BlocksLeftOut::new(&fitted.sums, self.judging(), &fitted.declared);
+        Ok(left_out.is_some_and(|left_out| {
+            let gain = compare(&as_given, &left_out.errors(), weights);
+            gain.is_beyond(self.case.numbers.screen, None)
+        }))
     }
 
     pub fn held_out(&self, role: LogRole) -> HeldOutRows<'_> {
@@ -239,16 +158,6 @@ impl<'a> PreparedCase<'a> {
         )?;
         Ok(errors::summed(model, &case.units, (&pieces, self.together)))
     }
-}
-
-/// Squared torque of every block, `[block][joint]`.
-fn torque_squares(sums: &BlockSums, layout: &ColumnLayout) -> Vec<Vec<f64>> {
-    let of_block = |joints: &Vec<DMatrix<f64>>| {
-        let each = joints.iter().enumerate();
-        let square = |(j, s): (usize, &DMatrix<f64>)| s[(layout.torque(j), layout.torque(j))];
-        each.map(square).collect()
-    };
-    sums.blocks.iter().map(of_block).collect()
 }
 
 /// Raw residuals along stretches, `[stretch][joint][sample]`.

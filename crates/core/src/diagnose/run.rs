@@ -6,10 +6,11 @@ use rayon::prelude::*;
 use super::change::friction_changes;
 use super::error::DiagnoseError;
 use super::outcome::{Diagnosis, FoundEffect, LeftCandidate};
-use super::prepared::{PreparedCase, SearchedCase, filtered, residuals};
+use super::prepared::{PreparedCase, filtered, residuals};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
 use super::problem::unknowns::Unknowns;
+use super::searched::SearchedCase;
 use super::steps::{Judged, judge};
 use super::unexplained::dependence::{Left, dependences};
 use super::unexplained::{noise, part_unexplained, unexplained};
@@ -118,6 +119,7 @@ impl PreparedCase<'_> {
             model: judged.written,
             estimates: judged.estimates,
             covariance: judged.covariance,
+            information: judged.information,
             steps: judged.steps,
             unknowns: self.unknowns.list.clone(),
             before,
@@ -150,7 +152,7 @@ fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
 /// The best shape of every law and place that was not chosen, with why.
 fn left_candidates(searched: &SearchedCase, numbers: &Numbers) -> Vec<LeftCandidate> {
     let mut out: Vec<LeftCandidate> = Vec::new();
-    let effect = |i: usize| &searched.candidates[i].0;
+    let effect = |i: usize| &searched.candidates[i].effect;
     let chosen: Vec<_> = searched
         .chosen
         .iter()

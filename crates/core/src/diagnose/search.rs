@@ -1,5 +1,6 @@
 //! The search: the greatest gain on blocks left out, again and again.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, exclude, is_friction_law};
@@ -11,8 +12,9 @@ use crate::judge::{BlockSums, BlocksLeftOut, ErrorGain, Numbers, Term, Terms};
 #[derive(Clone, Copy)]
 pub struct Field<'a> {
     pub candidates: &'a [Candidate],
-    /// Terms of each candidate.
+    /// Terms of each candidate's coefficients, and of the slopes by its shape.
     pub terms: &'a [Vec<Term>],
+    pub slopes: &'a [Vec<Term>],
     pub sums: &'a BlockSums,
     /// Blocks at the end that judge and are never fitted.
     pub judging: usize,
@@ -44,16 +46,23 @@ pub struct Looked {
 const ALTERNATIVES: usize = 3;
 
 impl Field<'_> {
-    /// Chooses what gains, the greatest first: at most a friction law for each joint, and `effects` besides. Returns also
-    /// what the others would gain in the end. None where these data determine nothing.
-    pub fn search(&self, declared: &Terms) -> Option<(Vec<Chosen>, Vec<Looked>)> {
-        let mut chosen = Vec::new();
+    /// Chooses what gains, the greatest first: at most a friction law for each joint, and `effects` besides, those that
+    /// are `chosen` already among them. Returns also what the others would gain in the end. None where these data determine nothing.
+    pub fn search(
+        &self,
+        declared: &Terms,
+        mut chosen: Vec<Chosen>,
+    ) -> Option<(Vec<Chosen>, Vec<Looked>)> {
         loop {
             let terms = declared.with(&self.terms_of(&chosen));
             let left_out = BlocksLeftOut::new(self.sums, self.judging, &terms)?;
             let taken: Vec<&Added> = self.taken(&chosen);
             let open: Vec<usize> = (0..self.candidates.len())
-                .filter(|i| !taken.iter().any(|t| exclude(t, &self.candidates[*i].0)))
+                .filter(|i| {
+                    !taken
+                        .iter()
+                        .any(|t| exclude(t, &self.candidates[*i].effect))
+                })
                 .collect();
             let part = self.watch.part("candidates", open.len());
             let looked: Vec<Looked> = open
@@ -90,14 +99,25 @@ impl Field<'_> {
         all.cloned().collect()
     }
 
+    /// Terms of their slopes.
+    pub fn slopes_of(&self, chosen: &[Chosen]) -> Vec<Term> {
+        let all = chosen.iter().flat_map(|c| &self.slopes[c.candidate]);
+        all.cloned().collect()
+    }
+
+    /// Sums of all fitted blocks.
+    pub fn total(&self) -> Vec<DMatrix<f64>> {
+        self.sums.over(0..self.sums.blocks.len() - self.judging)
+    }
+
     fn taken(&self, chosen: &[Chosen]) -> Vec<&Added> {
-        let all = chosen.iter().map(|c| &self.candidates[c.candidate].0);
+        let all = chosen.iter().map(|c| &self.candidates[c.candidate].effect);
         all.collect()
     }
 
     /// The greatest admissible gain, or what says the same with fewer numbers.
     fn best(&self, looked: &[Looked], room: &dyn Fn(&Added) -> bool) -> Option<Chosen> {
-        let effect = |l: &Looked| &self.candidates[l.candidate].0;
+        let effect = |l: &Looked| &self.candidates[l.candidate].effect;
         let admissible: Vec<&Looked> = looked
             .iter()
             .filter(|l| room(effect(l)))

@@ -5,11 +5,12 @@ use nalgebra::DMatrix;
 use super::error::DiagnoseError;
 use super::held_out::EffectChange;
 use super::outcome::{FoundEffect, StepStatus};
-use super::prepared::{PreparedCase, SearchedCase, moved};
+use super::prepared::{PreparedCase, moved};
 use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, value};
 use super::search::{Chosen, Field};
-use super::tables::{self, Estimates, Verified};
+use super::searched::SearchedCase;
+use super::tables::{self, Estimates, TermPlaces, Verified};
 use super::watch::UNWATCHED;
 use crate::effect::{Added, AugmentedModel};
 use crate::judge::{Numbers, Terms};
@@ -23,6 +24,7 @@ pub struct Judged {
     pub written: AugmentedModel,
     pub estimates: AugmentedModel,
     pub covariance: DMatrix<f64>,
+    pub information: DMatrix<f64>,
 }
 
 /// One effect on its way.
@@ -40,16 +42,17 @@ struct Way {
 /// # Errors
 /// [`DiagnoseError`].
 pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
-    let declared = prepared.terms(&searched.layout);
-    let parts = (&searched.candidates[..], &searched.layout);
-    let field = prepared.field(parts, &searched.sums, UNWATCHED);
-    let work = Judging {
+    let summed = &searched.summed;
+    let mut work = Judging {
         prepared,
-        field,
-        declared,
+        field: prepared.field(&searched.candidates, summed, UNWATCHED),
+        declared: &summed.declared,
+        about: &summed.about,
+        refit: true,
     };
     let mut ways = work.ways(searched)?;
     work.settle(&mut ways)?;
+    work.refit = work.wants_other_numbers(&ways)?;
     let judge = work.written(&ways, true)?;
     work.look(&mut ways)?;
     let written = match ways.iter().any(|w| w.vetoed) {
@@ -63,7 +66,11 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
 struct Judging<'a> {
     prepared: &'a PreparedCase<'a>,
     field: Field<'a>,
-    declared: Terms,
+    declared: &'a Terms,
+    /// The declared model that the sums are about.
+    about: &'a AugmentedModel,
+    /// Whether these data want other declared numbers than those that were given.
+    refit: bool,
 }
 
 impl Judging<'_> {
@@ -74,32 +81,18 @@ impl Judging<'_> {
     /// The effects that were chosen, and those that the user wants.
     fn ways(&self, searched: &SearchedCase) -> Result<Vec<Way>, DiagnoseError> {
         let case = self.prepared.case;
-        let mut chosen = searched.chosen.clone();
         let robot = &case.given.model.robot;
         let is = |effect: &Added, (name, joint): &(String, Option<String>)| {
             effect.name() == name && effect.place.name(robot) == *joint
         };
-        for wanted in &case.wishes.accepted {
-            let of = |c: &usize| is(&searched.candidates[*c].0, wanted);
-            if chosen.iter().any(|c| of(&c.candidate)) {
-                continue;
-            }
-            let looked = searched.looked.iter().filter(|l| of(&l.candidate));
-            let best = looked.max_by(|a, b| a.gain.value.total_cmp(&b.gain.value));
-            let Some(best) = best else {
-                return Err(not_there(wanted));
-            };
-            chosen.push(Chosen {
-                candidate: best.candidate,
-                gain: best.gain.clone(),
-                error: searched.error,
-                alternatives: Vec::new(),
-            });
-        }
-        let verified =
-            tables::verified(&self.field, &self.declared, &chosen, &self.prepared.blocks);
+        let verified = tables::verified(
+            &self.field,
+            self.declared,
+            &searched.chosen,
+            &self.prepared.blocks,
+        );
         let way = |verified: Verified| {
-            let effect = &searched.candidates[verified.chosen.candidate].0;
+            let effect = &searched.candidates[verified.chosen.candidate].effect;
             Way {
                 accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted)),
                 verified,
@@ -133,13 +126,14 @@ impl Judging<'_> {
         let nothing = DiagnoseError::NothingDetermined {
             unknowns: self.prepared.unknowns.len(),
         };
-        Estimates::of(&self.field, &self.declared, effects).ok_or(nothing)
+        let rows = self.prepared.case.prior.rows_per_independent;
+        Estimates::of(&self.field, self.declared, effects, rows).ok_or(nothing)
     }
 
     /// Part of an effect's amplitude that predicts. What a person can measure is whole or is not there.
     fn factor(&self, way: &Way) -> f64 {
         let s = way.verified.agreement.s;
-        let effect = &self.field.candidates[way.verified.chosen.candidate].0;
+        let effect = &self.field.candidates[way.verified.chosen.candidate].effect;
         match (way.accepted, effect.law.entry.measurable) {
             (true, _) => 1.0,
             (false, false) => s,
@@ -152,20 +146,54 @@ impl Judging<'_> {
     fn written(&self, ways: &[Way], all: bool) -> Result<AugmentedModel, DiagnoseError> {
         let effects: Vec<_> = ways.iter().filter(|w| all || !w.vetoed).collect();
         match effects.iter().any(|w| w.amplitude.is_some()) {
-            true => Ok(self.prepared.refit(&self.with(&effects))?),
+            true => {
+                let fitted = self.prepared.refit(&self.fitted(&effects))?;
+                Ok(self.based(fitted))
+            }
             false => Ok(self.prepared.case.given.clone()),
         }
     }
 
-    /// The model with some effects, by the sums of products.
+    /// A model with effects, its declared numbers as given but for what the effects change: where these data do not ask
+    /// for others, those of other data stay.
+    fn based(&self, model: AugmentedModel) -> AugmentedModel {
+        match self.refit {
+            true => model,
+            false => self.as_given(model),
+        }
+    }
+
+    /// Whether these data ask for declared numbers other than the given ones with what the effects change.
+    fn wants_other_numbers(&self, ways: &[Way]) -> Result<bool, DiagnoseError> {
+        let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
+        let fitted = self.prepared.refit(&self.fitted(&effects))?;
+        let kept = self.as_given(fitted.clone());
+        Ok(self.prepared.is_better(&fitted, &kept)?)
+    }
+
+    /// A fitted model with its declared numbers moved by as much as the given ones are from those fitted alone.
+    fn as_given(&self, mut model: AugmentedModel) -> AugmentedModel {
+        let unknowns = &self.prepared.unknowns;
+        let (given, fitted) = (&self.prepared.case.given, &self.prepared.fitted.model);
+        let off = |u: &Unknown| value(given, *u) - value(fitted, *u);
+        let off: Vec<f64> = unknowns.list.iter().map(off).collect();
+        super::problem::unknowns::step(&mut model, unknowns, &off);
+        model
+    }
+
+    /// The model with some effects as it would be written, by the sums of products.
     fn with(&self, ways: &[&Way]) -> AugmentedModel {
+        self.based(self.fitted(ways))
+    }
+
+    fn fitted(&self, ways: &[&Way]) -> AugmentedModel {
         let own = ways
             .iter()
             .filter_map(|w| Some((&w.verified.chosen, w.amplitude.clone()?)));
         let own: Vec<_> = own.collect();
-        let values = tables::beside(&self.field, &self.declared, &own);
-        let fitted = (&self.prepared.fitted.model, &self.prepared.unknowns);
-        tables::model(&self.field, fitted, &values, &own)
+        let values = tables::beside(&self.field, self.declared, &own);
+        let about = (self.about, &self.prepared.unknowns);
+        tables::model(&self.field, about, &values, &own)
     }
 
     /// Compares held-out errors with and without every effect, the others kept and refitted, and takes out what makes a
@@ -231,12 +259,12 @@ impl Judging<'_> {
         let kept = ways.iter().filter(|w| w.amplitude.is_some());
         let kept: Vec<Chosen> = kept.map(|w| w.verified.chosen.clone()).collect();
         let estimates = self.estimates(&kept)?;
-        let (fitted, unknowns) = (&self.prepared.fitted.model, &self.prepared.unknowns);
+        let unknowns = &self.prepared.unknowns;
         let before = self.prepared.case.given.effects.len();
-        let (mut judged, mut in_file, mut at) = (before, before, self.declared.len());
+        let (mut judged, mut in_file) = (before, before);
+        let mut places = estimates.places.iter();
         let mut steps = Vec::new();
         for way in ways {
-            let count = way.verified.amplitude.len();
             let place = |there: bool, next: &mut usize| {
                 let place = there.then_some(*next);
                 *next += usize::from(there);
@@ -246,15 +274,15 @@ impl Judging<'_> {
             let mut step = self.step(way);
             step.judged = place(in_it, &mut judged);
             step.written = place(in_it && !way.vetoed, &mut in_file);
-            if in_it {
-                step.covariance = covariance(&step.estimate, &estimates.covariance, at);
-                at += count;
+            if let Some(own) = in_it.then(|| places.next()).flatten() {
+                step.covariance = covariance(&step.estimate, &estimates.covariance, own);
             }
             steps.push(step);
         }
         Ok(Judged {
-            estimates: moved(fitted, unknowns, &estimates.values),
+            estimates: moved(self.about, unknowns, &estimates.values),
             covariance: estimates.covariance,
+            information: estimates.information,
             steps,
             judge,
             written,
@@ -277,7 +305,7 @@ impl Judging<'_> {
         };
         FoundEffect {
             alternatives: others
-                .map(|i| self.field.candidates[*i].0.clone())
+                .map(|i| self.field.candidates[*i].effect.clone())
                 .collect(),
             covariance: vec![f64::INFINITY; size * size],
             estimate: effect,
@@ -296,24 +324,20 @@ impl Judging<'_> {
     }
 }
 
-/// Covariance of (shape, linear) of an effect whose coefficients stand from `at` on; shapes are not fitted.
-fn covariance(effect: &Added, all: &DMatrix<f64>, at: usize) -> Vec<f64> {
-    let (shapes, size) = (effect.shape.len(), effect.parameters());
+/// Covariance of (shape, linear) of an effect that stands at some places; a shape that is not refined has none.
+fn covariance(effect: &Added, all: &DMatrix<f64>, places: &TermPlaces) -> Vec<f64> {
+    let (count, size) = (effect.shape.len(), effect.parameters());
+    let place = |k: usize| match k.checked_sub(count) {
+        Some(linear) => Some(places.first + linear),
+        None => (places.shapes.iter().find(|(shape, _)| *shape == k)).map(|(_, place)| *place),
+    };
     let of = |k: usize| {
         let (row, column) = (k / size, k % size);
-        match row >= shapes && column >= shapes {
-            true => all[(at + row - shapes, at + column - shapes)],
-            false => 0.0,
+        match (place(row), place(column)) {
+            (Some(row), Some(column)) => all[(row, column)],
+            (None, _) if row == column && !effect.held[row] => f64::INFINITY,
+            _ => 0.0,
         }
     };
     (0..size * size).map(of).collect()
-}
-
-fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
-    let place = joint.as_ref().map_or(String::new(), |j| format!(" of {j}"));
-    DiagnoseError::Accept {
-        name: format!("{name}{place}"),
-        why: "it was not among the candidates: see `candidates` in the JSON document for those that there are"
-            .to_owned(),
-    }
 }

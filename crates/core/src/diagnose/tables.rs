@@ -16,12 +16,26 @@ pub struct Verified {
     pub amplitude: Vec<f64>,
 }
 
+/// Where the terms of an effect stand.
+pub struct TermPlaces {
+    /// The first of its coefficients.
+    pub first: usize,
+    /// Shape parameters that are refined, and the place of each.
+    pub shapes: Vec<(usize, usize)>,
+}
+
 /// The joint fit of declared terms and effects.
 pub struct Estimates {
     /// Values of the declared unknowns, about the fitted model, then of every effect's coefficients.
     pub values: DVector<f64>,
-    /// By the block jackknife.
+    /// By the block jackknife, and of what is known beforehand: of the declared unknowns, then of each effect's
+    /// coefficients and shape.
     pub covariance: DMatrix<f64>,
+    /// What the fitted rows and what is known beforehand say of the declared unknowns beside fixed effects, counted
+    /// in independent rows.
+    pub information: DMatrix<f64>,
+    /// Where the coefficients of each effect begin in it, and where its shapes stand.
+    pub places: Vec<TermPlaces>,
 }
 
 /// Places of the coefficients of each effect behind `declared` unknowns.
@@ -44,8 +58,7 @@ pub fn verified(
     blocks: &Blocks,
 ) -> Vec<Verified> {
     let terms = declared.with(&field.terms_of(chosen));
-    let fitted = field.sums.blocks.len() - field.judging;
-    let values = terms.fit(&field.sums.over(0..fitted), &[]).values;
+    let values = terms.fit(&field.total(), &[]).values;
     let places = places(field, declared.len(), chosen);
     let of = |(at, own): (usize, Vec<usize>)| {
         let mut agreement = agreement(field.sums, blocks, &terms, (&own, &values), field.numbers);
@@ -66,7 +79,7 @@ fn is_needed(field: &Field, declared: &Terms, chosen: &[Chosen], at: usize) -> b
     let mut others = chosen.to_vec();
     let own = others.remove(at).candidate;
     let terms = declared.with(&field.terms_of(&others));
-    let place = field.candidates[own].0.place;
+    let place = field.candidates[own].effect.place;
     BlocksLeftOut::new(field.sums, field.judging, &terms).is_some_and(|left_out| {
         let gain = left_out.gain(&field.terms[own]);
         gain.is_beyond(field.numbers.screen, own_joint(place))
@@ -75,10 +88,16 @@ fn is_needed(field: &Field, declared: &Terms, chosen: &[Chosen], at: usize) -> b
 
 impl Estimates {
     /// The joint fit with some effects; none where these data determine nothing.
-    pub fn of(field: &Field, declared: &Terms, effects: &[Chosen]) -> Option<Self> {
+    pub fn of(
+        field: &Field,
+        declared: &Terms,
+        effects: &[Chosen],
+        rows_per_independent: f64,
+    ) -> Option<Self> {
         let terms = declared.with(&field.terms_of(effects));
-        let fitted = field.sums.blocks.len() - field.judging;
-        let values = terms.fit(&field.sums.over(0..fitted), &[]).values;
+        let total = field.total();
+        let values = terms.fit(&total, &[]).values;
+        let (terms, places) = with_shapes(field, declared, effects);
         let left_out = BlocksLeftOut::new(field.sums, field.judging, &terms)?;
         let without: Vec<&DVector<f64>> = left_out.values().collect();
         let count = without.len() as f64;
@@ -89,8 +108,34 @@ impl Estimates {
             let off = x - &mean;
             covariance.ger((count - 1.0) / count, &off, &off, 1.0);
         }
-        Some(Estimates { values, covariance })
+        covariance += terms.known_before(&total)? * rows_per_independent;
+        Some(Estimates {
+            values,
+            covariance,
+            information: declared.information(&total) / rows_per_independent,
+            places,
+        })
     }
+}
+
+/// Terms of declared unknowns and effects, each with the slopes by its shape, and where these stand.
+fn with_shapes(field: &Field, declared: &Terms, effects: &[Chosen]) -> (Terms, Vec<TermPlaces>) {
+    let mut terms = declared.clone();
+    let mut places = Vec::new();
+    for c in effects {
+        let candidate = &field.candidates[c.candidate];
+        let first = terms.len();
+        terms.list.extend_from_slice(&field.terms[c.candidate]);
+        let mut shapes = Vec::new();
+        for ((k, _), term) in candidate.slopes.iter().zip(&field.slopes[c.candidate]) {
+            if !candidate.effect.held[*k] {
+                shapes.push((*k, terms.len()));
+                terms.list.push(term.clone());
+            }
+        }
+        places.push(TermPlaces { first, shapes });
+    }
+    (terms, places)
 }
 
 /// Values of the declared unknowns beside effects of given amplitudes.
@@ -101,8 +146,7 @@ pub fn beside(field: &Field, declared: &Terms, effects: &[(&Chosen, Vec<f64>)]) 
     let held = places.into_iter().flatten();
     let amplitudes = effects.iter().flat_map(|(_, a)| a.iter().copied());
     let held: Vec<(usize, f64)> = held.zip(amplitudes).collect();
-    let fitted = field.sums.blocks.len() - field.judging;
-    let values = terms.fit(&field.sums.over(0..fitted), &held).values;
+    let values = terms.fit(&field.total(), &held).values;
     values.iter().take(declared.len()).copied().collect()
 }
 
@@ -122,7 +166,7 @@ pub fn model(
 
 /// An effect with its amplitudes.
 pub fn effect(field: &Field, chosen: &Chosen, linear: &[f64]) -> Added {
-    let (shape, _) = &field.candidates[chosen.candidate];
+    let shape = &field.candidates[chosen.candidate].effect;
     Added {
         linear: linear.to_vec(),
         ..shape.clone()

@@ -149,6 +149,29 @@ impl Terms {
         }
     }
 
+    /// Information matrix of the terms: that of joints' sums and of what is known beforehand, in weighted rows.
+    pub fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
+        let (mut normal, mut right) = self.normal(sums);
+        let diagonal: Vec<f64> = normal.diagonal().iter().copied().collect();
+        self.firm(&mut normal, &mut right, &diagonal);
+        normal
+    }
+
+    /// What the fit has of its prior: the covariance of its values by that of the prior, over the squared unit in which
+    /// information counts.
+    pub fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {
+        let (mut normal, mut right) = self.normal(sums);
+        let diagonal: Vec<f64> = normal.diagonal().iter().map(|x| x.max(1e-300)).collect();
+        self.firm(&mut normal, &mut right, &diagonal);
+        let known = self.prior.1.len();
+        let mut prior = DMatrix::zeros(self.len(), self.len());
+        prior
+            .view_mut((0, 0), (known, known))
+            .copy_from(&self.prior.0);
+        let factor = normal.cholesky()?;
+        Some(factor.solve(&factor.solve(&prior).transpose()))
+    }
+
     /// Squared residual of each joint at some values.
     pub fn squares(&self, sums: &[DMatrix<f64>], values: &DVector<f64>) -> Vec<f64> {
         let of_joint = |(j, sums): (usize, &DMatrix<f64>)| {

@@ -240,43 +240,83 @@ const ROUNDING: f64 = 1e-13;
 /// # Errors
 /// [`cft_ident_core::inertia::solution::FitError`].
 pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
-    model.forget_consistent();
-    let robot = model.robot.robot();
-    let inertial = robot.parameters().iter().map(|info| info.name.to_string());
-    let mut keys: Vec<String> = inertial.collect();
-    let shared = keys.len();
     let Some(covariance) = &model.covariance else {
+        model.forget_consistent();
         return Ok(());
     };
-    let missing = |key: &String| !model.parameters.iter().any(|p| p.key() == *key);
-    if keys.iter().any(missing) {
-        return Ok(());
-    }
+    let mut keys = inertial_keys(model);
     let others = covariance.names.iter();
     let others: Vec<String> = others
         .filter(|name| !keys.contains(name))
         .cloned()
         .collect();
     keys.extend(others);
-    let value = |key: &String| {
-        let p = model.parameters.iter().find(|p| p.key() == *key);
-        p.map_or(0.0, |p| p.value)
+    let rows = rows_of_covariance(&model.covariance_of(&keys), keys.len());
+    project_in(model, &keys, rows)
+}
+
+/// The same in the metric of an information matrix of these unknowns, inertial ones among them or not.
+///
+/// # Errors
+/// [`cft_ident_core::inertia::solution::FitError`].
+pub(super) fn project_by(
+    model: &mut ModelFile,
+    unknowns: &[String],
+    information: &DMatrix<f64>,
+) -> Result<(), IdentifyError> {
+    let mut keys = inertial_keys(model);
+    let others = unknowns.iter().filter(|key| !keys.contains(key));
+    let others: Vec<String> = others.cloned().collect();
+    keys.extend(others);
+    let place: Vec<Option<usize>> = keys
+        .iter()
+        .map(|key| unknowns.iter().position(|u| u == key))
+        .collect();
+    let at = |i: usize, j: usize| {
+        let of = place[i].zip(place[j]);
+        of.map_or(0.0, |(a, b)| information[(a, b)])
     };
+    let rows = rows_of_information(DMatrix::from_fn(keys.len(), keys.len(), at));
+    project_in(model, &keys, rows)
+}
+
+/// Keys of the robot's inertial parameters, in its order.
+fn inertial_keys(model: &ModelFile) -> Vec<String> {
+    let robot = model.robot.robot();
+    let names = robot.parameters().iter();
+    names.map(|info| info.name.to_string()).collect()
+}
+
+/// The nearest consistent parameters, where `rows` are those of a factor of the information matrix of `keys`.
+fn project_in(
+    model: &mut ModelFile,
+    keys: &[String],
+    rows: DMatrix<f64>,
+) -> Result<(), IdentifyError> {
+    model.forget_consistent();
+    let robot = model.robot.robot();
+    let shared = robot.parameters().len();
+    let of_key = |key: &String| model.parameters.iter().find(|p| p.key() == *key);
+    if keys[..shared].iter().any(|key| of_key(key).is_none()) {
+        return Ok(());
+    }
+    let value = |key: &String| of_key(key).map_or(0.0, |p| p.value);
     let theta = DVector::from_iterator(keys.len(), keys.iter().map(value));
-    let rows = information(&model.covariance_of(&keys), &theta);
+    let target = &rows * &theta;
+    let last = keys.len();
+    let mut rows = rows.insert_column(last, 0.0);
+    rows.set_column(last, &target);
     let place = |name: &str, joint: &str| {
         let key = format!("{name}:{joint}");
         keys.iter().position(|k| *k == key)
     };
     let names = robot.joint_names().iter().enumerate();
     let friction = names.filter_map(|(j, joint)| {
+        let held = model.held_out.get(j);
         Some(FrictionColumns {
             viscous: place("viscous", joint)?,
             coulomb: place("coulomb", joint)?,
-            speed: model
-                .held_out
-                .get(j)
-                .map_or(f64::INFINITY, |held| held.speed_seen),
+            speed: held.map_or(f64::INFINITY, |held| held.speed_seen),
         })
     });
     let friction: Vec<FrictionColumns> = friction.filter(|of| of.viscous >= shared).collect();
@@ -299,24 +339,28 @@ pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
     Ok(())
 }
 
-/// A factor of the information matrix, with the values beside it as a target; what has no variance of its own has
-/// no row.
-fn information(covariance: &[f64], theta: &DVector<f64>) -> DMatrix<f64> {
-    let u = theta.len();
-    let variance = |i: usize| covariance[i * u + i].max(0.0).sqrt();
-    let scale: Vec<f64> = (0..u)
-        .map(|i| {
-            if variance(i) > 0.0 {
-                1.0 / variance(i)
-            } else {
-                0.0
-            }
-        })
-        .collect();
+/// Rows whose square is an information matrix.
+fn rows_of_information(information: DMatrix<f64>) -> DMatrix<f64> {
+    let parts = SymmetricEigen::new(information);
+    let mut rows = parts.eigenvectors.transpose();
+    for (k, size) in parts.eigenvalues.iter().enumerate() {
+        rows.row_mut(k).scale_mut(size.max(0.0).sqrt());
+    }
+    rows
+}
+
+/// Rows whose square is the information matrix of a covariance of `u` unknowns; what has no variance of its own
+/// has no row.
+fn rows_of_covariance(covariance: &[f64], u: usize) -> DMatrix<f64> {
+    let scale = |i: usize| match covariance[i * u + i].max(0.0).sqrt() {
+        std if std > 0.0 => 1.0 / std,
+        _ => 0.0,
+    };
+    let scale: Vec<f64> = (0..u).map(scale).collect();
     let correlation = DMatrix::from_fn(u, u, |i, j| covariance[i * u + j] * scale[i] * scale[j]);
     let parts = SymmetricEigen::new(correlation);
     let largest = parts.eigenvalues.amax();
-    let mut rows = DMatrix::zeros(u, u + 1);
+    let mut rows = DMatrix::zeros(u, u);
     for k in 0..u {
         let size = parts.eigenvalues[k];
         if size <= ROUNDING * largest {
@@ -326,7 +370,5 @@ fn information(covariance: &[f64], theta: &DVector<f64>) -> DMatrix<f64> {
             rows[(k, i)] = parts.eigenvectors[(i, k)] * scale[i] / size.sqrt();
         }
     }
-    let target = rows.columns(0, u) * theta;
-    rows.set_column(u, &target);
     rows
 }

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::consistent::project;
+use super::consistent::project_by;
 use super::contact::contacts;
 use super::control::{Control, Progress};
 use super::error::IdentifyError;
@@ -345,14 +345,7 @@ impl Diagnosed {
     pub fn told(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
         let effect = &step.estimate;
         let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
-        let mut numbers = effect.numbers(&machine.robot, unit, Some(&step.covariance));
-        // a shape stands on a grid
-        let on_grid = |n: &&mut EffectNumber| effect.law.shape.contains(&n.key.as_str());
-        numbers
-            .iter_mut()
-            .filter(on_grid)
-            .for_each(|n| n.std = None);
-        numbers
+        effect.numbers(&machine.robot, unit, Some(&step.covariance))
     }
 
     /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
@@ -363,7 +356,14 @@ impl Diagnosed {
         }
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
-        model.forget_consistent();
+        // inertial parameters that are kept are as consistent as they were
+        let kept = !diagnosis
+            .unknowns
+            .iter()
+            .any(|u| matches!(u, Unknown::Theta(_)));
+        if !kept {
+            model.forget_consistent();
+        }
         model.friction_prior.clone_from(&self.friction_prior);
         // beside a part of an effect the declared numbers take up the rest, and are no estimates
         let whole = self.is_whole();
@@ -420,8 +420,16 @@ impl Diagnosed {
             }
         }
         self.held.write_into(&mut model);
-        if file.is_consistent() && project(&mut model).is_err() {
-            model.forget_consistent();
+        if !kept && file.is_consistent() {
+            let key = |unknown: &Unknown| match fitted(&diagnosis.model, *unknown) {
+                Some((name, Some(joint), _)) => format!("{name}:{joint}"),
+                Some((name, None, _)) => name,
+                None => String::new(),
+            };
+            let unknowns: Vec<String> = diagnosis.unknowns.iter().map(key).collect();
+            if project_by(&mut model, &unknowns, &diagnosis.information).is_err() {
+                model.forget_consistent();
+            }
         }
         model
     }

@@ -3,9 +3,9 @@
 use super::logged_robot::LoggedRobot;
 use super::setup_file::Declared;
 use crate::setup::{
-    Alternative, Cause, Change, ChannelKind, Correction, Drive, Estimate, Finding, FindingKind,
+    Alternative, Cause, Change, ChannelKind, Correction, Drive, Finding, FindingKind,
     FindingSeverity, Found, FrictionPower, LIMITS, Problem, Searched, Setting, SetupErrors,
-    SetupReport, Undecided, Weight,
+    SetupEstimate, SetupReport, Undecided, Weight,
 };
 use ChannelKind::{Position, Torque};
 use cft_ident_core::number::{percent, significant};
@@ -295,7 +295,7 @@ impl Words<'_> {
     }
 
     /// A value that is on no list.
-    fn estimate(&self, estimate: &Estimate, errors: &[Vec<f64>; 2]) -> Finding {
+    fn estimate(&self, estimate: &SetupEstimate, errors: &[Vec<f64>; 2]) -> Finding {
         let said = self.said(&estimate.change);
         let joint = said.entry.joint.clone();
         let [before, after] = errors
@@ -347,7 +347,7 @@ impl Words<'_> {
         let off = |way: f64| !all.is_empty() && all.iter().all(|w| w.weight.is_off(way));
         let moves = |way: f64| all.iter().all(|w| w.motion.is_off(way));
         let way = if off(-1.0) { -1.0 } else { 1.0 };
-        let list = |of: fn(&Weight) -> crate::setup::Gain| -> String {
+        let list = |of: fn(&Weight) -> crate::setup::WeightGain| -> String {
             let each = all.iter().map(|w| {
                 let gain = of(w);
                 let [low, high] = gain.interval_95.map(|x| significant(x, 3));

@@ -31,7 +31,7 @@ enum Free {
 
 /// A value by the data.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct SetupEstimate {
     /// The change of the set-up that it stands for.
     pub change: Change,
     /// A factor, or an angle \[rad\].
@@ -97,7 +97,7 @@ impl Free {
     }
 }
 
-impl Estimate {
+impl SetupEstimate {
     /// Whether it is said where it is no mistake.
     pub(super) fn is_told(&self) -> bool {
         !matches!(self.free, Free::Begins(_))
@@ -127,7 +127,7 @@ pub(super) fn estimates(
     base: &Correction,
     joints: &[usize],
     (few, whole): (&Trial, &Trial),
-) -> Vec<Estimate> {
+) -> Vec<SetupEstimate> {
     let cases = Free::all(problem, joints, &whole.errors());
     let of = |free: &Free| best(problem, base, *free, (few, whole));
     cases.par_iter().filter_map(of).collect()
@@ -138,7 +138,7 @@ fn best(
     base: &Correction,
     free: Free,
     (few, whole): (&Trial, &Trial),
-) -> Option<Estimate> {
+) -> Option<SetupEstimate> {
     let at = |x: f64, every: usize, same: &Trial| {
         let change = free.change(problem, x);
         Trial::new(problem, (base, Some(&change)), every, Some(same))
@@ -180,7 +180,7 @@ fn best(
         Free::Factor(..) => x.exp(),
         _ => x,
     };
-    (std > 0.0).then(|| Estimate {
+    (std > 0.0).then(|| SetupEstimate {
         change: free.change(problem, x),
         value: told(x),
         interval_95: [-TWO_SIDED, TWO_SIDED].map(|k| told(x + k * std)),

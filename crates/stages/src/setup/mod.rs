@@ -41,7 +41,7 @@ mod weight;
 
 pub use channels::{Channels, Drive};
 pub use correction::{Change, Correction};
-pub use estimate::Estimate;
+pub use estimate::SetupEstimate;
 pub use finding::{
     Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, Setting,
     SetupErrors, SetupReport,
@@ -51,7 +51,7 @@ pub use problem::{KnownBeforehand, Problem};
 pub use sample::{Sample, Thinner};
 pub use search::{Found, Searched, search};
 pub use undecided::{Cause, Undecided};
-pub use weight::{Gain, Weight};
+pub use weight::{Weight, WeightGain};
 
 /// The numbers that decide beside those of the judge.
 #[derive(Debug, Clone, Copy)]

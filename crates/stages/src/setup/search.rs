@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
-use super::estimate::{Estimate, estimates};
+use super::estimate::{SetupEstimate, estimates};
 use super::finding::ChannelKind::Torque;
 use super::hypotheses::{self, oddity};
 use super::physics::{Broken, Driven};
@@ -40,7 +40,7 @@ pub struct Searched {
     /// Joints whose friction drives them, where no mistake explains it.
     pub driven: Vec<Driven>,
     /// A value that is on no list, with the errors as declared and with it.
-    pub estimate: Option<(Estimate, [Vec<f64>; 2])>,
+    pub estimate: Option<(SetupEstimate, [Vec<f64>; 2])>,
     /// Errors with gravity and without, where the torques hold none.
     pub without_gravity: Option<[Vec<f64>; 2]>,
     /// Gain of the measured weight over that of the file's own masses.
@@ -95,7 +95,7 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
     out
 }
 
-type Told = Option<(Estimate, [Vec<f64>; 2])>;
+type Told = Option<(SetupEstimate, [Vec<f64>; 2])>;
 
 struct Look<'a> {
     problem: &'a Problem<'a>,
@@ -140,7 +140,7 @@ impl Look<'_> {
         let few = self.quick(base, None, None);
         let all = hypotheses::all(self.problem);
         let mut list = self.judged(base, all, (few.as_ref(), declared));
-        let mut fitted: Option<(Estimate, Trial)> = None;
+        let mut fitted: Option<(SetupEstimate, Trial)> = None;
         if let (Some(few), Some(whole), true) = (&few, declared, moving.len() > 1) {
             let both = (few, &whole.trial);
             for estimate in estimates(self.problem, base, &doubt, both) {
@@ -212,11 +212,16 @@ impl Look<'_> {
 
     /// Whether the data tell the factor of a hypothesis: any that is far off frees a joint from all others.
     fn has_a_factor(&self, base: &Correction, judged: &Judged, declared: Option<&Judged>) -> bool {
+        let trial = &judged.trial;
+        let seen = match declared {
+            Some(d) => Compared::of(self.problem, &d.trial, trial).better,
+            None => self.problem.channels_that_move(),
+        };
         let same = declared.map(|d| &d.trial);
         let far = |by: f64| {
-            let other = judged.trial.change.as_ref().and_then(|c| c.times(by));
+            let other = trial.change.as_ref().and_then(|c| c.times(by));
             let other = other.and_then(|c| Trial::new(self.problem, (base, Some(&c)), 1, same));
-            other.is_none_or(|other| other.whole() > LIMITS.far * judged.trial.whole())
+            other.is_none_or(|other| other.square(&seen) > LIMITS.far * trial.square(&seen))
         };
         far(LIMITS.yardstick) && far(LIMITS.yardstick.recip())
     }
@@ -291,13 +296,18 @@ impl Look<'_> {
         if fitted.is_some_and(|f| f.square(&seen) * LIMITS.far < best.trial.square(&seen)) {
             return None;
         }
-        let near = |j: &Trial| {
-            j.square(&seen) < LIMITS.far * best.trial.square(&seen)
-                || !j.gain(&best.trial, &seen).is_beyond(NUMBERS.screen, None)
+        let untold = |j: &Trial| !j.gain(&best.trial, &seen).is_beyond(NUMBERS.screen, None);
+        let near = |j: &Trial| j.square(&seen) < LIMITS.far * best.trial.square(&seen) || untold(j);
+        let others = order.iter().map(|j| (turned(j), &j.trial));
+        let others = others.filter(|(t, j)| j.change != best.trial.change && *t <= turned(best));
+        let others: Vec<&Trial> = others.map(|(_, j)| j).filter(|j| near(j)).collect();
+        let tied: Vec<Change> = others.iter().filter_map(|j| j.change.clone()).collect();
+        let made = change.clone();
+        let elsewhere = |j: &&&Trial| {
+            let other = j.change.as_ref();
+            other.is_some_and(|other| !same_place(&made, other))
         };
-        let others = order.iter().filter(|j| j.trial.change != best.trial.change);
-        let others = others.filter(|j| turned(j) <= turned(best) && near(&j.trial));
-        let tied: Vec<Change> = others.filter_map(|j| j.trial.change.clone()).collect();
+        let open = others.iter().filter(elsewhere).any(|j| untold(j));
         let beside = fitted.is_some_and(|f| {
             let own = f
                 .change
@@ -306,12 +316,11 @@ impl Look<'_> {
             !own && near(f)
         });
         let absurd: Vec<usize> = (seen.iter().copied())
-            .filter(|j| !(before[*j] <= LIMITS.unexplained))
+            .filter(|j| before[*j].is_nan() || before[*j] > LIMITS.unexplained)
             .collect();
         let repaired = absurd.iter().all(|j| after[*j] <= LIMITS.sound)
             && (!absurd.is_empty() || mended && turned(best) == 0);
         let alike = tied.iter().all(|other| same_line(&change, other));
-        let open = !tied.iter().all(|other| same_place(&change, other));
         // no line mends it, and `inspect` knows it surely where the log has velocities
         let velocity = matches!(change, Change::Velocity(..));
         let together = change.joints().into_iter().find_map(|j| {

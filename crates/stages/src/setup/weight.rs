@@ -16,7 +16,7 @@ const COLUMNS: usize = 4;
 
 /// A measured part of a torque over that of the file's masses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gain {
+pub struct WeightGain {
     pub value: f64,
     pub interval_95: [f64; 2],
 }
@@ -25,11 +25,11 @@ pub struct Gain {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weight {
     pub joint: usize,
-    pub weight: Gain,
-    pub motion: Gain,
+    pub weight: WeightGain,
+    pub motion: WeightGain,
 }
 
-impl Gain {
+impl WeightGain {
     /// Whether it is another one than by the masses, too small (-1) or too large (1).
     pub fn is_off(&self, way: f64) -> bool {
         let [low, high] = self.interval_95;
@@ -84,7 +84,7 @@ pub(super) fn weights(problem: &Problem) -> Vec<Weight> {
     let gain = |at: usize| {
         let values: Vec<f64> = left_out.values().map(|x| x[at]).collect();
         let (value, std) = jackknife(&values);
-        Gain {
+        WeightGain {
             value,
             interval_95: [-TWO_SIDED, TWO_SIDED].map(|k| value + k * std),
         }

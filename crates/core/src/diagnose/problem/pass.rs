@@ -26,6 +26,9 @@ const TOGETHER: usize = 4;
 /// Rows that are summed of all logs, about.
 const MOST_ROWS: usize = 40_000;
 
+/// Part of a shape by which it is moved for a slope.
+const LITTLE: f64 = 1e-4;
+
 /// Rows and what each of them counts.
 pub struct Data<'a> {
     pub stretches: &'a [Stretch],
@@ -35,19 +38,54 @@ pub struct Data<'a> {
     pub rest_speed: &'a [f64],
 }
 
+/// An effect at a place in one shape, with bounds of its coefficients; without any it has no columns.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    pub effect: Added,
+    pub bounds: Vec<Bound>,
+    /// Shape parameters whose slopes of its torque are columns too, with bounds of a step.
+    pub slopes: Vec<(usize, Bound)>,
+}
+
+impl Candidate {
+    /// Columns in the rows of a joint: of its coefficients, then slopes.
+    fn columns(&self, scene: &Scene, joint: usize) -> Vec<Vec<f64>> {
+        let mut out = self.effect.columns(scene, joint);
+        out.truncate(self.bounds.len());
+        for (k, _) in &self.slopes {
+            let by = match self.effect.shape[*k] {
+                0.0 => LITTLE,
+                p => LITTLE * p.abs(),
+            };
+            let at = |by: f64| {
+                let mut moved = self.effect.clone();
+                moved.shape[*k] += by;
+                let mut torque = vec![0.0; scene.len()];
+                moved.torque(scene, joint, &mut torque);
+                torque
+            };
+            let sides = at(by).into_iter().zip(at(-by));
+            out.push(sides.map(|(a, b)| (a - b) / (2.0 * by)).collect());
+        }
+        out
+    }
+}
+
 /// Where the columns of unknowns and candidates stand in the rows of each joint.
 pub struct ColumnLayout {
     /// Terms of the declared unknowns.
     pub declared: Vec<Term>,
     /// Terms of each candidate, as many as it has coefficients.
     pub candidates: Vec<Vec<Term>>,
+    /// Terms of each candidate's slopes.
+    pub slopes: Vec<Vec<Term>>,
     /// Columns of each joint: unknowns, candidates, then the measured torque; the residual stands last.
     pub columns: Vec<usize>,
 }
 
 impl ColumnLayout {
-    /// Of unknowns and candidates with bounds of their coefficients.
-    pub fn of(unknowns: &Unknowns, candidates: &[(Added, Vec<Bound>)]) -> Self {
+    /// Of unknowns and candidates.
+    pub fn of(unknowns: &Unknowns, candidates: &[Candidate]) -> Self {
         let joints = unknowns.columns.len();
         let term = |bound| Term {
             columns: Vec::new(),
@@ -60,21 +98,24 @@ impl ColumnLayout {
             }
         }
         let mut columns: Vec<usize> = unknowns.columns.iter().map(Vec::len).collect();
-        let candidates = candidates.iter().map(|(effect, bounds)| {
-            let mut terms: Vec<Term> = bounds.iter().map(|b| term(*b)).collect();
-            for j in (0..joints).filter(|j| effect.place.touches(*j)) {
+        let terms = candidates.iter().map(|c| {
+            let bounds = c.bounds.iter().chain(c.slopes.iter().map(|(_, b)| b));
+            let mut terms: Vec<Term> = bounds.map(|b| term(*b)).collect();
+            for j in (0..joints).filter(|j| c.effect.place.touches(*j)) {
                 for term in &mut terms {
                     term.columns.push((j, columns[j]));
                     columns[j] += 1;
                 }
             }
-            terms
+            let slopes = terms.split_off(c.bounds.len());
+            (terms, slopes)
         });
-        let candidates = candidates.collect();
+        let (candidates, slopes) = terms.unzip();
         columns.iter_mut().for_each(|c| *c += 1);
         ColumnLayout {
             declared,
             candidates,
+            slopes,
             columns,
         }
     }
@@ -91,7 +132,7 @@ impl ColumnLayout {
 /// [`MotionError`] of the filter.
 pub fn pass(
     model: &AugmentedModel,
-    (unknowns, candidates): (&Unknowns, &[(Added, Vec<Bound>)]),
+    (unknowns, candidates): (&Unknowns, &[Candidate]),
     layout: &ColumnLayout,
     data: &Data,
     blocks: &[TimeBlock],
@@ -214,7 +255,7 @@ impl<'a> Window<'a> {
     fn rows(
         &self,
         unknowns: &Unknowns,
-        candidates: &[(Added, Vec<Bound>)],
+        candidates: &[Candidate],
         layout: &ColumnLayout,
     ) -> Result<Vec<DMatrix<f64>>, MotionError> {
         let n = self.model.model.robot.joints();
@@ -232,7 +273,7 @@ impl<'a> Window<'a> {
         &self,
         j: usize,
         unknowns: &Unknowns,
-        candidates: &[(Added, Vec<Bound>)],
+        candidates: &[Candidate],
         regressor: &mut [Vec<f64>],
     ) -> Result<DMatrix<f64>, MotionError> {
         let (model, part) = (self.model, &self.part);
@@ -247,8 +288,9 @@ impl<'a> Window<'a> {
                 Unknown::Offset(_) => vec![1.0; part.len()],
             });
         }
-        for (effect, _) in candidates.iter().filter(|(e, _)| e.place.touches(j)) {
-            raw.extend(effect.columns(&scene, j));
+        let own = |c: &&Candidate| c.effect.place.touches(j) && !c.bounds.is_empty();
+        for candidate in candidates.iter().filter(own) {
+            raw.extend(candidate.columns(&scene, j));
         }
         let mut hat = self.torques.hat[j].clone();
         raw.iter_mut().for_each(|column| shifted(column, late));

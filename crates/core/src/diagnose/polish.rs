@@ -1,0 +1,151 @@
+//! Chosen effects in their best shape: Gauss-Newton over shapes, amplitudes and the declared unknowns together, a small
+//! pass over the rows for each step.
+
+use nalgebra::DVector;
+
+use super::candidates::{Candidate, refined_shapes};
+use super::prepared::{PreparedCase, moved};
+use super::search::Chosen;
+use super::searched::Summed;
+use super::watch::UNWATCHED;
+use crate::effect::{Added, AugmentedModel};
+use crate::motion::MotionError;
+
+/// Most steps.
+const STEPS: usize = 6;
+/// A step that takes less than this part off the squares is the last.
+const SETTLED: f64 = 1e-5;
+/// Times that a step is halved where it makes the fit worse.
+const HALVED: usize = 4;
+
+/// A fit of chosen effects in some shape.
+struct Point {
+    summed: Summed,
+    candidates: Vec<Candidate>,
+    /// Of the declared unknowns, then of every coefficient.
+    values: DVector<f64>,
+    squares: f64,
+    /// Of every shape that is refined: where to go from here.
+    step: Vec<f64>,
+}
+
+impl PreparedCase<'_> {
+    /// Moves the shapes of chosen candidates to where all blocks together want them. Returns sums of these candidates
+    /// alone, about the declared model that was fitted with them.
+    pub fn polished(
+        &self,
+        candidates: &mut [Candidate],
+        summed: &Summed,
+        chosen: &[Chosen],
+        directions: &[Added],
+    ) -> Result<Summed, MotionError> {
+        let field = self.field(candidates, summed, UNWATCHED);
+        let terms = summed.declared.with(&field.terms_of(chosen));
+        let values = terms.fit(&field.total(), &[]).values;
+        let mut list = candidates.to_vec();
+        for (i, candidate) in list.iter_mut().enumerate() {
+            if !chosen.iter().any(|c| c.candidate == i) {
+                candidate.bounds.clear();
+            }
+        }
+        let start = self.there(&list, chosen, &values, &[]);
+        let mut best = self.point(summed.about.clone(), start, (chosen, directions))?;
+        for _ in 0..STEPS {
+            let Some(next) = self.better(&best, chosen, directions)? else {
+                break;
+            };
+            let settled = best.squares - next.squares <= SETTLED * best.squares;
+            best = next;
+            if settled {
+                break;
+            }
+        }
+        for c in chosen {
+            let found = &best.candidates[c.candidate];
+            let own = &mut candidates[c.candidate];
+            own.effect.shape.clone_from(&found.effect.shape);
+            own.slopes.clone_from(&found.slopes);
+            for (k, room) in &found.slopes {
+                own.effect.held[*k] = room.least == 0.0 || room.most == 0.0;
+            }
+        }
+        Ok(best.summed)
+    }
+
+    /// A step on; none where no part of it makes the fit better.
+    fn better(
+        &self,
+        from: &Point,
+        chosen: &[Chosen],
+        directions: &[Added],
+    ) -> Result<Option<Point>, MotionError> {
+        let about = moved(&from.summed.about, &self.unknowns, &from.values);
+        let mut part = 1.0;
+        for _ in 0..HALVED {
+            let step: Vec<f64> = from.step.iter().map(|x| part * x).collect();
+            let list = self.there(&from.candidates, chosen, &from.values, &step);
+            let next = self.point(about.clone(), list, (chosen, directions))?;
+            if next.squares < from.squares {
+                return Ok(Some(next));
+            }
+            part *= 0.5;
+        }
+        Ok(None)
+    }
+
+    /// Candidates with the amplitudes of a fit, a step on.
+    fn there(
+        &self,
+        list: &[Candidate],
+        chosen: &[Chosen],
+        values: &DVector<f64>,
+        step: &[f64],
+    ) -> Vec<Candidate> {
+        let mut list = list.to_vec();
+        let (mut at, mut steps) = (self.unknowns.len(), step.iter());
+        for c in chosen {
+            let own = &mut list[c.candidate];
+            for x in &mut own.effect.linear {
+                *x = values[at];
+                at += 1;
+            }
+            for ((k, _), by) in own.slopes.iter().zip(&mut steps) {
+                own.effect.shape[*k] += by;
+            }
+            own.slopes = refined_shapes(&self.fitted.model, self.case, &self.cover, &own.effect);
+        }
+        list
+    }
+
+    fn point(
+        &self,
+        about: AugmentedModel,
+        candidates: Vec<Candidate>,
+        (chosen, directions): (&[Chosen], &[Added]),
+    ) -> Result<Point, MotionError> {
+        // a law that is chosen gives the direction in its present shape
+        let present = |d: &Added| {
+            let mut own = chosen.iter().map(|c| &candidates[c.candidate].effect);
+            let own = own.find(|e| e.name() == d.name() && e.place == d.place);
+            let mut direction = own.unwrap_or(d).clone();
+            direction.linear.fill(0.0);
+            direction
+        };
+        let directions: Vec<Added> = directions.iter().map(present).collect();
+        let summed = self.summed(about, &candidates, &directions)?;
+        let field = self.field(&candidates, &summed, UNWATCHED);
+        let total = field.total();
+        let terms = summed.declared.with(&field.terms_of(chosen));
+        let fit = terms.fit(&total, &[]);
+        let weighted = fit.squares.iter().zip(&terms.weights);
+        let with_slopes = terms.with(&field.slopes_of(chosen));
+        let all = with_slopes.fit(&total, &[]).values;
+        Ok(Point {
+            squares: weighted.map(|(s, w)| s * w).sum(),
+            step: all.iter().skip(terms.len()).copied().collect(),
+            values: fit.values,
+            summed,
+            candidates,
+        })
+    }
+}

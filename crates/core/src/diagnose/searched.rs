@@ -1,0 +1,205 @@
+//! What is chosen of all candidates: one pass over the rows, then the search; once more about the friction laws that
+//! are found, for what goes by a joint's direction goes by its law.
+
+use nalgebra::DMatrix;
+
+use super::candidates::{Candidate, NotTried, candidates, is_friction_law};
+use super::error::DiagnoseError;
+use super::prepared::PreparedCase;
+use super::problem::fit::determines_some;
+use super::problem::pass::{ColumnLayout, pass};
+use super::search::{Chosen, Field, Looked};
+use super::tables::verified;
+use super::watch::{UNWATCHED, Watch};
+use crate::effect::{Added, AugmentedModel};
+use crate::judge::{BlockSums, BlocksLeftOut, Terms, compare};
+use crate::motion::MotionError;
+
+/// Sums of products about a model.
+pub struct Summed {
+    /// The declared model that they are about.
+    pub about: AugmentedModel,
+    pub layout: ColumnLayout,
+    pub sums: BlockSums,
+    /// The declared terms.
+    pub declared: Terms,
+}
+
+/// What the search came to.
+pub struct SearchedCase {
+    /// Those that were chosen in their best shape.
+    pub candidates: Vec<Candidate>,
+    pub not_tried: Vec<NotTried>,
+    /// Sums of what was chosen.
+    pub summed: Summed,
+    pub chosen: Vec<Chosen>,
+    pub looked: Vec<Looked>,
+    /// Squared error of blocks left out by all that was chosen, in the weights of the joints.
+    pub error: f64,
+    /// Whether the declared model explains more of blocks left out than no torque does.
+    pub determined: bool,
+}
+
+impl PreparedCase<'_> {
+    /// Sums about a model; friction goes by the `directions` of these laws.
+    pub fn summed(
+        &self,
+        about: AugmentedModel,
+        candidates: &[Candidate],
+        directions: &[Added],
+    ) -> Result<Summed, MotionError> {
+        let layout = ColumnLayout::of(&self.unknowns, candidates);
+        let mut beside = about.clone();
+        beside.effects.extend_from_slice(directions);
+        let columns = (&self.unknowns, candidates);
+        let sums = pass(&beside, columns, &layout, &self.data, &self.all_blocks)?;
+        let mut declared = self.declared.terms(&self.unknowns, &layout, &about);
+        declared.weights.clone_from(&self.fitted.weights);
+        Ok(Summed {
+            about,
+            layout,
+            sums,
+            declared,
+        })
+    }
+
+    /// What is searched, by sums of products.
+    pub fn field<'b>(
+        &'b self,
+        candidates: &'b [Candidate],
+        summed: &'b Summed,
+        watch: Watch<'b>,
+    ) -> Field<'b> {
+        Field {
+            candidates,
+            terms: &summed.layout.candidates,
+            slopes: &summed.layout.slopes,
+            sums: &summed.sums,
+            judging: self.judging(),
+            numbers: &self.case.numbers,
+            watch,
+        }
+    }
+
+    /// Chooses what gains, and what the user wants.
+    pub fn search(&self, watch: Watch) -> Result<SearchedCase, DiagnoseError> {
+        let model = &self.fitted.model;
+        let (mut candidates, not_tried) = candidates(model, self.case, &self.cover);
+        let mut summed = self.summed(model.clone(), &candidates, &[])?;
+        let nothing = || DiagnoseError::NothingDetermined {
+            unknowns: self.unknowns.len(),
+        };
+        if !determines_some(&summed.sums, &summed.declared) && !self.case.keep {
+            return Err(nothing());
+        }
+        let numbers = &self.case.numbers;
+        let alone = BlocksLeftOut::new(&summed.sums, self.judging(), &summed.declared);
+        let errors = alone.ok_or_else(nothing)?.errors();
+        let weights = &summed.declared.weights;
+        let determined =
+            compare(&torque_squares(&summed), &errors, weights).is_beyond(numbers.screen, None);
+        let error = errors.iter().flat_map(|e| e.iter().zip(weights));
+        let error = error.map(|(e, w)| e * w).sum();
+        let (mut chosen, mut looked) = (Vec::new(), Vec::new());
+        let mut directions = Vec::new();
+        if self.blocks.parts >= numbers.parts {
+            let field = self.field(&candidates, &summed, watch);
+            (chosen, looked) = field
+                .search(&summed.declared, Vec::new())
+                .ok_or_else(nothing)?;
+            let smooth = |c: &&Chosen| {
+                let effect = &candidates[c.candidate].effect;
+                is_friction_law(effect) && effect.law.direction.is_some()
+            };
+            let laws: Vec<Chosen> = chosen.iter().filter(smooth).cloned().collect();
+            directions = self.agreed(&mut candidates, &summed, &laws)?;
+            if !directions.is_empty() {
+                summed = self.summed(model.clone(), &candidates, &directions)?;
+                let field = self.field(&candidates, &summed, watch);
+                (chosen, looked) = field.search(&summed.declared, laws).ok_or_else(nothing)?;
+            }
+        }
+        self.accept(&candidates, &looked, error, &mut chosen)?;
+        if !chosen.is_empty() {
+            summed = self.polished(&mut candidates, &summed, &chosen, &directions)?;
+        }
+        Ok(SearchedCase {
+            error,
+            determined,
+            candidates,
+            not_tried,
+            summed,
+            chosen,
+            looked,
+        })
+    }
+
+    /// Friction laws in their best shape whose parts agree, with no amplitude.
+    fn agreed(
+        &self,
+        candidates: &mut [Candidate],
+        summed: &Summed,
+        laws: &[Chosen],
+    ) -> Result<Vec<Added>, MotionError> {
+        if laws.is_empty() {
+            return Ok(Vec::new());
+        }
+        let polished = self.polished(candidates, summed, laws, &[])?;
+        let field = self.field(candidates, &polished, UNWATCHED);
+        let found = verified(&field, &polished.declared, laws, &self.blocks);
+        let agreed = found.iter().filter(|v| v.agreement.s > 0.0);
+        let effects = agreed.map(|v| candidates[v.chosen.candidate].effect.clone());
+        Ok(effects.collect())
+    }
+
+    /// Adds the effects that the user wants.
+    fn accept(
+        &self,
+        candidates: &[Candidate],
+        looked: &[Looked],
+        error: f64,
+        chosen: &mut Vec<Chosen>,
+    ) -> Result<(), DiagnoseError> {
+        let robot = &self.case.given.model.robot;
+        for wanted in &self.case.wishes.accepted {
+            let is = |c: usize| {
+                let effect = &candidates[c].effect;
+                effect.name() == wanted.0 && effect.place.name(robot) == wanted.1
+            };
+            if chosen.iter().any(|c| is(c.candidate)) {
+                continue;
+            }
+            let own = looked.iter().filter(|l| is(l.candidate));
+            let best = own.max_by(|a, b| a.gain.value.total_cmp(&b.gain.value));
+            let best = best.ok_or_else(|| not_there(wanted))?;
+            chosen.push(Chosen {
+                candidate: best.candidate,
+                gain: best.gain.clone(),
+                error,
+                alternatives: Vec::new(),
+            });
+        }
+        Ok(())
+    }
+}
+
+fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
+    let place = joint.as_ref().map_or(String::new(), |j| format!(" of {j}"));
+    DiagnoseError::Accept {
+        name: format!("{name}{place}"),
+        why: "it was not among the candidates: see `candidates` in the JSON document for those that there are"
+            .to_owned(),
+    }
+}
+
+/// Squared torque of every block, `[block][joint]`.
+fn torque_squares(summed: &Summed) -> Vec<Vec<f64>> {
+    let of_block = |joints: &Vec<DMatrix<f64>>| {
+        let square = |(j, s): (usize, &DMatrix<f64>)| {
+            let torque = summed.layout.torque(j);
+            s[(torque, torque)]
+        };
+        joints.iter().enumerate().map(square).collect()
+    };
+    summed.sums.blocks.iter().map(of_block).collect()
+}
