@@ -7,7 +7,7 @@ use cft_ident_logs::log::{Block, Channel, Layout, LogSpec, RawReader, Reader};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::log_drawn::{DRAWN, JOINTS, Motion, ROWS, mapped, names, read, same};
+use crate::log_drawn::{DRAWN, Motion, ROWS, mapped, names, read, same};
 
 fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(cft_ident_support::ROOT).join("fixtures/tables");
@@ -24,7 +24,16 @@ fn layout(positions: [&str; 3], torques: [&str; 3], time: &str) -> Layout {
     named(&mut layout.positions, positions);
     named(&mut layout.torques, torques);
     layout.velocities.clear();
-    time.clone_into(&mut layout.time.column);
+    in_time(layout, time)
+}
+
+/// The layout with times of this column, which may be in nanoseconds.
+fn in_time(mut layout: Layout, column: &str) -> Layout {
+    column.clone_into(&mut layout.time.column);
+    if column.ends_with("[ns]") {
+        "ns".clone_into(&mut layout.time.unit);
+        layout.time.factor = 1e-9;
+    }
     layout
 }
 
@@ -310,11 +319,9 @@ fn what_is_written_as_parquet_is_read_back_bit_for_bit() {
                 .unwrap();
         }
         log.commit().unwrap();
-        let mut layout = Layout::joint_columns(&JOINTS);
+        let mut layout = Layout::joint_columns(&crate::log_drawn::JOINTS);
         layout.velocities.clear();
-        if origin != 0 {
-            "t [ns]".clone_into(&mut layout.time.column);
-        }
+        let layout = in_time(layout, if origin == 0 { "t" } else { "t [ns]" });
         same(&read(&path, &layout).unwrap(), &motion, 11);
     }
 }

@@ -1,6 +1,7 @@
 //! Parquet files: columns of numbers and of lists of numbers, and the datasets of LeRobot, whose description names
 //! what the lists hold.
 
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, Write};
 use std::panic::AssertUnwindSafe;
@@ -32,7 +33,7 @@ struct ParquetTable {
     names: Vec<String>,
     columns: Vec<Column>,
     rows: RowIter<'static>,
-    waiting: std::vec::IntoIter<PathBuf>,
+    waiting: VecDeque<PathBuf>,
     /// The first row, read for its widths.
     first: Option<Row>,
     number: u64,
@@ -89,7 +90,7 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
         names,
         columns,
         rows,
-        waiting: more.to_vec().into_iter(),
+        waiting: more.iter().cloned().collect(),
         first,
         number: 0,
         clock,
@@ -223,7 +224,7 @@ impl ParquetTable {
             if let Some(row) = whole(|| rows.next().transpose().map_err(broken))? {
                 return Ok(Some(row));
             }
-            let Some(path) = self.waiting.next() else {
+            let Some(path) = self.waiting.pop_front() else {
                 return Ok(None);
             };
             self.rows = rows_of(&path, &mut Vec::new())?.0;
