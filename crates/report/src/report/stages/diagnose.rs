@@ -4,7 +4,9 @@ use super::step_words::{alternatives, grade, in_words, titled, worsened};
 use super::{first_screen, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
-use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
+use crate::report::sections::{
+    fit, free_run, friction, parameters, provenance, residual, sketch, torque,
+};
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer};
 use cft_ident_core::diagnose::{
@@ -41,6 +43,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut page = report.page();
     first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
+    free_run::section(&mut page, of.found.free_run.as_ref());
     report
 }
 
@@ -98,6 +101,7 @@ pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     for (i, step) in d.steps.iter().enumerate() {
         step_told(terminal, machine, found, (i + 1, step));
     }
+    free_run::section(terminal, found.free_run.as_ref());
     terminal.list(doubts(machine, found));
     terminal.list(changes(machine, found));
     terminal.note("  ", &first_screen::next(machine, found), 4);
