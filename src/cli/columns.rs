@@ -161,6 +161,14 @@ fn place(
             let name = &log.names()[column];
             let mut seen = InspectedChannel::new(name, role, Some(joint), Some(&unit));
             (seen.limits, seen.saturates) = limits(machine, (j, joint), role, raw);
+            if role == ChannelRole::Torque && !raw && !["N", "Nm"].contains(&&*unit) {
+                // the limit is that of a torque
+                seen.limits = None;
+            }
+            if role == ChannelRole::Position {
+                let limits = machine.file.limits.get(joint);
+                seen.speed = limits.and_then(|limits| limits.speed);
+            }
             seen.factor = channel.factor;
             known[column] = Some(ChannelColumn {
                 column,

@@ -18,13 +18,14 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident convert unseen.csv unseen.mcap
   cft-ident convert unseen.csv joints.csv.zst -r configs/cft.toml
-  cft-ident convert bag_0.mcap bag_1.mcap run.csv.gz";
+  cft-ident convert bag_0.mcap bag_1.mcap run.csv.gz
+  cft-ident convert unseen.csv unseen.parquet";
 
-/// Write logs in another form: CSV or MCAP, each also compressed with gzip or zstd.
+/// Write logs in another form: CSV or MCAP, each also compressed with gzip or zstd, or Parquet.
 ///
 /// Numbers stay as they are, to the last bit; time becomes seconds. In MCAP the columns q_, dq_ and
 /// tau_ of the joints are sensor_msgs/msg/JointState on /joint_states; others are on topics of their
-/// own. Several logs become one, in the order of time. With a robot file the channels that it names
+/// own. In Parquet each is a column, times of dates are stamps in nanoseconds. Several logs become one, in the order of time. With a robot file the channels that it names
 /// are written, as joint positions and torques in SI units.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
@@ -32,7 +33,7 @@ pub struct Args {
     /// Logs, in the order of time; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "IN")]
     pub logs: Vec<LogSpec>,
-    /// Log to write: .csv or .mcap, and .gz or .zst after it
+    /// Log to write: .csv or .mcap, and .gz or .zst after it; or .parquet
     #[arg(value_name = "OUT", value_parser = arguments::log_file)]
     pub output: PathBuf,
     /// Robot file, or a built-in one such as configs/cft.toml: write its joint channels

@@ -91,6 +91,8 @@ struct Work {
     robot: PathBuf,
     /// Its text, where it was drafted here.
     draft: Option<String>,
+    /// Its text, where it comes with the tool.
+    shipped: Option<&'static str>,
     /// What was guessed in it.
     guesses: Vec<String>,
     warnings: Vec<String>,
@@ -165,6 +167,7 @@ impl Work {
             base,
             robot,
             draft: None,
+            shipped: None,
             guesses: Vec::new(),
             warnings,
         })
@@ -181,9 +184,13 @@ impl Work {
             return Err(CliError::input("no log is named"));
         };
         let (mut robot, mut draft, mut guesses) = (file.to_path_buf(), None, Vec::new());
-        let mut warnings = Vec::new();
+        let (mut warnings, mut shipped) = (Vec::new(), None);
         let machine = match is_urdf(file) {
-            false => LoggedRobot::load(&file.to_string_lossy())?,
+            false => {
+                // one that comes with the tool is written beside its model, to be changed there
+                shipped = config::embedded(file).filter(|_| !file.exists());
+                LoggedRobot::load(&file.to_string_lossy())?
+            }
             true => {
                 robot = folder.join("robot.toml");
                 let asked = new::Args {
@@ -225,6 +232,7 @@ impl Work {
             machine,
             robot,
             draft,
+            shipped,
             guesses,
             warnings,
         })
@@ -314,6 +322,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         machine,
         robot,
         draft,
+        shipped,
         mut guesses,
         mut warnings,
     } = work;
@@ -355,6 +364,9 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
             write((folder, context), "robot.toml", text, &mut files)?;
         }
         (None, _) => checked.write(context)?,
+    }
+    if let Some(text) = shipped {
+        write((folder, context), "robot.toml", text, &mut files)?;
     }
     let machine = checked.machine;
     let settings = IdentifySettings {

@@ -15,6 +15,8 @@ pub struct InspectedChannel {
     pub unit: Option<String>,
     /// Limits of its numbers by the robot file.
     pub limits: Option<[f64; 2]>,
+    /// Largest speed of a position by the robot file [unit/s].
+    pub speed: Option<f64>,
     /// Whether a number at its limit is what was really applied: the volts of an amplifier.
     pub saturates: bool,
     /// What a 0 of the column stands for.
@@ -43,6 +45,7 @@ impl InspectedChannel {
             joint: joint.map(str::to_owned),
             unit: unit.map(str::to_owned),
             limits: None,
+            speed: None,
             saturates: false,
             zero: 0.0,
             factor: 1.0,

@@ -312,7 +312,8 @@ impl LogJudge {
         if self.clock.rows == 0 {
             let dt = typical_step(times);
             for &index in &self.positions {
-                self.tracks[index].excitation = Some(Excitation::new(dt));
+                let track = &mut self.tracks[index];
+                track.excitation = Some(Excitation::new(dt, track.channel.speed));
             }
         }
         let mut steps = std::mem::take(&mut self.steps);

@@ -10,6 +10,7 @@ use super::findings::{ChannelFacts, Findings, Gap, RowCost, RowFate, joined};
 use super::judge::{Depth, LogJudge, Track};
 use super::words::ChannelRole;
 use super::{shape, together};
+use crate::log::round_within;
 
 /// Steps off the median by more than a tenth, as a share of all, from which a clock is irregular.
 const UNEVEN: f64 = 0.05;
@@ -37,6 +38,7 @@ fn conclude(judge: &LogJudge) -> Findings {
     together::stalls(judge, &clock, &mut draft);
     for (place, track) in judge.tracks.iter().enumerate() {
         number_faults(track, &mut draft);
+        speed_faults(judge, place, &mut draft);
         shape::faults(judge, place, &clock, &mut draft);
     }
     together::faults(judge, &clock, &mut draft);
@@ -218,7 +220,17 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             rows_text(rows, 1)
         )
     };
-    let remedy = "delete duplicate rows; if the clock is too coarse and rows lie evenly, `rate_hz = ..` in [log] of the robot file, in place of `time`";
+    let rate = (seen.rows.saturating_sub(1)) as f64 / seen.duration();
+    // a clock that stands still now and then is another fault
+    let coarse = 4 * seen.repeated.rows() > seen.rows && seen.duration() > 10.0 * clock.dt;
+    let remedy = &match coarse {
+        true => format!(
+            "the clock moves in steps of {}, too coarse for rows at {rate} Hz: where rows lie evenly, `rate_hz = {rate}` in [log] of the robot file, in place of `time`",
+            seconds(clock.dt),
+            rate = round_within(rate, rate * 2.0 * clock.dt / seen.duration()),
+        ),
+        false => "delete duplicate rows; where rows lie evenly, `rate_hz = ..` in [log] of the robot file, in place of `time`".to_owned(),
+    };
     draft.stretches(
         FaultKind::RepeatedTime,
         Error,
@@ -287,6 +299,36 @@ fn gap_faults(clock: &ClockFacts, draft: &mut FaultList) {
     };
     let remedy = "record with a larger buffer or a lower rate; a few gaps in a long log do no harm";
     draft.stretches(FaultKind::Dropout, Warning, None, &gaps, &effect, remedy);
+}
+
+/// Positions that move faster than the robot can, where no velocity of the joint was logged that says so itself.
+fn speed_faults(judge: &LogJudge, place: usize, draft: &mut FaultList) {
+    let track = &judge.tracks[place];
+    let (Some(limit), Some(motion)) = (track.channel.speed, &track.excitation) else {
+        return;
+    };
+    let of_joint = |other: &Track| {
+        other.channel.role == ChannelRole::Velocity && other.channel.joint == track.channel.joint
+    };
+    if judge.tracks.iter().any(of_joint) {
+        return;
+    }
+    let unit = track.channel.unit.as_deref().unwrap_or_default();
+    let effect = |rows: u64, times: usize| {
+        format!(
+            "{} in which it moves faster than {limit} {unit}/s, the limit of its joint: unit, encoder or limit is wrong, or the times are",
+            rows_text(rows, times)
+        )
+    };
+    let remedy = "check the unit of this channel and of the time in [log], and `speed` in [limits] of the robot file";
+    draft.stretches(
+        FaultKind::BeyondLimits,
+        Warning,
+        Some(&track.channel.name),
+        &motion.too_fast,
+        &effect,
+        remedy,
+    );
 }
 
 fn number_faults(track: &Track, draft: &mut FaultList) {

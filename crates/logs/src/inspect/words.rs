@@ -331,7 +331,12 @@ pub fn role(words: &[Word]) -> Option<ChannelRole> {
     let position = words
         .iter()
         .any(|w| !short(w) && POSITIONS.contains(&&*w.text));
-    match (position, has(words, &TORQUES)) {
+    // a dataset of LeRobot calls positions the observed state
+    let observed = |pair: &[Word]| pair[0].text == "observation" && pair[1].text == "state";
+    match (
+        position || words.windows(2).any(observed),
+        has(words, &TORQUES),
+    ) {
         (true, _) => Some(ChannelRole::Position),
         (_, true) => Some(ChannelRole::Torque),
         _ if words.iter().any(short) => Some(ChannelRole::Position),

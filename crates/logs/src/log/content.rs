@@ -1,13 +1,14 @@
 //! Files opened for what they hold: decompressed on the way, and known by their first bytes.
 
 use std::io::{self, BufReader, Chain, Cursor, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::held_files::OpenFile;
 use super::source::Checksum;
 use super::stream::{Stream, Watch};
-use super::{LogError, source};
+use super::table::TableText;
+use super::{LogError, source, table};
 
 /// First bytes of a file of reduced logs.
 pub const REDUCED: &[u8] = b"cft-ident reduced\n";
@@ -35,8 +36,12 @@ pub(super) struct Content {
     rest: Box<dyn Read + Send>,
     /// What is known of a stream while it arrives; none of a file.
     pub(super) watch: Option<Watch>,
-    /// The bytes of the file as they lie on the disk; none of a stream.
+    /// The bytes of the file as they lie on the disk; none of a stream and of several files.
     pub(super) raw: Option<RawBytes>,
+    /// Whether the text is that of a table which is none: its lines stand nowhere.
+    pub(super) table: bool,
+    /// What was left out of a table.
+    pub(super) notes: Vec<String>,
 }
 
 /// The bytes of an open file, hashed as they are read.
@@ -46,6 +51,12 @@ pub(super) struct RawBytes(Arc<Mutex<(OpenFile, Checksum)>>);
 impl RawBytes {
     fn new(file: OpenFile) -> Self {
         Self(Arc::new(Mutex::new((file, Checksum::default()))))
+    }
+
+    /// The file, to be read from a byte on.
+    fn file(&self) -> OpenFile {
+        let inner = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        inner.0.from(0)
     }
 
     /// SHA-256 of the whole file, hexadecimal; what was not read yet is read.
@@ -73,6 +84,14 @@ impl Content {
     /// # Errors
     /// A file that cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        Self::open_with(path, &[])
+    }
+
+    /// Opens a table that goes on in other files.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub(super) fn open_with(path: &Path, more: &[PathBuf]) -> Result<Self, LogError> {
         let fail = |error| source::failed(path, error);
         let file = source::open(path)?;
         let size = file.metadata().map_err(fail)?.len();
@@ -100,6 +119,15 @@ impl Content {
             }
             rest = Box::new(CutOff(error.kind(), error.to_string()));
         }
+        if compression == Compression::None && table::is_table(&head) {
+            return Self::of_table(
+                table::open(path, &raw.file(), &head, more)?,
+                size,
+                raw,
+                more,
+            )
+            .map_err(fail);
+        }
         if head.starts_with(REDUCED) {
             return Err(LogError::Format {
                 file: source::shown(path),
@@ -114,6 +142,30 @@ impl Content {
             rest,
             watch: None,
             raw: Some(raw),
+            table: false,
+            notes: Vec::new(),
+        })
+    }
+
+    fn of_table(
+        mut text: TableText,
+        size: u64,
+        raw: RawBytes,
+        more: &[PathBuf],
+    ) -> io::Result<Self> {
+        let mut head = Vec::with_capacity(HEAD);
+        Read::by_ref(&mut text)
+            .take(HEAD as u64)
+            .read_to_end(&mut head)?;
+        Ok(Self {
+            compression: Compression::None,
+            size,
+            head,
+            notes: std::mem::take(&mut text.notes),
+            rest: Box::new(text),
+            watch: None,
+            raw: more.is_empty().then_some(raw),
+            table: true,
         })
     }
 
@@ -141,6 +193,8 @@ impl Content {
             rest: Box::new(rest),
             watch: Some(watch),
             raw: None,
+            table: false,
+            notes: Vec::new(),
         })
     }
 

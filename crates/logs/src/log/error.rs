@@ -27,6 +27,9 @@ pub enum LogError {
         kind: &'static str,
         remedy: &'static str,
     },
+    /// Arrays or a Parquet file that are no table of numbers.
+    #[error("{file}: cannot be read: {problem}; write it as CSV, a column for each channel")]
+    Table { file: String, problem: String },
     /// A part of a recording that is not what was written.
     #[error(
         "{file}: {part} is damaged: its checksum is {calculated:08x}, not {saved:08x}; copy the file again from where it was recorded, or use the part before it: FILE@0..10s"

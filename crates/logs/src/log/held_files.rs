@@ -53,6 +53,14 @@ impl OpenFile {
         }
     }
 
+    /// The same file, read from a byte on by whoever takes this.
+    pub(super) fn from(&self, at: u64) -> Self {
+        Self {
+            file: Arc::clone(&self.file),
+            at: Some(at),
+        }
+    }
+
     pub(super) fn metadata(&self) -> io::Result<Metadata> {
         self.file.metadata()
     }

@@ -8,6 +8,7 @@ use super::content::{Content, RawBytes};
 use super::layout::Layout;
 use super::recording::{JoinedTopics, JointStates, MessageRows, format_of, has_none, of_topics};
 use super::rows::{LogRows, Strictness};
+use super::table;
 use super::text::TextRows;
 
 /// A log that was opened.
@@ -27,8 +28,10 @@ pub(super) fn open(
     layout: &Layout,
     strictness: Strictness,
 ) -> Result<Opened, LogError> {
-    if let [path] = files {
-        let content = Content::open(path)?;
+    if let [path, more @ ..] = files
+        && (more.is_empty() || table::begins(path))
+    {
+        let content = Content::open_with(path, more)?;
         if format_of(content.head()).is_none() {
             let bytes = content.raw.clone();
             let (rows, layout, refused) = TextRows::open(path, content, layout, strictness)?;

@@ -322,7 +322,7 @@ impl LogPass {
 }
 
 /// The shortest number that is as near to `x` as `within`.
-fn round_within(x: f64, within: f64) -> f64 {
+pub(crate) fn round_within(x: f64, within: f64) -> f64 {
     let shorter = (1..=6).map(|digits| {
         let place = 10_f64.powi(digits - 1 - x.abs().log10().floor() as i32);
         (x * place).round() / place

@@ -1,6 +1,8 @@
 //! A log as it stands in its files: every column, with its errors. What a strict reader refuses, or
 //! passes over, can be looked at here.
 
+use std::path::PathBuf;
+
 use super::columns::{time_of, unit_of};
 use super::content::Content;
 use super::layout::{Channel, Layout};
@@ -19,13 +21,10 @@ use cft_ident_core::number::is_usable;
 /// A file that cannot be read.
 pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
     let files = spec.files()?;
-    // an empty part of a recording that is split is of no format
-    for file in &files {
-        if format_of(Content::open(file)?.head()).is_some() {
-            return state_groups(&files);
-        }
+    match is_recording(&files)? {
+        true => state_groups(&files),
+        false => Ok(Vec::new()),
     }
-    Ok(Vec::new())
 }
 
 /// The topics of a recording, with the numbers in their messages; none of a text log.
@@ -34,12 +33,24 @@ pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
 /// A file that cannot be read.
 pub fn listing(spec: &LogSpec) -> Result<Vec<TopicFacts>, LogError> {
     let files = spec.files()?;
-    for file in &files {
-        if format_of(Content::open(file)?.head()).is_some() {
-            return recording::listing(&files);
+    match is_recording(&files)? {
+        true => recording::listing(&files),
+        false => Ok(Vec::new()),
+    }
+}
+
+/// Whether files are a recording; an empty part of one that is split is of no format.
+fn is_recording(files: &[PathBuf]) -> Result<bool, LogError> {
+    for file in files {
+        let content = Content::open(file)?;
+        if content.table {
+            return Ok(false);
+        }
+        if format_of(content.head()).is_some() {
+            return Ok(true);
         }
     }
-    Ok(Vec::new())
+    Ok(false)
 }
 
 /// Consecutive rows of all columns.

@@ -116,6 +116,7 @@ pub fn remedy(error: &io::Error) -> &'static str {
         io::ErrorKind::PermissionDenied => "allow reading it, or copy it to where you may read",
         io::ErrorKind::IsADirectory => "name a file inside this folder",
         io::ErrorKind::InvalidData => "it is no UTF-8 text; name the right file",
+        io::ErrorKind::Unsupported => "write it as CSV, a column for each channel",
         io::ErrorKind::UnexpectedEof => "it is cut off: copy it again from where it was recorded",
         _ => "check the disk or the connection, and try again",
     }
@@ -171,8 +172,9 @@ pub fn named_beside_of(path: &Path, ends: &[&str], wanted: &dyn Fn(&Path) -> boo
 }
 
 /// Endings of files that hold logs.
-const LOGS: [&str; 9] = [
-    "csv", "txt", "dat", "tsv", "mcap", "db3", "csv.gz", "csv.zst", "mcap.zst",
+const LOGS: [&str; 12] = [
+    "csv", "txt", "dat", "tsv", "npz", "npy", "parquet", "mcap", "db3", "csv.gz", "csv.zst",
+    "mcap.zst",
 ];
 
 /// The error for a read that the system refused.

@@ -9,6 +9,7 @@ use super::LogError;
 use super::names::escape_whole;
 use super::recording::FORMATS;
 use super::source::{failed, file_name, shown};
+use super::table::dataset;
 use super::tape::Kept;
 
 /// The part of a log that is used.
@@ -204,7 +205,8 @@ impl LogSpec {
     /// A folder without recordings, or one that cannot be read.
     pub(super) fn files(&self) -> Result<Vec<PathBuf>, LogError> {
         if self.path.is_dir() {
-            return recordings_in(&self.path);
+            let dataset = dataset(&self.path).map_err(|error| failed(&self.path, error))?;
+            return dataset.map_or_else(|| recordings_in(&self.path), Ok);
         }
         Ok(self.joined().unwrap_or_else(|| vec![self.path.clone()]))
     }
@@ -236,7 +238,7 @@ fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, LogError> {
     }
     found.sort_by_cached_key(|(_, path)| natural(&file_name(path)));
     let problem = match found.first() {
-        None => "holds no .mcap or .db3 file",
+        None => "holds no .mcap or .db3 file, and no dataset of LeRobot",
         Some((first, _)) if found.iter().any(|(other, _)| other != first) => {
             "holds both .mcap and .db3 files"
         }

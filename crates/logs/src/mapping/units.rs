@@ -65,6 +65,30 @@ const TORQUES: [(&str, &[&str]); 10] = [
 /// axes.
 const SHORT: [(&str, &str); 5] = [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
 
+/// Words that name parts of robots too: units in brackets alone.
+const AMBIGUOUS: [&str; 5] = ["turn", "load", "count", "inc", "tick"];
+
+/// The units that the names of columns of one kind state. In words they are units where all of these columns state
+/// one: in `q_base_turn` beside `q_upper` the word is the joint's.
+fn stated_by_all(
+    columns: &[&LogColumn],
+    alike: &dyn Fn(usize, usize) -> bool,
+    known: &[(&'static str, &[&str])],
+) -> Vec<Option<&'static str>> {
+    let each: Vec<_> = columns.iter().map(|column| stated(column, known)).collect();
+    let all = |k: usize| {
+        let mut others = each
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| alike(k, *other));
+        others.all(|(_, unit)| unit.is_some())
+    };
+    let holds = |k: usize| columns[k].unit.is_some() || all(k);
+    (0..each.len())
+        .map(|k| each[k].filter(|_| holds(k)))
+        .collect()
+}
+
 /// The unit that the name of a column states: in brackets, or in a word that means nothing else.
 fn stated(column: &LogColumn, known: &[(&'static str, &[&str])]) -> Option<&'static str> {
     let of = |word: &str| {
@@ -80,7 +104,12 @@ fn stated(column: &LogColumn, known: &[(&'static str, &[&str])]) -> Option<&'sta
     let milli = last.filter(|word| word.text == "ma" && spoken.len() > 1);
     of(&bracket)
         .or(short.map(|(_, unit)| *unit))
-        .or_else(|| spoken.iter().find_map(|word| of(&word.text)))
+        .or_else(|| {
+            let sure = spoken
+                .iter()
+                .filter(|word| !AMBIGUOUS.contains(&&*word.text));
+            sure.into_iter().find_map(|word| of(&word.text))
+        })
         .or_else(|| milli.and_then(|_| of("milliamps")))
 }
 
@@ -103,15 +132,17 @@ pub(super) fn other_velocity(velocity: &LogColumn, position: Option<&'static str
 
 /// The units of the positions of all joints.
 pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<Unit> {
+    let stated = stated_by_all(columns, &|a, b| kinds[a] == kinds[b], &POSITIONS);
     let of = |kind: JointKind| {
-        let all = columns.iter().zip(kinds).filter(move |(_, k)| **k == kind);
-        let plain = all.filter(|(column, _)| stated_position(column).is_none());
-        plain
-            .map(|(column, _)| column.largest())
-            .fold(0.0, f64::max)
+        let plain = (0..columns.len()).filter(|k| kinds[*k] == kind && stated[*k].is_none());
+        plain.map(|k| columns[k].largest()).fold(0.0, f64::max)
     };
     let (turned, slid) = (of(JointKind::Revolute), of(JointKind::Prismatic));
-    let plain = columns.iter().filter(|c| stated_position(c).is_none());
+    let plain = columns
+        .iter()
+        .zip(&stated)
+        .filter(|(_, unit)| unit.is_none());
+    let plain = plain.map(|(column, _)| column);
     let whole = plain.clone().all(|c| c.whole) && turned.max(slid) > 400.0;
     let first = plain.clone().next().map(|column| &column.name);
     let guessed = |kind: JointKind, column: &LogColumn| {
@@ -145,8 +176,8 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
             ..Unit::default()
         }
     };
-    let each = columns.iter().zip(kinds);
-    each.map(|(column, kind)| match stated_position(column) {
+    let each = columns.iter().zip(kinds).zip(&stated);
+    each.map(|((column, kind), stated)| match *stated {
         None => guessed(*kind, column),
         Some("rad" | "m") => Unit::default(),
         Some("counts") => Unit {
@@ -177,9 +208,10 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
 /// The units of the torques of all joints; `limits` are those of the robot [Nm or N], where known.
 pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<Unit> {
     let guessed = guessed_torque(columns, limits);
+    let stated = stated_by_all(columns, &|_, _| true, &TORQUES);
     let of = |(k, column): (usize, &&LogColumn)| {
         match (
-        stated_torque(column),
+        stated[k],
         drive(&words(&column.name)),
     ) {
         (Some("A"), NamedDrive::Unsaid | NamedDrive::Current)
@@ -316,6 +348,20 @@ mod tests {
         assert_eq!(counts.unit, Some("counts"));
         let torque =
             |name: &str, largest, whole| one(of_torques(&[&column(name, largest, whole)], &[None]));
+        // a word that is a joint's, or a part's
+        let base = [
+            column("q_base_turn", 1.0, false),
+            column("q_upper", 1.0, false),
+        ];
+        let found = of_positions(&[&base[0], &base[1]], &[JointKind::Revolute; 2]);
+        assert_eq!(found, vec![Unit::default(); 2]);
+        let deg = [
+            column("q_rev_deg", 1.0, false),
+            column("q_count", 1.0, false),
+        ];
+        let found = of_positions(&[&deg[0], &deg[1]], &[JointKind::Revolute; 2]);
+        assert_eq!(found, vec![Unit::default(); 2]);
+        assert_eq!(torque("load_torque_1", 2.5, false), Unit::default());
         assert_eq!(torque("tau_mnm_1", 2e3, false).unit, Some("mNm"));
         assert_eq!(torque("force_kN", 2.5, false).unit, Some("kN"));
         assert_eq!(torque("Torque_A1", 2.5, false), Unit::default());

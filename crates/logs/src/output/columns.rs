@@ -71,7 +71,9 @@ pub(super) fn topics(columns: &[String]) -> Vec<TopicColumns> {
             continue;
         }
         let Some(found) = take(kind) else { continue };
-        let torque = kind.starts_with("tau") || kind.starts_with("residual");
+        let torque = ["tau", "residual", "band"]
+            .iter()
+            .any(|begins| kind.starts_with(begins));
         let array = if torque {
             Array::Effort
         } else {
@@ -166,9 +168,14 @@ mod tests {
             ),
         ];
         assert_eq!(found, expected);
-        let residual = of("t,tau_q1,tau_q2,tau_hat_q1,tau_hat_q2,residual_q1,residual_q2");
+        let residual = of(
+            "t,tau_q1,tau_q2,tau_hat_q1,tau_hat_q2,residual_q1,residual_q2,band_lower_q1,band_lower_q2",
+        );
         let topics: Vec<&str> = residual.iter().map(|t| t.name.as_str()).collect();
-        assert_eq!(topics, ["/joint_states", "/tau_hat", "/residual"]);
+        assert_eq!(
+            topics,
+            ["/joint_states", "/tau_hat", "/residual", "/band_lower"]
+        );
         assert!(
             residual
                 .iter()

@@ -5,6 +5,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::mcap::McapLog;
+#[cfg(feature = "parquet")]
+use super::parquet::ParquetLog;
 use super::text::Text;
 use super::{AtomicFile, OutputError};
 use crate::log::Instant;
@@ -12,8 +14,16 @@ use crate::log::Instant;
 /// What a log file is, by the end of its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogForm {
-    messages: bool,
+    kind: Kind,
     packing: Packing,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Text,
+    Messages,
+    #[cfg(feature = "parquet")]
+    Parquet,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,11 +35,15 @@ enum Packing {
 
 impl LogForm {
     /// Endings that a log to be written may have.
+    #[cfg(feature = "parquet")]
+    pub const ENDINGS: &str = ".csv or .mcap, and .gz or .zst after it, or in .parquet";
+    /// Endings that a log to be written may have.
+    #[cfg(not(feature = "parquet"))]
     pub const ENDINGS: &str = ".csv or .mcap, and .gz or .zst after it";
 
     /// Whether it is a recording of messages.
     pub fn is_recording(self) -> bool {
-        self.messages
+        self.kind == Kind::Messages
     }
 
     /// By the name of the file; `None` for any other ending.
@@ -42,8 +56,14 @@ impl LogForm {
         } else {
             (name.as_str(), Packing::None)
         };
-        let messages = name.ends_with(".mcap");
-        (messages || name.ends_with(".csv")).then_some(Self { messages, packing })
+        let kind = match Path::new(name).extension()?.to_str()? {
+            "csv" => Kind::Text,
+            "mcap" => Kind::Messages,
+            #[cfg(feature = "parquet")]
+            "parquet" if packing == Packing::None => Kind::Parquet,
+            _ => return None,
+        };
+        Some(Self { kind, packing })
     }
 }
 
@@ -101,12 +121,14 @@ impl Write for Packed {
 enum Sink {
     Text(Box<Text<io::BufWriter<Packed>>>),
     Messages(Box<McapLog<Packed>>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<ParquetLog<Packed>>),
 }
 
 /// Writes a log row by row: whole or not at all.
 ///
 /// As CSV: a header line, then rows of the shortest numbers that are read back bit for bit. As MCAP:
-/// see [`super::mcap`]. The bytes depend on the rows alone.
+/// see [`super::mcap`]. As Parquet: a column of doubles for each channel. The bytes depend on the rows alone.
 pub struct LogWriter {
     path: std::path::PathBuf,
     sink: Sink,
@@ -144,16 +166,19 @@ impl LogWriter {
     ) -> Result<Self, OutputError> {
         let columns: Vec<String> = columns.iter().map(|c| c.as_ref().to_owned()).collect();
         let form = LogForm::of(path).unwrap_or(LogForm {
-            messages: false,
+            kind: Kind::Text,
             packing: Packing::None,
         });
         let file = AtomicFile::create(path)?;
         let begun = Packed::new(file, form.packing).and_then(|packed| {
-            Ok(if form.messages {
-                Sink::Messages(Box::new(McapLog::new(packed, &columns, notes)?))
-            } else {
-                let buffered = io::BufWriter::with_capacity(1 << 16, packed);
-                Sink::Text(Box::new(Text::new(buffered, &columns, notes)?))
+            Ok(match form.kind {
+                Kind::Text => {
+                    let buffered = io::BufWriter::with_capacity(1 << 16, packed);
+                    Sink::Text(Box::new(Text::new(buffered, &columns, notes)?))
+                }
+                Kind::Messages => Sink::Messages(Box::new(McapLog::new(packed, &columns, notes)?)),
+                #[cfg(feature = "parquet")]
+                Kind::Parquet => Sink::Parquet(Box::new(ParquetLog::new(packed, &columns, notes))),
             })
         });
         Ok(Self {
@@ -185,6 +210,8 @@ impl LogWriter {
             match &mut self.sink {
                 Sink::Text(text) => text.row(self.origin, &self.row),
                 Sink::Messages(recording) => recording.row(self.origin, &self.row),
+                #[cfg(feature = "parquet")]
+                Sink::Parquet(file) => file.row(self.origin, &self.row),
             }
         };
         written.map_err(|error| OutputError::new(&self.path, error))
@@ -207,6 +234,8 @@ impl LogWriter {
                     .map_err(io::IntoInnerError::into_error)
             }),
             Sink::Messages(recording) => recording.finish(),
+            #[cfg(feature = "parquet")]
+            Sink::Parquet(file) => file.finish(),
         };
         let file = packed.and_then(Packed::finish);
         file.map_err(|error| OutputError::new(&self.path, error))
@@ -220,12 +249,12 @@ mod tests {
     #[test]
     fn the_ending_tells_the_form_and_anything_else_is_none() {
         let of = |name: &str| LogForm::of(Path::new(name));
-        let form = |messages, packing| Some(LogForm { messages, packing });
-        assert_eq!(of("a/b.csv"), form(false, Packing::None));
-        assert_eq!(of("a.CSV.gz"), form(false, Packing::Gzip));
-        assert_eq!(of("a.mcap"), form(true, Packing::None));
-        assert_eq!(of("a.mcap.zst"), form(true, Packing::Zstd));
-        for name in ["a.txt", "a.gz", "csv", "a.db3", ""] {
+        let form = |kind, packing| Some(LogForm { kind, packing });
+        assert_eq!(of("a/b.csv"), form(Kind::Text, Packing::None));
+        assert_eq!(of("a.CSV.gz"), form(Kind::Text, Packing::Gzip));
+        assert_eq!(of("a.mcap"), form(Kind::Messages, Packing::None));
+        assert_eq!(of("a.mcap.zst"), form(Kind::Messages, Packing::Zstd));
+        for name in ["a.txt", "a.parquet.gz", "a.gz", "csv", "a.db3", ""] {
             assert_eq!(of(name), None, "{name}");
         }
     }

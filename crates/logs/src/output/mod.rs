@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all, logs as CSV and MCAP, motions as controllers take them.
+//! Files that appear whole or not at all, logs as CSV, MCAP and Parquet, motions as controllers take them.
 //!
 //! A file is written under another name in its own folder, brought to the disk, and renamed. Until
 //! then whatever had its name stays as it was. What is no regular file (a terminal, a pipe,
@@ -7,6 +7,8 @@
 mod columns;
 mod log;
 mod mcap;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod text;
 mod together;
 mod trajectory;

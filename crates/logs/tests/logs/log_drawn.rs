@@ -13,20 +13,20 @@ use mcap::WriteOptions;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const JOINTS: [&str; 3] = ["base_turn", "joint_2", "Z"];
-const ROWS: usize = 400;
+pub(crate) const JOINTS: [&str; 3] = ["base_turn", "joint_2", "Z"];
+pub(crate) const ROWS: usize = 400;
 /// Logs that are drawn of each kind.
-const DRAWN: u64 = 24;
+pub(crate) const DRAWN: u64 = 24;
 
 /// What a log holds.
-struct Motion {
-    t: Vec<f64>,
-    q: Vec<[f64; 3]>,
-    tau: Vec<[f64; 3]>,
+pub(crate) struct Motion {
+    pub(crate) t: Vec<f64>,
+    pub(crate) q: Vec<[f64; 3]>,
+    pub(crate) tau: Vec<[f64; 3]>,
 }
 
 impl Motion {
-    fn drawn(rng: &mut ChaCha8Rng) -> Self {
+    pub(crate) fn drawn(rng: &mut ChaCha8Rng) -> Self {
         let w: [f64; 3] = std::array::from_fn(|_| rng.random_range(1.0..3.0));
         let t: Vec<f64> = (0..ROWS).map(|k| k as f64 / 100.0).collect();
         let q = t.iter().map(|t| w.map(|w| (w * t).sin()));
@@ -53,7 +53,7 @@ fn known() -> Vec<Known> {
 }
 
 /// The layout that a look at the log gives.
-fn mapped(path: &Path) -> Layout {
+pub(crate) fn mapped(path: &Path) -> Layout {
     let spec = LogSpec::whole(path);
     let asked = Asked::default();
     let seen = look(&spec, &asked, Some(3), &|| false).unwrap();
@@ -85,7 +85,7 @@ fn mapped(path: &Path) -> Layout {
     layout
 }
 
-fn read(path: &Path, layout: &Layout) -> Result<Block, LogError> {
+pub(crate) fn read(path: &Path, layout: &Layout) -> Result<Block, LogError> {
     let mut reader = Reader::open(&LogSpec::whole(path), layout)?;
     let (mut block, mut all) = (Block::default(), Block::default());
     while reader.read(&mut block)? {
@@ -97,7 +97,7 @@ fn read(path: &Path, layout: &Layout) -> Result<Block, LogError> {
 }
 
 #[track_caller]
-fn same(found: &Block, motion: &Motion, seed: u64) {
+pub(crate) fn same(found: &Block, motion: &Motion, seed: u64) {
     let flat = |rows: &[[f64; 3]]| rows.concat();
     assert_eq!(found.t.len(), ROWS, "seed {seed}");
     assert_eq!(found.tau, flat(&motion.tau), "seed {seed}");
@@ -112,7 +112,7 @@ fn same(found: &Block, motion: &Motion, seed: u64) {
 }
 
 /// Names of the positions and torques, and what the positions are multiplied with.
-fn names(style: u32) -> ([String; 3], [String; 3], [f64; 3]) {
+pub(crate) fn names(style: u32) -> ([String; 3], [String; 3], [f64; 3]) {
     let each = |of: &dyn Fn(usize) -> String| std::array::from_fn(of);
     let degrees = 180.0 / std::f64::consts::PI;
     match style {

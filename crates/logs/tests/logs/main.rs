@@ -8,3 +8,4 @@ mod log_messages;
 mod log_recordings;
 mod log_shared_data;
 mod log_support;
+mod log_tables;

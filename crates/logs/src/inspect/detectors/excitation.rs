@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::histogram::Histogram;
+use crate::inspect::fault::Episodes;
 use cft_ident_core::math::rank;
 
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against the
@@ -15,6 +16,9 @@ const SPACING_S: f64 = 0.02;
 const LONGEST: usize = 4096;
 /// A joint moves where its speed is above this share of the largest.
 const MOVING: f64 = 0.02;
+
+/// Speeds in a row that one wrong position alone cannot make.
+const IN_A_ROW: u32 = 4;
 
 /// Highest accelerations that are remembered with their times.
 const HIGHEST: usize = 64;
@@ -66,13 +70,17 @@ pub(in crate::inspect) struct Excitation {
     points: u64,
     direction: f64,
     reversals: u64,
+    /// Largest speed by the robot file, how many speeds in a row are beyond it, and when they were.
+    limit: Option<f64>,
+    fast: u32,
+    pub(in crate::inspect) too_fast: Episodes,
     /// First and last time [s] of the rows of the highest accelerations, and their sizes.
     highest: Vec<[f64; 3]>,
 }
 
 impl Excitation {
-    /// For rows `dt` apart [s].
-    pub(in crate::inspect) fn new(dt: f64) -> Self {
+    /// For rows `dt` apart [s] of a joint that may be so fast.
+    pub(in crate::inspect) fn new(dt: f64, limit: Option<f64>) -> Self {
         let spacing = if dt > 0.0 {
             ((SPACING_S / dt).round() as usize).clamp(1, LONGEST)
         } else {
@@ -89,6 +97,9 @@ impl Excitation {
             points: 0,
             direction: 0.0,
             reversals: 0,
+            limit,
+            fast: 0,
+            too_fast: Episodes::default(),
             highest: Vec::new(),
         }
     }
@@ -109,6 +120,7 @@ impl Excitation {
     /// The next row belongs to another stretch.
     pub(in crate::inspect) fn part(&mut self) {
         self.count = 0;
+        self.fast = 0;
         self.direction = 0.0;
     }
 
@@ -125,6 +137,12 @@ impl Excitation {
         self.speeds.add(v);
         self.accelerations.add(a);
         self.remember([t0, t2, a.abs()]);
+        if let Some(limit) = self.limit {
+            self.fast = if v.abs() > limit { self.fast + 1 } else { 0 };
+            if self.fast >= IN_A_ROW {
+                self.too_fast.add(t1, t2, self.spacing as u64, t2 - t0);
+            }
+        }
         let direction = if v == 0.0 { 0.0 } else { v.signum() };
         let row = [a, v, direction, 1.0];
         for (sums, x) in self.gram.iter_mut().zip(row) {
@@ -210,7 +228,7 @@ mod tests {
     use super::*;
 
     fn fed(q: impl Fn(f64) -> f64) -> JointMotion {
-        let mut motion = Excitation::new(0.001);
+        let mut motion = Excitation::new(0.001, None);
         for k in 0..20_000 {
             let t = f64::from(k) * 0.001;
             motion.take(t, q(t));
@@ -233,6 +251,23 @@ mod tests {
         assert!((found.speed_rms * 2f64.sqrt() / (0.5 * w) - 1.0).abs() < 0.02);
         assert_eq!(found.reversals, 25);
         assert!(found.moving_share > 0.97);
+    }
+
+    #[test]
+    fn speeds_beyond_the_limit_are_seen_and_a_single_wrong_position_is_none() {
+        let rows = |limit: f64, wrong: bool| {
+            let mut motion = Excitation::new(0.001, Some(limit));
+            for k in 0..20_000 {
+                let t = f64::from(k) * 0.001;
+                let spike = if wrong && k == 9_000 { 50.0 } else { 0.0 };
+                motion.take(t, 0.5 * (4.0 * t).sin() + spike);
+            }
+            motion.too_fast.rows()
+        };
+        assert_eq!(rows(2.1, false), 0);
+        assert_eq!(rows(2.1, true), 0);
+        // above half of its largest, a sine is for two thirds of the time
+        assert!((rows(1.0, false) as f64 / 20_000.0 - 2.0 / 3.0).abs() < 0.15);
     }
 
     #[test]

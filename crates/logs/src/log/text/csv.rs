@@ -72,6 +72,8 @@ pub(super) struct TextFile {
     /// Bytes and lines before the table.
     before: (u64, u64),
     told: Vec<String>,
+    /// The rows are those of a table without lines.
+    table: bool,
     /// What is known of a stream.
     watch: Option<Watch>,
 }
@@ -93,6 +95,7 @@ impl TextFile {
         };
         let found = head::look_at(path, begin, &wanted)?;
         let watch = content.watch.clone();
+        let (table, notes) = (content.table, content.notes.clone());
         let mut inner = content.into_bytes();
         let (before, _) = found.before;
         let passed = io::copy(&mut (&mut inner).take(before), &mut io::sink());
@@ -118,7 +121,8 @@ impl TextFile {
             malformed: 0,
             blank: 0,
             before: found.before,
-            told: found.told,
+            told: [notes, found.told].concat(),
+            table,
             watch,
         };
         if let Some((names, _)) = found.header_in_comment {
@@ -377,7 +381,14 @@ impl TextFile {
     /// File and line of the current row, for a message.
     #[cold]
     pub(super) fn place(&self) -> String {
-        format!("{}:{}", self.file(), self.line())
+        match self.table {
+            true => format!(
+                "{}, row {}",
+                self.file(),
+                self.line_hint().saturating_sub(1)
+            ),
+            false => format!("{}:{}", self.file(), self.line()),
+        }
     }
 
     /// Line on which the current row ends.

@@ -28,7 +28,7 @@ pub(super) struct Head {
 }
 
 /// Formats that are not read: how a file begins, what it is, and the way out.
-const OTHERS: [(&[u8], &str, &str); 11] = [
+const OTHERS: [(&[u8], &str, &str); 9] = [
     (
         b"\xff\xfe",
         "UTF-16 text",
@@ -56,23 +56,13 @@ const OTHERS: [(&[u8], &str, &str); 11] = [
     ),
     (
         b"PAR1",
-        "a Parquet file",
+        "a Parquet file, which this program was built without (feature `parquet`)",
         "write it as CSV: `python -c \"import pandas; pandas.read_parquet('IN').to_csv('OUT.csv', index=False)\"`",
     ),
     (
         b"ARROW1",
         "an Arrow file",
         "write it as CSV: `python -c \"import pandas; pandas.read_feather('IN').to_csv('OUT.csv', index=False)\"`",
-    ),
-    (
-        b"PK\x03\x04",
-        "a zip archive, as .npz and .xlsx are",
-        "write its arrays as CSV, in Python: `a = numpy.load('IN.npz')`, then numpy.savetxt with a header; save a sheet of a spreadsheet as CSV",
-    ),
-    (
-        b"\x93NUMPY",
-        "an array of numpy",
-        "write it as CSV: `python -c \"import numpy; numpy.savetxt('OUT.csv', numpy.load('IN'), delimiter=',', header='t,q_q1,tau_q1', comments='')\"`",
     ),
     (b"%PDF", "a PDF document", "give the log itself"),
     (

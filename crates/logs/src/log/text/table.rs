@@ -98,10 +98,10 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     let number = lines[at].number;
     if row > 0 || asked.is_some() {
         told.push(format!(
-            "the table begins at line {number}: {} before it are passed over (`header_line` in [log] of the robot file says another)",
+            "the table begins at line {number}: {} passed over (`header_line` in [log] of the robot file says another)",
             match number - 1 {
-                1 => "1 line".to_owned(),
-                more => format!("{more} lines"),
+                1 => "1 line before it is".to_owned(),
+                more => format!("{more} lines before it are"),
             }
         ));
     }

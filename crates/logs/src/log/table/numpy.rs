@@ -1,0 +1,176 @@
+//! Arrays of one length as a table: a column for an array of one axis, one for each joint for an array of two.
+
+use std::collections::BTreeMap;
+use std::io::{self, Read};
+
+use super::npy::{Array, Field};
+use super::{COLUMNS, Table, unusable};
+
+/// Columns of an array whose columns lie one behind the other, each of which is read from a place of its own.
+const APART: u64 = 256;
+/// Names of the column of times, by which the rows are counted.
+const TIMES: [&str; 6] = ["t", "time", "times", "timestamp", "timestamps", "stamp"];
+
+/// Rows of some columns that lie side by side.
+struct Stream {
+    file: Box<dyn Read + Send>,
+    record: Vec<u8>,
+    fields: Vec<Field>,
+}
+
+/// Arrays as rows.
+pub(super) struct ArrayTable {
+    names: Vec<String>,
+    streams: Vec<Stream>,
+    left: u64,
+}
+
+/// Axes of an array, those of one element aside.
+fn axes(array: &Array) -> Vec<u64> {
+    match array.shape.len() {
+        0..=2 => array.shape.clone(),
+        _ => (array.shape.iter().copied())
+            .filter(|count| *count != 1)
+            .collect(),
+    }
+}
+
+/// The number of rows: that of the times, else that which most arrays have along an axis.
+fn rows_of(arrays: &[Array]) -> Option<u64> {
+    let numbers = || arrays.iter().filter(|array| array.element.is_some());
+    let timed = numbers().find(|array| TIMES.contains(&&*array.name.to_lowercase()));
+    if let Some(array) = timed {
+        return axes(array).into_iter().max();
+    }
+    let mut votes: BTreeMap<u64, usize> = BTreeMap::new();
+    for array in numbers() {
+        if let Some(longest) = axes(array).into_iter().max() {
+            *votes.entry(longest).or_default() += 1;
+        }
+    }
+    let most = votes
+        .into_iter()
+        .max_by_key(|(rows, votes)| (*votes, *rows));
+    most.map(|(rows, _)| rows)
+}
+
+impl ArrayTable {
+    /// The table that arrays make up, and what is left out of it.
+    ///
+    /// # Errors
+    /// Arrays that hold no numbers in rows.
+    pub(super) fn new(arrays: Vec<Array>) -> io::Result<(Self, Vec<String>)> {
+        let Some(rows) = rows_of(&arrays) else {
+            return Err(unusable(
+                "it holds no array of numbers, as .npz files do (.xlsx files are archives too)"
+                    .to_owned(),
+            ));
+        };
+        let mut out = Self {
+            names: Vec::new(),
+            streams: Vec::new(),
+            left: rows,
+        };
+        let mut notes = Vec::new();
+        for array in &arrays {
+            if !out.add(array, rows)? {
+                let shape: Vec<String> = array.shape.iter().map(u64::to_string).collect();
+                let kind = match array.element {
+                    Some(_) => format!("which is not {rows} rows"),
+                    None => "and no numbers".to_owned(),
+                };
+                notes.push(format!(
+                    "the array `{}` is left out: it has the shape ({}), {kind}",
+                    array.name,
+                    shape.join(", "),
+                ));
+            }
+        }
+        match out.names.is_empty() {
+            true => Err(unusable("no array holds numbers in rows".to_owned())),
+            false => Ok((out, notes)),
+        }
+    }
+
+    /// Adds the columns of an array; false where it has none of so many rows.
+    fn add(&mut self, array: &Array, rows: u64) -> io::Result<bool> {
+        let Some(element) = &array.element else {
+            return Ok(false);
+        };
+        let size = element.size as u64;
+        // how many elements a row has, and whether they lie apart
+        let (count, apart) = match axes(array)[..] {
+            [n] if n == rows => (1, false),
+            [n, count] if n == rows => (count, array.by_columns && count > 1),
+            [count, n] if n == rows => (count, !array.by_columns && count > 1),
+            _ => return Ok(false),
+        };
+        let wide = count.saturating_mul(element.fields.len() as u64);
+        let room = (COLUMNS - self.names.len()) as u64;
+        if count == 0 || wide > room || (apart && count > APART) {
+            return Ok(false);
+        }
+        let base = match array.name.is_empty() {
+            true => "column",
+            false => &array.name,
+        };
+        let name = |k: u64, field: &Field| {
+            let index = if count > 1 {
+                format!("_{k}")
+            } else {
+                String::new()
+            };
+            match element.named {
+                true if array.name.is_empty() => format!("{}{index}", field.name),
+                true => format!("{base}_{}{index}", field.name),
+                false => format!("{base}{index}{}", field.name),
+            }
+        };
+        for k in 0..count {
+            let fields = element.fields.iter();
+            self.names.extend(fields.map(|field| name(k, field)));
+        }
+        let streams = if apart { 0..count } else { 0..1 };
+        let each = if apart { 1 } else { count };
+        for k in streams {
+            let from = k.saturating_mul(rows).saturating_mul(size);
+            let shifted = |j: u64| {
+                let moved = move |field: &Field| Field {
+                    at: field.at + (j * size) as usize,
+                    ..field.clone()
+                };
+                element.fields.iter().map(moved)
+            };
+            self.streams.push(Stream {
+                file: array.reader(from)?,
+                record: vec![0; (each * size) as usize],
+                fields: (0..each).flat_map(shifted).collect(),
+            });
+        }
+        Ok(true)
+    }
+}
+
+impl Table for ArrayTable {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn row(&mut self, line: &mut Vec<u8>) -> io::Result<bool> {
+        if self.left == 0 {
+            return Ok(false);
+        }
+        self.left -= 1;
+        let mut first = true;
+        for stream in &mut self.streams {
+            stream.file.read_exact(&mut stream.record)?;
+            for field in &stream.fields {
+                if !std::mem::take(&mut first) {
+                    line.push(b',');
+                }
+                field.scalar.write(line, &stream.record[field.at..])?;
+            }
+        }
+        Ok(true)
+    }
+}

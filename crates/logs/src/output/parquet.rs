@@ -1,0 +1,163 @@
+//! A log as a Parquet file: a column of doubles for each channel, the time first. Times that are counted from another
+//! instant than zero are time stamps in nanoseconds, for which seconds in a double have no room.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+
+use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical};
+use parquet::data_type::{DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::{Type, TypePtr};
+
+use crate::log::Instant;
+
+/// Numbers that are held until they are written.
+const HELD: usize = 1 << 20;
+/// Rows of a group at least.
+const ROWS: usize = 1024;
+
+/// Rows as a Parquet file.
+pub(super) struct ParquetLog<W: Write + Send> {
+    columns: Vec<String>,
+    notes: Vec<String>,
+    state: State<W>,
+    origin: Instant,
+    /// Rows that are not written yet, column by column.
+    held: Vec<Vec<f64>>,
+}
+
+enum State<W: Write + Send> {
+    /// Whether times are stamps is not known before the first row.
+    Waiting(W),
+    Begun(Box<SerializedFileWriter<W>>),
+    Ended,
+}
+
+impl<W: Write + Send> ParquetLog<W> {
+    /// Begins a file of these columns, of which the first is the time.
+    pub(super) fn new(out: W, columns: &[String], notes: &[String]) -> Self {
+        Self {
+            columns: columns.to_vec(),
+            notes: notes.to_vec(),
+            state: State::Waiting(out),
+            origin: Instant::default(),
+            held: vec![Vec::new(); columns.len()],
+        }
+    }
+
+    /// Writes a row.
+    pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> io::Result<()> {
+        self.origin = origin;
+        for (column, value) in self.held.iter_mut().zip(row) {
+            column.push(*value);
+        }
+        let rows = self.held.first().map_or(0, Vec::len);
+        match rows >= ROWS && rows * self.columns.len() >= HELD {
+            true => self.write().map_err(plain),
+            false => Ok(()),
+        }
+    }
+
+    fn stamped(&self) -> bool {
+        self.origin != Instant::default()
+    }
+
+    /// The writer, begun where it is not yet.
+    fn begin(&mut self) -> Result<(), ParquetError> {
+        if !matches!(self.state, State::Waiting(_)) {
+            return Ok(());
+        }
+        let State::Waiting(out) = std::mem::replace(&mut self.state, State::Ended) else {
+            return Ok(());
+        };
+        let notes = self.notes.iter().enumerate();
+        let notes =
+            notes.map(|(k, note)| KeyValue::new(format!("note_{:02}", k + 1), note.clone()));
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::ZSTD(Default::default()))
+            .set_created_by(concat!("cft-ident ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_dictionary_enabled(false)
+            .set_key_value_metadata(Some(notes.collect()))
+            .build();
+        let schema = schema(&self.columns, self.stamped())?;
+        let writer = SerializedFileWriter::new(out, schema, Arc::new(properties))?;
+        self.state = State::Begun(Box::new(writer));
+        Ok(())
+    }
+
+    /// Writes the rows that are held, as a group.
+    fn write(&mut self) -> Result<(), ParquetError> {
+        self.begin()?;
+        let (stamped, origin) = (self.stamped(), self.origin);
+        let State::Begun(writer) = &mut self.state else {
+            return Ok(());
+        };
+        let mut group = writer.next_row_group()?;
+        for (index, values) in self.held.iter_mut().enumerate() {
+            let Some(mut column) = group.next_column()? else {
+                break;
+            };
+            match stamped && index == 0 {
+                true => {
+                    let stamp = |t: &f64| i64::try_from(origin.later(*t).nanoseconds());
+                    let stamps: Result<Vec<i64>, _> = values.iter().map(stamp).collect();
+                    let stamps = stamps.map_err(|_| {
+                        ParquetError::General(
+                            "a time is beyond the range of time stamps".to_owned(),
+                        )
+                    })?;
+                    column
+                        .typed::<Int64Type>()
+                        .write_batch(&stamps, None, None)?;
+                }
+                false => {
+                    column
+                        .typed::<DoubleType>()
+                        .write_batch(values, None, None)?;
+                }
+            }
+            column.close()?;
+            values.clear();
+        }
+        group.close()?;
+        Ok(())
+    }
+
+    /// Ends the file.
+    pub(super) fn finish(mut self) -> io::Result<W> {
+        if self.held.iter().any(|column| !column.is_empty()) {
+            self.write().map_err(plain)?;
+        }
+        self.begin().map_err(plain)?;
+        match self.state {
+            State::Begun(writer) => writer.into_inner().map_err(plain),
+            _ => Err(io::ErrorKind::WriteZero.into()),
+        }
+    }
+}
+
+fn schema(columns: &[String], stamped: bool) -> Result<TypePtr, ParquetError> {
+    let field = |(index, name): (usize, &String)| {
+        let of = |physical| {
+            Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED)
+        };
+        let built = match stamped && index == 0 {
+            true => of(Physical::INT64)
+                .with_logical_type(Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
+            false => of(Physical::DOUBLE),
+        };
+        built.build().map(Arc::new)
+    };
+    let fields: Result<Vec<TypePtr>, ParquetError> =
+        columns.iter().enumerate().map(field).collect();
+    let root = Type::group_type_builder("log").with_fields(fields?);
+    root.build().map(Arc::new)
+}
+
+/// The error of the system, or that of the format.
+fn plain(error: ParquetError) -> io::Error {
+    io::Error::other(error.to_string())
+}
