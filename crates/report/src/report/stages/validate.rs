@@ -58,7 +58,7 @@ pub fn validate(of: &Validate) -> Report {
         let caption = format!("{}, which the model was made from", caption(&used.logs));
         detail.table(summary::torque_errors(&caption, &used.errors.joints));
     }
-    free_run::section(&mut report.terminal(), of.found.free_run.as_ref());
+    free_run::section(&mut report.detail(), of.found.free_run.as_ref());
     overall(&mut report.detail(), judged);
     let mut page = report.page();
     page.figure(&bars(of).svg());
