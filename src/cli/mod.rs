@@ -310,6 +310,9 @@ fn execute(
     context.check_outputs(&[], &[])?;
     let mut outcome = cli.command.run(&context)?;
     outcome.document.warn_first(context.warnings());
+    if let Some(page) = context.page() {
+        outcome.says_where(&page, context.detail());
+    }
     let exit = outcome::show(
         &outcome,
         json,

@@ -3,6 +3,7 @@
 //! `--json -` cannot be spoilt by one of them.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use super::error::{CliError, indented, tell};
 use super::exit::Exit;
@@ -21,6 +22,16 @@ pub struct Outcome {
     pub document: Document,
     /// Limits that the user set and the result misses, one sentence each; they make exit status 1.
     pub missed: Vec<String>,
+}
+
+impl Outcome {
+    /// Names the page that was written, where the text does not yet.
+    pub(super) fn says_where(&mut self, page: &Path, detail: Detail) {
+        let page = page.display().to_string();
+        if detail != Detail::Brief && !self.text.contains(&page) {
+            self.text += &format!("report: {page}\n");
+        }
+    }
 }
 
 /// Warnings that are shown before a result.

@@ -244,6 +244,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(file) = residual {
         context.files().add_log(file)?;
     }
+    for path in args.output.iter().chain(&args.plot) {
+        report
+            .terminal()
+            .line(&format!("written: {}", path.display()));
+    }
     Ok(Outcome {
         text: report.text_for(context.detail()),
         document,

@@ -166,6 +166,7 @@ fn the_verdict_comes_first_quiet_says_it_alone_and_verbose_says_more() {
         "validate unseen.csv -m model.toml",
         "friction q1.csv q2.csv q4.csv -r configs/cft.toml -o f.toml",
         "compare model.toml refined.toml unseen.csv",
+        "diagnose identification.csv -m model.toml --holdout unseen.csv -o r.toml --report r.html",
     ];
     for line in lines {
         let said = |detail: &str| printed(folder.path(), &format!("{line} {detail}"));
@@ -173,11 +174,13 @@ fn the_verdict_comes_first_quiet_says_it_alone_and_verbose_says_more() {
         assert!(usual.starts_with(quiet.trim_end()), "{line}:\n{usual}");
         assert!(quiet.lines().count() < usual.lines().count(), "{line}");
         assert!(
-            usual.lines().count() <= 24,
+            usual.lines().count() <= 25,
             "{line}: more than a screen:\n{usual}"
         );
         // the line that says there is more is not in it
         let left = usual.replace("--verbose shows more\n", "");
+        let page = "report: r.html\n";
+        assert_eq!(usual.ends_with(page), line.contains("--report"), "{line}");
         assert!(verbose.lines().count() >= left.lines().count(), "{line}");
     }
 }

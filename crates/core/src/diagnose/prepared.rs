@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::candidates::candidates;
 use super::error::DiagnoseError;
 use super::held_out::HeldOutRows;
 use super::memory::memory_s;
@@ -14,8 +15,8 @@ use super::problem::fit::{Declared, Fitted, fit};
 use super::problem::pass::Data;
 use super::problem::unknowns::{Unknowns, step};
 use super::unexplained::errors::{self, Counted, Errors};
-use crate::effect::{AugmentedModel, Cover};
-use crate::judge::{Blocks, BlocksLeftOut, TimeBlock, compare, divide};
+use crate::effect::{Added, AugmentedModel, Cover};
+use crate::judge::{Blocks, BlocksLeftOut, LogRows, Term, TimeBlock, compare, divide};
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
@@ -62,17 +63,8 @@ impl<'a> PreparedCase<'a> {
         drop(raw);
         let residual = filtered(&fitted.model, &data)?;
         let memory = memory_s(&residual, &logs, split);
-        let reach = |s: &Stretch| case.filters.of(s).trim as f64 * s.dt;
-        let reach = case.stretches.iter().map(reach).fold(0.0, f64::max);
-        let least = (numbers.memory_times * memory).max(reach);
-        let blocks = divide(&logs, least, numbers);
-        let judging = divide(&split.logs(&case.stretches, LogRole::Veto), least, numbers);
-        let all_blocks = [blocks.list.as_slice(), &judging.list].concat();
-        let rows = |p: &Piece| p.rows.len() as f64 * split.step_s[p.stretch];
-        let lengths: Vec<f64> = split.pieces.iter().map(rows).collect();
-        let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
-        Ok(PreparedCase {
-            together: (least / mean).ceil().max(1.0) as usize,
+        let prepared = PreparedCase {
+            together: 1,
             case,
             split,
             data,
@@ -80,9 +72,63 @@ impl<'a> PreparedCase<'a> {
             unknowns,
             fitted,
             cover,
-            blocks,
-            all_blocks,
-        })
+            blocks: Blocks::default(),
+            all_blocks: Vec::new(),
+        };
+        let mut prepared = prepared.divided(&logs, memory);
+        if prepared.blocks.parts < numbers.parts {
+            let rest = prepared.memory_of_rest(&logs)?;
+            prepared = prepared.divided(&logs, rest.min(memory));
+            if prepared.blocks.parts < numbers.parts {
+                prepared = prepared.divided(&logs, memory);
+            }
+        }
+        Ok(prepared)
+    }
+
+    /// Divided into blocks beside which a residual's memory \[s\] is short.
+    fn divided(mut self, logs: &[LogRows], memory: f64) -> Self {
+        let (case, split) = (self.case, self.split);
+        let numbers = &case.numbers;
+        let reach = |s: &Stretch| case.filters.of(s).trim as f64 * s.dt;
+        let reach = case.stretches.iter().map(reach).fold(0.0, f64::max);
+        let least = (numbers.memory_times * memory).max(reach);
+        self.blocks = divide(logs, least, numbers);
+        let judging = divide(&split.logs(&case.stretches, LogRole::Veto), least, numbers);
+        self.all_blocks = [self.blocks.list.as_slice(), &judging.list].concat();
+        let rows = |p: &Piece| p.rows.len() as f64 * split.step_s[p.stretch];
+        let lengths: Vec<f64> = split.pieces.iter().map(rows).collect();
+        let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
+        self.together = (least / mean).ceil().max(1.0) as usize;
+        self
+    }
+
+    /// Memory \[s\] of the residual beside the one effect that explains most: what an effect leaves remembers as long
+    /// as the motion does, and is no noise. One effect is too few numbers to whiten noise.
+    fn memory_of_rest(&self, logs: &[LogRows]) -> Result<f64, DiagnoseError> {
+        let model = &self.fitted.model;
+        let (candidates, _) = candidates(model, self.case, &self.cover);
+        let summed = self.summed(model.clone(), &candidates, &[])?;
+        let fitted = self.all_blocks.len() - self.judging();
+        let total = summed.sums.over(0..fitted);
+        let weights = &summed.declared.weights;
+        let beside = |own: &Vec<Term>| {
+            let fit = summed.declared.with(own).fit(&total, &[]);
+            let square = fit.squares.iter().zip(weights).map(|(e, w)| e * w);
+            (square.sum::<f64>(), fit.values)
+        };
+        let terms = summed.layout.candidates.par_iter();
+        let fits: Vec<_> = terms.map(beside).collect();
+        let fits = candidates.iter().zip(fits);
+        let Some((candidate, (_, values))) = fits.min_by(|a, b| a.1.0.total_cmp(&b.1.0)) else {
+            return Ok(f64::INFINITY);
+        };
+        let mut with = moved(model, &self.unknowns, &values);
+        with.effects.push(Added {
+            linear: values.as_slice()[self.unknowns.len()..].to_vec(),
+            ..candidate.effect.clone()
+        });
+        Ok(memory_s(&filtered(&with, &self.data)?, logs, self.split))
     }
 
     /// Blocks that only judge.

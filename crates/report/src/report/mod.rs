@@ -14,6 +14,7 @@ pub mod summary;
 pub mod table;
 mod text;
 mod traces;
+pub mod usual;
 mod value;
 
 pub use traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};

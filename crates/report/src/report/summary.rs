@@ -1,6 +1,7 @@
 //! The two tables that most commands end with: parameters, and torque errors per joint.
 
 use super::table::{Align, Table};
+use super::value::Writer;
 use cft_ident_core::number::{self, ABSENT};
 use cft_ident_core::validate::JointError;
 
@@ -67,6 +68,36 @@ pub fn parameters(caption: &str, rows: &[ParameterRow]) -> Table {
         table.row(cells);
     }
     table
+}
+
+/// Joints that a screen has room for.
+pub(crate) const SCREEN: usize = 8;
+
+/// The joints that a screen shows, those of the largest errors, in their order; and a line about the others.
+pub(crate) fn most_wrong(errors: &[f64]) -> (Vec<usize>, Option<String>) {
+    let mut order: Vec<usize> = (0..errors.len()).collect();
+    order.sort_by(|a, b| errors[*b].total_cmp(&errors[*a]));
+    let others = order.split_off(SCREEN.min(order.len()));
+    order.sort_unstable();
+    let more = others.first().map(|largest| {
+        format!(
+            "{} more joints, each with {} or less",
+            others.len(),
+            number::percent(errors[*largest])
+        )
+    });
+    (order, more)
+}
+
+/// The errors of the joints with the largest ones, for a screen.
+pub(crate) fn largest_errors(writer: &mut Writer, caption: &str, rows: &[JointError]) {
+    let errors: Vec<f64> = rows.iter().map(|row| row.relative_error).collect();
+    let (joints, more) = most_wrong(&errors);
+    let shown: Vec<JointError> = joints.into_iter().map(|j| rows[j].clone()).collect();
+    writer.table(torque_errors(caption, &shown));
+    if let Some(more) = more {
+        writer.line(&more);
+    }
 }
 
 /// The errors as a table.

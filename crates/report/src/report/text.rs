@@ -21,7 +21,7 @@ impl Report {
         if detail == Detail::Brief && !brief.is_empty() {
             return brief;
         }
-        let parts = self.parts(&[Shown::Terminal]);
+        let parts = self.parts(&[Shown::Terminal, Shown::Usual]);
         let mut text: String = parts.map(shown).collect();
         if self.parts(&[Shown::Detail]).count() > self.parts(&[]).count() {
             text += "--verbose shows more\n";
@@ -121,11 +121,12 @@ mod tests {
         let mut report = Report::new("title");
         report.everywhere().verdict("it holds", true);
         report.detail().line("all 58 parameters");
+        report.usual().line("six of them");
         report.terminal().line("written: a.toml");
         assert_eq!(report.text_for(Detail::Brief), "it holds\n");
         assert_eq!(
             report.text_for(Detail::Usual),
-            "it holds\nwritten: a.toml\n--verbose shows more\n"
+            "it holds\nsix of them\nwritten: a.toml\n--verbose shows more\n"
         );
         assert_eq!(
             report.text_for(Detail::Full),

@@ -13,6 +13,8 @@ pub enum Shown {
     Terminal,
     /// On a terminal that is to show little.
     Brief,
+    /// On a terminal that is to show about a screen.
+    Usual,
     /// On a terminal that is to show everything.
     Detail,
     Page,
@@ -115,6 +117,11 @@ impl Report {
     /// Adds a verdict that a terminal shows where little is asked for, and others have said in more words.
     pub fn brief(&mut self) -> Writer<'_> {
         self.shown(Shown::Brief)
+    }
+
+    /// Adds parts in short, which a terminal leaves out where it shows everything.
+    pub fn usual(&mut self) -> Writer<'_> {
+        self.shown(Shown::Usual)
     }
 
     /// Adds parts that a terminal shows where everything is asked for.

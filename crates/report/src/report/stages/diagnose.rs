@@ -1,25 +1,25 @@
 //! The report of `diagnose`.
 
-use super::step_words::{alternatives, grade, in_words, titled, worsened};
+use super::diagnose_words::errors as errors_of;
+pub use super::diagnose_words::words;
+use super::step_words::{alternatives, grade, in_words, worsened};
 use super::{first_screen, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
 use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::table::{Align, Table};
-use crate::report::{Report, TraceStyle, Writer};
-use cft_ident_core::diagnose::{
-    Diagnosis, Errors, FoundEffect, LeftCandidate, SplitErrors, StepStatus,
-};
+use crate::report::{Report, TraceStyle, Writer, summary};
+use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, LeftCandidate, SplitErrors};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::identify::{
-    DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command,
-};
+use cft_ident_stages::identify::{DataFault, Diagnosed, LoggedRobot, separating_command};
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
 /// Candidates that a page tells.
 const MOST: usize = 20;
+/// Changes of friction that a screen has room for.
+const FEW: usize = 2;
 /// Margin of what a terminal says of an effect.
 const MARGIN: &str = "     ";
 
@@ -37,7 +37,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
     let (text, good) = words(of.machine, of.found);
     report.everywhere().verdict(&text, good);
-    told(&mut report.terminal(), of.machine, of.found);
+    told(&mut report, of.machine, of.found);
     let mut page = report.page();
     first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
@@ -87,20 +87,63 @@ pub fn at_fault(fault: &DataFault) -> String {
     format!("The data are at fault ({}): {}.", fault.kind, fault.effect)
 }
 
-/// The errors and the effects for a terminal.
-pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+/// The errors and what to do next for a terminal; the effects one by one where it shows everything.
+pub fn told(report: &mut Report, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
-    terminal.line("");
-    terminal.table(before_and_after(machine, d));
+    report.terminal().line("");
+    in_short(&mut report.usual(), machine, d);
+    let mut detail = report.detail();
+    detail.table(before_and_after(machine, d));
     if !d.steps.is_empty() {
-        terminal.line("");
+        detail.line("");
     }
     for (i, step) in d.steps.iter().enumerate() {
-        step_told(terminal, machine, found, (i + 1, step));
+        step_told(&mut detail, machine, found, (i + 1, step));
     }
-    terminal.list(doubts(machine, found));
-    terminal.list(changes(machine, found));
-    terminal.note("  ", &first_screen::next(machine, found), 4);
+    detail.list(doubts(machine, found));
+    report
+        .terminal()
+        .list(changes(machine, found).into_iter().take(FEW));
+    report
+        .detail()
+        .list(changes(machine, found).into_iter().skip(FEW));
+    report
+        .terminal()
+        .note("", &first_screen::next(machine, found), 2);
+}
+
+/// Errors joint by joint, those of a screen.
+fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
+    let (_, before) = errors_of(&d.before);
+    let (data, after) = errors_of(&d.after);
+    let changed = d.written().next().is_some();
+    let mut columns = vec![
+        ("joint", Align::Left),
+        ("now", Align::Decimal),
+        ("95 % CI", Align::Right),
+    ];
+    if changed {
+        columns.insert(1, ("as given", Align::Decimal));
+    } else {
+        columns[1].0 = "error";
+    }
+    let mut table =
+        Table::new(&columns).caption(&format!("relative torque error [%] of each joint, {data}"));
+    let relative: Vec<f64> = after.joints.iter().map(|e| e.relative_error).collect();
+    let (joints, more) = summary::most_wrong(&relative);
+    for j in joints {
+        let [low, high] = after.joints[j].interval_95.map(number::hundredths);
+        let mut row = vec![machine.robot.joint_names()[j].clone()];
+        if changed {
+            row.push(number::hundredths(before.joints[j].relative_error));
+        }
+        row.extend([number::hundredths(relative[j]), format!("{low}..{high}")]);
+        table.row(row);
+    }
+    usual.table(table);
+    if let Some(more) = more {
+        usual.line(&more);
+    }
 }
 
 /// Friction that changes from a time on.
@@ -216,6 +259,12 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
         })
         .collect();
     let mut out = Vec::new();
+    if let Some(share) = explained(d).filter(|_| d.written().next().is_some()) {
+        out.push(format!(
+            "what is written explains {} of the residual power above the noise",
+            number::percent(share)
+        ));
+    }
     if !open.is_empty() && d.written().next().is_some() {
         out.push(format!(
             "the residual of {} is not noise yet: treat the effects found as approximations, for the cause may be \
@@ -225,16 +274,6 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     }
     out.extend(what_is_left::sentences(machine, found));
     out
-}
-
-/// Errors of two models in words, of held-out data where there are any.
-fn from_to(before: &SplitErrors, after: &SplitErrors) -> String {
-    let (data, errors) = match (&before.holdout, &after.holdout) {
-        (Some(before), Some(after)) => ("held-out error", [before, after]),
-        _ => ("error of the fitted data", [&before.train, &after.train]),
-    };
-    let [before, after] = errors.map(|e| number::percent(e.overall.mean_relative_error));
-    format!("{data} goes from {before} as given to {after}, as the rms over the joints")
 }
 
 /// Part of the residual power above the noise that is explained, of all joints together.
@@ -247,68 +286,6 @@ fn explained(d: &Diagnosis) -> Option<f64> {
     (all > 0.0)
         .then(|| 1.0 - left / all)
         .filter(|share| *share > 0.0)
-}
-
-/// The verdict in words, and whether nothing calls for attention.
-pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
-    let d = &found.diagnosis;
-    let graded = |s: &FoundEffect| {
-        let grade = match (s.accepted_by_user, s.status) {
-            (true, _) => "accepted by you",
-            (_, StepStatus::Confirmed) => "confirmed",
-            (_, StepStatus::Indicated) => "indicated",
-            (_, StepStatus::Seen) => "seen",
-        };
-        format!("{} ({grade})", titled(machine, &s.estimate))
-    };
-    let written: Vec<String> = d.written().map(graded).collect();
-    let unconfirmed = d.steps.iter().filter(|s| s.judged.is_none());
-    let seen: Vec<String> = unconfirmed.map(|s| titled(machine, &s.estimate)).collect();
-    let mut text = match found.verdict() {
-        DiagnosisVerdict::EffectsFound => {
-            let mut text = format!("The model lacks: {}.", written.join("; "));
-            text += &format!(" With this the {}.", from_to(&d.before, &d.after));
-            if let Some(share) = explained(d) {
-                text += &format!(
-                    " It explains {} of the residual power above the noise.",
-                    number::percent(share)
-                );
-            }
-            text
-        }
-        _ if !d.determined => {
-            "These data determine nothing: the noise is as large as the torque that the model explains.".to_owned()
-        }
-        _ if !d.long_enough() => format!(
-            "These logs are too short to confirm any effect: they give {} parts that are independent of each other, of \
-             {} s, and {} are needed. The model is as it was.",
-            d.parts,
-            number::significant(d.block_s, 2),
-            d.parts_needed
-        ),
-        DiagnosisVerdict::NothingMissing if seen.is_empty() => {
-            "Nothing is missing: the remaining residual is noise.".to_owned()
-        }
-        DiagnosisVerdict::NothingMissing => "Nothing that matters is missing.".to_owned(),
-        _ => "A residual above the noise is left that no effect explains in all parts of the data. The model is as it \
-              was."
-            .to_owned(),
-    };
-    if let Some(selected) = &d.selected {
-        let vetoed = d.steps.iter().filter(|s| s.vetoed());
-        let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
-        text += &format!(
-            " Held-out data are worse on a joint with {}, which is not written: with the written model, selected on \
-             these data, the {} (optimistic).",
-            names.join("; "),
-            from_to(&d.before, selected)
-        );
-    }
-    if !seen.is_empty() {
-        text += &format!(" Seen and not confirmed: {}.", seen.join("; "));
-    }
-    let good = d.determined && !matches!(found.verdict(), DiagnosisVerdict::UnexplainedResidual);
-    (text, good)
 }
 
 /// What was added, the torque and the residual before and after, and what was not added.

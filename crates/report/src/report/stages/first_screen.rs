@@ -1,10 +1,11 @@
 //! What the page of a diagnosis shows first: errors per joint as bars, and the next thing to do.
 
+use super::diagnose_words::errors as errors_of;
 use crate::report::Writer;
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
-use cft_ident_core::diagnose::Errors;
+use cft_ident_core::diagnose::{Errors, FoundEffect};
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
+use cft_ident_stages::identify::{Diagnosed, LoggedRobot, separating_command};
 
 /// Errors per joint as bars, and the next thing to do.
 pub fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
@@ -15,10 +16,11 @@ pub fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
 /// Errors of every joint before and after: held-out ones where there are any.
 fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
     let d = &found.diagnosis;
-    let (data, errors) = match (&d.before.holdout, &d.after.holdout) {
-        (Some(before), Some(after)) => ("held-out data", [before, after]),
-        _ => ("the fitted data", [&d.before.train, &d.after.train]),
+    let data = match d.after.holdout {
+        Some(_) => "held-out data",
+        None => "the fitted data",
     };
+    let errors = [&d.before, &d.after].map(|split| errors_of(split).1);
     let bar = |errors: &Errors, j: usize| ErrorBar {
         error: errors.joints[j].relative_error,
         interval_95: Some(errors.joints[j].interval_95),
@@ -37,6 +39,19 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
     }
 }
 
+/// The first effect of the written model that the data do not separate from another.
+fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
+    let mut written = found.diagnosis.written();
+    written.find(|step| !step.alternatives.is_empty())
+}
+
+/// The motion that [`next`] asks for, as a command; nothing where no motion of one joint will do.
+pub fn next_command(machine: &LoggedRobot, found: &Diagnosed) -> Option<String> {
+    let d = &found.diagnosis;
+    let step = unclear(found).filter(|_| d.determined && d.long_enough())?;
+    separating_command(&step.estimate, &machine.robot)
+}
+
 /// What to do next.
 pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
     let d = &found.diagnosis;
@@ -52,7 +67,7 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
             number::significant(d.block_s, 2)
         );
     }
-    if let Some(step) = d.steps.iter().find(|step| !step.alternatives.is_empty()) {
+    if let Some(step) = unclear(found) {
         let effect = &step.estimate;
         return format!(
             "Next: {}. That separates {} from {}.",

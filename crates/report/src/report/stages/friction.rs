@@ -41,8 +41,15 @@ pub fn friction(of: &Friction) -> Report {
         laws.table(law(of.machine, joint));
     }
     report.terminal().line("");
+    let (tally, _) = parameters::tally(of.file);
+    report.detail().paragraph(&format!("{tally}."));
+    report.page().paragraph(&format!("{tally}."));
+    report.terminal().note("", NEXT, 2);
     report
 }
+
+/// What to do next.
+const NEXT: &str = "Next: `cft-ident lsq` with this model as `-m` fits the inertias.";
 
 /// What a page has room for besides; `given` are the robot file and the model whose other joints are
 /// kept.
@@ -97,8 +104,26 @@ fn law(machine: &LoggedRobot, found: &FrictionOfJoint) -> Table {
 
 /// The verdict in words, and whether nothing calls for attention.
 fn words(of: &Friction) -> (String, bool) {
-    let (mut text, mut good) = parameters::tally(of.file);
-    text.push('.');
+    let worst = of.found.joints.iter();
+    let worst = worst.max_by(|a, b| {
+        a.estimate
+            .relative_error
+            .total_cmp(&b.estimate.relative_error)
+    });
+    let mut text = worst.map_or_else(String::new, |worst| {
+        let error = number::percent(worst.estimate.relative_error);
+        match of.found.joints.len() {
+            1 => format!(
+                "The friction law of {} leaves {error} of its torque.",
+                worst.joint
+            ),
+            n => format!(
+                "The friction laws of {n} joints leave at most {error} of the torque, at {}.",
+                worst.joint
+            ),
+        }
+    });
+    let mut good = true;
     for found in &of.found.joints {
         if !found.converged {
             good = false;
@@ -119,6 +144,9 @@ fn words(of: &Friction) -> (String, bool) {
                 found.joint
             );
         }
+    }
+    if good {
+        text += " The curves can be used over the speeds covered.";
     }
     (text, good)
 }

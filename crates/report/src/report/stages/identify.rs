@@ -61,23 +61,21 @@ impl Identify<'_> {
             let text = diagnose::at_fault(fault);
             page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
         }
-        let (tally, mut good) = parameters::tally(self.model());
-        let mut text = format!("{tally}.");
         if let Some(found) = self.diagnosed() {
-            let (words, named) = diagnose::words(self.machine, found);
-            text += &format!(" {words}");
-            good &= named;
+            let (text, good) = diagnose::words(self.machine, found);
+            page.verdict(&text, good);
         }
-        page.verdict(&text, good);
         match &self.found.validated {
+            // the diagnosis has said what the model misses
+            Some(_) if self.diagnosed().is_some() && self.limit.is_none() => {}
             Some(validated) => {
                 let errors = validated.judged();
                 let (text, good) = validate::words(errors, self.limit, &self.title());
-                let declared = match self.found.refined {
-                    Some(_) => text.replacen("The model", "The declared model", 1),
+                let given = match self.found.refined {
+                    Some(_) => text.replacen("The model", "The model before the diagnosis", 1),
                     None => text,
                 };
-                page.verdict(&declared, good);
+                page.verdict(&given, good);
             }
             None => page.verdict(
                 "There is no validation log: the held-out error is not known.",
@@ -93,7 +91,7 @@ pub fn identify(of: &Identify) -> Report {
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
     of.verdicts(&mut report.everywhere());
     if let Some(diagnosed) = of.diagnosed() {
-        diagnose::told(&mut report.terminal(), machine, diagnosed);
+        diagnose::told(&mut report, machine, diagnosed);
     }
     if let Some(validated) = &found.validated {
         let caption = format!("torque on held-out data ({})", of.unseen.join(", "));
@@ -107,8 +105,10 @@ pub fn identify(of: &Identify) -> Report {
         validate::told(&mut rest, errors, &caption);
         validate::overall(&mut report.detail(), errors);
     }
+    let (tally, _) = parameters::tally(of.model());
     let mut detail = report.detail();
     detail.line("");
+    detail.paragraph(&format!("{tally}."));
     detail.table(beside_truth(of));
     detail.line("");
     lsq::condition(&mut detail, &found.dynamics);
@@ -124,8 +124,12 @@ pub fn identify(of: &Identify) -> Report {
             let caption = "errors of the reconstructed torque on held-out data";
             validate::errors(&mut page, validated.judged(), caption);
         }
-        (None, None) => lsq::residuals(&mut page, &found.dynamics),
+        (None, None) => {
+            let all: Vec<usize> = (0..found.dynamics.joints.len()).collect();
+            lsq::residuals(&mut page, &found.dynamics, &all);
+        }
     }
+    page.paragraph(&format!("{tally}."));
     parameters::section(&mut page, of.model(), of.truth);
     report
 }

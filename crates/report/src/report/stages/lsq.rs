@@ -3,7 +3,7 @@
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::{Align, Table, unbroken};
-use crate::report::{Report, Writer, summary};
+use crate::report::{Report, Writer, summary, usual};
 use cft_ident_core::math::descent::Ending;
 use cft_ident_core::number;
 use cft_ident_core::verdict::{IDENTIFIED, Verdict, WEAK};
@@ -32,14 +32,20 @@ const FEW: usize = 8;
 pub fn lsq(of: &Lsq) -> Report {
     let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
     let mut report = Report::new(&format!("Least squares fit to {}", names.join(", ")));
-    let (text, good) = parameters::tally(of.file);
-    let apart = far_off(of.found);
-    let good = good && apart.is_none();
-    let text = format!("{text}.{}", apart.unwrap_or_default());
+    let (text, good) = words(of);
     report.everywhere().verdict(&text, good);
     report.terminal().line("");
     gains(&mut report.terminal(), &of.found.gains);
-    residuals(&mut report.terminal(), of.found);
+    let relative: Vec<f64> = of.found.joints.iter().map(|e| e.relative_error).collect();
+    let (joints, more) = summary::most_wrong(&relative);
+    residuals(&mut report.usual(), of.found, &joints);
+    if let Some(more) = more {
+        report.usual().line(&more);
+    }
+    let all: Vec<usize> = (0..relative.len()).collect();
+    residuals(&mut report.detail(), of.found, &all);
+    let (tally, _) = parameters::tally(of.file);
+    report.detail().paragraph(&format!("{tally}."));
     let mut parameters = match of.found.unknowns.len() <= FEW {
         true => report.terminal(),
         false => report.detail(),
@@ -51,23 +57,24 @@ pub fn lsq(of: &Lsq) -> Report {
         motion(&mut report.terminal(), fit);
     }
     known_friction(&mut report.detail(), &of.found.friction);
-    report.terminal().line("");
-    condition(&mut report.terminal(), of.found);
-    fit_quality(&mut report.detail(), of.found);
+    let mut detail = report.detail();
+    detail.line("");
+    condition(&mut detail, of.found);
+    fit_quality(&mut detail, of.found);
     if let Some(links) = &of.found.consistent {
-        report.detail().table(bodies(links));
-        consistent(&mut report.terminal(), links);
+        detail.table(bodies(links));
+        consistent(&mut detail, links);
     }
+    report.terminal().line("");
+    report.terminal().note("", NEXT, 2);
     let mut page = report.page();
     gains(&mut page, &of.found.gains);
     known_friction(&mut page, &of.found.friction);
     if let Some(fit) = &of.found.by_motion {
         motion(&mut page, fit);
     }
-    residuals(&mut page, of.found);
-    page.paragraph(
-        "These errors are those of the data that were fitted; `validate` gives those of others.",
-    );
+    residuals(&mut page, of.found, &all);
+    page.paragraph(&format!("{tally}."));
     report
 }
 
@@ -81,7 +88,7 @@ pub fn pictures(
     quality: &[Inspected],
     command: &str,
 ) {
-    page.paragraph(&first_words(of.found));
+    page.paragraph(NEXT);
     parameters::section(page, of.file, &|_| None);
     if let Some(replayed) = replayed {
         let (machine, logs) = (of.machine, &replayed.logs);
@@ -98,22 +105,49 @@ pub fn pictures(
     provenance::section(page, file, &inputs, &[], summary, command);
 }
 
-/// How good the fit is, and what to do next.
-fn first_words(found: &IdentifiedDynamics) -> String {
-    let square = |x: f64| x * x;
-    let sum: f64 = found.joints.iter().map(|j| square(j.relative_error)).sum();
-    let rms = number::percent((sum / found.joints.len().max(1) as f64).sqrt());
-    let worst = found.joints.iter();
+/// What to do next.
+const NEXT: &str = "Next: `cft-ident validate` on a log that was not fitted, for this error is of the data that were; \
+                    `cft-ident diagnose` finds what the model lacks.";
+
+/// The error of the fit, how good that is and whether the model can be used; and whether nothing calls for attention.
+fn words(of: &Lsq) -> (String, bool) {
+    let joints = &of.found.joints;
+    let square: f64 = joints.iter().map(|j| j.relative_error.powi(2)).sum();
+    let rms = number::percent((square / joints.len().max(1) as f64).sqrt());
+    let worst = joints.iter();
     let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
-    let fit = match worst.filter(|_| found.joints.len() > 1) {
+    let mut text = match worst.filter(|_| joints.len() > 1) {
         Some(worst) => format!(
-            "The fit leaves {rms} of the torque, as the rms over the joints; most at {}: {}.",
+            "The fit leaves {rms} of the torque (rms over the joints), most at {}: {}.",
             worst.joint,
             number::percent(worst.relative_error)
         ),
         None => format!("The fit leaves {rms} of the torque."),
     };
-    format!("{fit} Next: `cft-ident validate` on a log that was not fitted.")
+    text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
+    let useless = joints.iter().filter(|j| j.relative_error >= 1.0);
+    let useless: Vec<&str> = useless.map(|j| j.joint.as_str()).collect();
+    let apart = far_off(of.found);
+    let good = useless.is_empty() && apart.is_none();
+    text += &match (useless.is_empty(), apart) {
+        (false, _) => format!(
+            " The model cannot be used for {}: no torque at all would be as near.",
+            useless.join(", ")
+        ),
+        (true, Some(apart)) => apart,
+        (true, None) => " The model can be used for motions like these.".to_owned(),
+    };
+    let open = of.found.unknowns.iter();
+    let open = open
+        .filter(|u| matches!(u.verdict, Verdict::NotIdentifiable))
+        .count();
+    if open > 0 {
+        text += &format!(
+            " Use its torques, and not its single numbers: {open} of {} parameters are not determined one by one.",
+            of.found.unknowns.len()
+        );
+    }
+    (text, good)
 }
 
 /// A joint's error is far above the others from so many times their median on, and from so much.
@@ -133,7 +167,7 @@ fn far_off(found: &IdentifiedDynamics) -> Option<String> {
         let median = median(j)?;
         (error(j) > LEAST && error(j) > FAR * median).then(|| {
             format!(
-                " The error of {}, {}, is far above that of the others, {} in the median.",
+                " Do not use it for {} before that is explained: its error of {} is far above the others', {} in the median.",
                 found.joints[j].joint,
                 number::percent(error(j)),
                 number::percent(median)
@@ -143,8 +177,8 @@ fn far_off(found: &IdentifiedDynamics) -> Option<String> {
     Some(far.collect::<String>()).filter(|text| !text.is_empty())
 }
 
-/// The residual of the fit, joint by joint.
-pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics) {
+/// The residual of the fit, of these joints.
+pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics, joints: &[usize]) {
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("relative error", Align::Decimal),
@@ -153,7 +187,8 @@ pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics) {
         ("unit", Align::Left),
     ])
     .caption("residual of the fit, on the logs that were fitted");
-    for (joint, rms) in found.joints.iter().zip(&found.fit.torque_rms) {
+    for &j in joints {
+        let (joint, rms) = (&found.joints[j], &found.fit.torque_rms[j]);
         let torque = |v: f64| number::significant(v, 3);
         table.row([
             joint.joint.as_str(),

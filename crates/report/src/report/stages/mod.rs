@@ -3,6 +3,7 @@
 
 pub mod compare;
 pub mod diagnose;
+mod diagnose_words;
 pub mod diff;
 pub mod excite;
 mod first_screen;

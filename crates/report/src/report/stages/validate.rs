@@ -4,7 +4,7 @@ use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, JointTorque, Torqu
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::table::unbroken;
-use crate::report::{Report, Writer, summary};
+use crate::report::{Report, Writer, summary, usual};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
 use cft_ident_core::validate::{JointError, TorqueErrors, Validation};
@@ -38,6 +38,7 @@ pub fn validate(of: &Validate) -> Report {
     let by_use = of.found.by_use.as_ref();
     let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
     let (mut text, mut good) = words(judged, of.limit, &escaped(logs));
+    text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
     if let Some(told) = not_a_validation(judged) {
         text = format!("NOT A VALIDATION: {told}.");
         good = false;
@@ -46,12 +47,14 @@ pub fn validate(of: &Validate) -> Report {
     used_before(&mut report.everywhere(), of);
     report.terminal().line("");
     let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
-    told(&mut report.terminal(), judged, &caption(logs));
+    let whole = caption(logs);
+    summary::largest_errors(&mut report.usual(), &whole, &judged.joints);
+    told(&mut report.detail(), judged, &whole);
     if let Some(ErrorsByUse { used, .. }) = by_use {
-        let mut terminal = report.terminal();
-        terminal.line("");
+        let mut detail = report.detail();
+        detail.line("");
         let caption = format!("{}, which the model was made from", caption(&used.logs));
-        terminal.table(summary::torque_errors(&caption, &used.errors.joints));
+        detail.table(summary::torque_errors(&caption, &used.errors.joints));
     }
     overall(&mut report.detail(), judged);
     let mut page = report.page();
@@ -195,19 +198,24 @@ fn at_rest(of: &TorqueErrors) -> Option<String> {
 /// The verdict in words, and whether nothing calls for attention.
 pub fn words(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, bool) {
     let mut text = format!(
-        "The model gives the torque of {title} to within {}, as the rms over the joints.",
+        "The model misses {} of the torque of {title}",
         number::percent(of.overall.mean_relative_error)
     );
     let joints = of.joints.iter();
     if let Some(worst) = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))
         && of.joints.len() > 1
     {
+        text += " (rms over the joints";
+        if let Some(all) = of.overall.relative_error {
+            text += &format!("; {} of all their torques together", number::percent(all));
+        }
         text += &format!(
-            " The worst joint is {} with {}.",
+            "), most at {}: {}",
             worst.joint,
             number::percent(worst.relative_error)
         );
     }
+    text += ".";
     let Some(limit) = limit else {
         return (text, true);
     };

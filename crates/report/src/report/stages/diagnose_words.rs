@@ -1,0 +1,168 @@
+//! The verdict of a diagnosis in a breath: what was confirmed and what that bought, how good the model now is, and
+//! where most is left.
+
+use super::step_words::titled;
+use crate::report::usual;
+use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
+use cft_ident_core::number;
+use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
+
+/// Effects that the verdict names; it counts the others.
+const NAMED: usize = 3;
+
+/// The verdict in words, and whether nothing calls for attention.
+pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
+    let d = &found.diagnosis;
+    let lacking = found.verdict();
+    let mut text = match lacking {
+        DiagnosisVerdict::EffectsFound => added(machine, d),
+        _ if !d.determined => {
+            let text = "These data determine nothing: the noise is as large as the torque that the model explains.";
+            return (text.to_owned(), false);
+        }
+        _ if !d.long_enough() => format!(
+            "These logs are too short to confirm an effect: they give {} independent parts of {} s, and {} are needed.",
+            d.parts,
+            number::significant(d.block_s, 2),
+            d.parts_needed
+        ),
+        DiagnosisVerdict::NothingMissing if d.steps.is_empty() => {
+            "Nothing is missing: the remaining residual is noise.".to_owned()
+        }
+        DiagnosisVerdict::NothingMissing => "Nothing that matters is missing.".to_owned(),
+        _ => "No effect is confirmed: a residual above the noise is left that none explains in all parts of the data."
+            .to_owned(),
+    };
+    let (bought, worse) = bought(d);
+    text += &format!(" {bought}");
+    text += &taken_out(machine, d);
+    if !robot_is_exact(d) {
+        text += &format!(" {}", usual::words(machine.file.log.torque_is));
+    }
+    if let Some(left) = most_is_left(machine, d) {
+        text += &format!(" {left}");
+    }
+    let good = !worse && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
+    (text, good)
+}
+
+/// Whether the error is so small that no published figure is of use beside it.
+fn robot_is_exact(d: &Diagnosis) -> bool {
+    let least = [usual::Measured::Sensors, usual::Measured::Currents]
+        .map(|measured| usual::range(measured)[0])
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    errors(&d.after).1.overall.mean_relative_error < 0.5 * least
+}
+
+/// The effects of the written model, by how firm they are.
+fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
+    let graded = |grade: &str, steps: Vec<&FoundEffect>| {
+        let names = steps.iter().take(NAMED);
+        let mut names: Vec<String> = names.map(|s| titled(machine, &s.estimate)).collect();
+        if steps.len() > NAMED {
+            names.push(format!("{} more", steps.len() - NAMED));
+        }
+        let count = match steps.len() {
+            1 => "One effect".to_owned(),
+            n => format!("{n} effects"),
+        };
+        (!steps.is_empty()).then(|| format!("{count} {grade}: {}.", names.join("; ")))
+    };
+    let by = |status: StepStatus| {
+        let steps = d
+            .written()
+            .filter(|s| !s.accepted_by_user && s.status == status);
+        steps.collect::<Vec<_>>()
+    };
+    let wanted = d.written().filter(|s| s.accepted_by_user).collect();
+    let firm = match d.after.holdout {
+        Some(_) => "confirmed, on held-out data too",
+        None => "confirmed",
+    };
+    let all = [
+        graded(firm, by(StepStatus::Confirmed)),
+        graded("indicated, and written in part", by(StepStatus::Indicated)),
+        graded("written because you asked for it", wanted),
+    ];
+    all.into_iter().flatten().collect::<Vec<_>>().join(" ")
+}
+
+/// The errors that count, and of which data they are: held-out ones where there are any.
+pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
+    match &of.holdout {
+        Some(errors) => ("held-out error", errors),
+        None => ("error of the fitted data", &of.train),
+    }
+}
+
+/// What the diagnosis did to the error, and whether that is worse.
+fn bought(d: &Diagnosis) -> (String, bool) {
+    let ((data, before), (_, after)) = (errors(&d.before), errors(&d.after));
+    let mean = |e: &Errors| e.overall.mean_relative_error;
+    let percent = |e: &Errors| number::percent(mean(e));
+    let (goes, worse) = match (
+        percent(before) == percent(after),
+        mean(after) > mean(before),
+    ) {
+        (true, _) => ("stays at", false),
+        (false, true) => ("RISES", true),
+        (false, false) => ("falls", false),
+    };
+    let mut text = match (d.written().next(), goes) {
+        (None, _) => format!("The {data} is {}", percent(after)),
+        (Some(_), "stays at") => format!("The {data} stays at {}", percent(after)),
+        (Some(_), goes) => format!(
+            "The {data} {goes} from {} to {}",
+            percent(before),
+            percent(after)
+        ),
+    };
+    if after.joints.len() > 1 {
+        text += " (rms over the joints";
+        if let Some(all) = after.overall.relative_error {
+            text += &format!("; {} of all their torques together", number::percent(all));
+        }
+        text += ")";
+    }
+    (text + ".", worse && d.written().next().is_some())
+}
+
+/// What held-out data took out of the model.
+fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
+    let Some(selected) = &d.selected else {
+        return String::new();
+    };
+    let vetoed = d.steps.iter().filter(|s| s.vetoed());
+    let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
+    format!(
+        " Not written, for a joint is worse with it on held-out data: {}. The model as it is written has a {} of {}, \
+         which is optimistic, since these data chose.",
+        names.join("; "),
+        errors(selected).0,
+        number::percent(errors(selected).1.overall.mean_relative_error)
+    )
+}
+
+/// The joint with the largest share of its torque left beyond the noise, and on what that depends.
+fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
+    let names = machine.robot.joint_names();
+    let share = |j: &usize| d.unexplained[*j].share;
+    let worst = d
+        .structured_joints()
+        .max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let error = number::percent(errors(&d.after).1.joints[worst].relative_error);
+    let place = match names.len() {
+        1 => format!("More than noise is left ({error} of the torque)"),
+        _ => format!("Most is left in {} ({error} of its torque)", names[worst]),
+    };
+    let dependence = d.dependence.iter().find(|of| of.joint == worst);
+    let on = dependence.map(|of| {
+        let signals = of.signals.iter().map(|s| signal_words(names, worst, *s));
+        format!(
+            "; it depends on {}",
+            signals.collect::<Vec<_>>().join(" and ")
+        )
+    });
+    Some(place + &on.unwrap_or_default() + ".")
+}

@@ -1,0 +1,147 @@
+//! Errors of published models, by which a reader judges an error.
+
+use cft_ident_core::number;
+use cft_ident_logs::log::TorqueIs;
+
+/// What the torques of a published figure are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measured {
+    /// Sensors at the joints.
+    Sensors,
+    /// Currents of the motors, or commands to them.
+    Currents,
+}
+
+/// Over what an error is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Over {
+    /// Norm of the error of all joints over the norm of their torques.
+    All,
+    /// Root mean square of the errors of the joints.
+    Joints,
+}
+
+/// A published relative error of torques.
+#[derive(Debug, Clone, Copy)]
+pub struct Published {
+    pub machine: &'static str,
+    pub measured: Measured,
+    pub over: Over,
+    /// Error of the data that were fitted, as a fraction.
+    pub fitted: Option<f64>,
+    /// Error of other data, as a fraction.
+    pub unseen: Option<f64>,
+    pub source: &'static str,
+}
+
+/// The figures, one machine a row.
+pub const PUBLISHED: [Published; 6] = [
+    Published {
+        machine: "Franka Emika Panda, seven joints",
+        measured: Measured::Sensors,
+        over: Over::All,
+        fitted: Some(0.0141),
+        unseen: None,
+        source: "Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca 2019, supplement",
+    },
+    Published {
+        machine: "Rokae xMate7p, seven joints",
+        measured: Measured::Sensors,
+        over: Over::All,
+        fitted: Some(0.0250),
+        unseen: Some(0.0319),
+        source: "github.com/NKU-ZiXuan/xMate7p_dyn_ident, commit 7d8c9246, at 1 kHz",
+    },
+    Published {
+        machine: "EMPS, one axis",
+        measured: Measured::Currents,
+        over: Over::All,
+        fitted: Some(0.040834),
+        unseen: Some(0.059824),
+        source: "Janot, Gautier and Brunot 2019, published with the logs",
+    },
+    Published {
+        machine: "Universal Robots UR10e, six joints",
+        measured: Measured::Currents,
+        over: Over::All,
+        fitted: Some(0.0400),
+        unseen: Some(0.0308),
+        source: "github.com/shamilmamedov/dynamic_calibration, commit 11af40e7",
+    },
+    Published {
+        machine: "Staubli TX40, six joints",
+        measured: Measured::Currents,
+        over: Over::All,
+        fitted: Some(0.073),
+        unseen: None,
+        source: "github.com/thanhndv212/figaroh-examples, commit c0b5c7f0",
+    },
+    Published {
+        machine: "Universal Robots UR10, six joints",
+        measured: Measured::Currents,
+        over: Over::Joints,
+        fitted: None,
+        unseen: Some(0.129),
+        source: "weighted least squares on the log of github.com/unisa-acg/inverse-dynamics-solver: \
+                 17, 6.8, 6.0, 12.6, 13.8 and 16.5 % by joint",
+    },
+];
+
+/// Least and largest published error.
+pub fn range(measured: Measured) -> [f64; 2] {
+    let rows = PUBLISHED.iter().filter(|row| row.measured == measured);
+    let errors = rows.flat_map(|row| row.fitted.into_iter().chain(row.unseen));
+    errors.fold([f64::INFINITY, 0.0], |[least, most], error| {
+        [least.min(error), most.max(error)]
+    })
+}
+
+/// How large errors usually are, in a sentence; of both kinds where a log does not say how its torques were measured.
+pub fn words(torque_is: Option<TorqueIs>) -> String {
+    let percent = |measured| {
+        let [least, most] = range(measured).map(|error| number::significant(100.0 * error, 2));
+        format!("{least} to {most} %")
+    };
+    let currents = percent(Measured::Currents);
+    match torque_is {
+        Some(TorqueIs::Motor | TorqueIs::Current | TorqueIs::Commanded) => {
+            format!("Usual for torques from motor currents: {currents}.")
+        }
+        Some(TorqueIs::Joint) | None => format!(
+            "Usual: {currents} for torques from motor currents, {} for joint torque sensors.",
+            percent(Measured::Sensors)
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sentence_has_the_ranges_of_the_table() {
+        assert_eq!(
+            words(Some(TorqueIs::Current)),
+            "Usual for torques from motor currents: 3.1 to 13 %."
+        );
+        assert!(words(None).ends_with("1.4 to 3.2 % for joint torque sensors."));
+    }
+
+    #[test]
+    fn every_figure_has_a_source_and_is_a_fraction() {
+        for row in &PUBLISHED {
+            let errors = [row.fitted, row.unseen];
+            let mut known = errors.iter().flatten().peekable();
+            assert!(
+                known.peek().is_some() && !row.source.is_empty(),
+                "{}",
+                row.machine
+            );
+            assert!(
+                known.all(|error| (0.001..1.0).contains(error)),
+                "{}",
+                row.machine
+            );
+        }
+    }
+}
