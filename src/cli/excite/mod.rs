@@ -1,6 +1,7 @@
 //! `cft-ident excite`: a motion that makes the parameters as certain as the limits allow, judged
 //! before the robot moves; or the same judgement of a motion that is there.
 
+mod aim;
 mod controllers;
 mod given;
 mod judge;
@@ -15,7 +16,7 @@ use super::exit::Exit;
 use super::outcome::Outcome;
 use super::{arguments, files, keep_what_there_is};
 use cft_ident_files::config::trajectory::FourierSection;
-use cft_ident_files::config::{RobotFile, Trajectory};
+use cft_ident_files::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_plant::excite::blend::Blend;
 use cft_ident_plant::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
@@ -31,6 +32,7 @@ use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::{Report, stages};
 
+use aim::Aim;
 use judge::{head, judged, refuse_broken};
 use names::Names;
 
@@ -38,6 +40,7 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident excite -r configs/cft.toml -o excitation.toml --plot excitation.svg
   cft-ident excite -r configs/cft.toml --joint q4 -o ladder.toml
+  cft-ident excite -m model.toml --for weak -o next.toml
   cft-ident excite --check configs/table3.toml";
 
 /// Design a motion for identification that keeps every limit, or check one that exists.
@@ -49,18 +52,19 @@ Example:
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// Robot file, or a built-in one
-    #[arg(
-        short,
-        long,
-        value_name = "ROBOT.toml",
-        default_value = "configs/cft.toml"
-    )]
-    pub robot: PathBuf,
+    /// Robot file, or a built-in one [default: the robot of the model, without a model configs/cft.toml]
+    #[arg(short, long, value_name = "ROBOT.toml")]
+    pub robot: Option<PathBuf>,
     /// Model file that torques and volts are foreseen with, limits kept for the 95 % band of its parameters
     /// [default: nominal numbers, or the inertials of the robot file; without any, torques are not foreseen]
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
+    /// What the next motion is for: the weak parameters of the model, whose intervals it narrows together with the
+    /// logs that there are, or an effect that the logs do not tell from its like. Limits that the robot file does not
+    /// give are the positions, speeds and torques of the model's logs
+    #[arg(long = "for", value_name = "weak|EFFECT:JOINT", requires = "model",
+          conflicts_with_all = ["check", "joint", "criterion", "parameters"])]
+    pub aim: Option<String>,
     /// Trajectory to judge instead of a design; status 1 when it breaks a limit
     #[arg(long, value_name = "TRAJECTORY.toml", conflicts_with_all = ["output", "with", "trajectories"])]
     pub check: Option<PathBuf>,
@@ -71,41 +75,41 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = CriterionName::Condition)]
     pub criterion: CriterionName,
     /// With a-optimal: only this parameter, by its relative error; may be given more than once
-    #[arg(long = "parameter", value_name = "NAME")]
+    #[arg(hide_short_help = true, long = "parameter", value_name = "NAME")]
     pub parameters: Vec<String>,
     /// Fundamental frequency [Hz]
-    #[arg(long, value_name = "HZ", default_value_t = 0.4, value_parser = frequency)]
+    #[arg(hide_short_help = true, long, value_name = "HZ", default_value_t = 0.4, value_parser = frequency)]
     pub frequency: f64,
     /// Harmonics of each coordinate
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=32))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=32))]
     pub harmonics: u16,
     /// Whole periods between the ends
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub periods: u32,
     /// Keep the offsets of this trajectory, such as configs/table3.toml
-    #[arg(long, value_name = "TRAJECTORY.toml")]
+    #[arg(hide_short_help = true, long, value_name = "TRAJECTORY.toml")]
     pub offsets: Option<PathBuf>,
     /// Share of every limit that the design leaves free, for what a controller strays
-    #[arg(long, value_name = "SHARE", default_value_t = 0.05, value_parser = share)]
+    #[arg(hide_short_help = true, long, value_name = "SHARE", default_value_t = 0.05, value_parser = share)]
     pub margin: f64,
     /// Pose from which the robot goes straight to the first point, coordinate by coordinate [m or rad]: limits are
     /// kept on the way too
-    #[arg(long, value_name = "X,X,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = arguments::finite)]
+    #[arg(hide_short_help = true, long, value_name = "X,X,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = arguments::finite)]
     pub from: Option<Vec<f64>>,
     /// Log or trajectory (.toml) that is used together with the design; may be given more than once
-    #[arg(long, value_name = "LOG|TRAJECTORY.toml")]
+    #[arg(hide_short_help = true, long, value_name = "LOG|TRAJECTORY.toml")]
     pub with: Vec<String>,
     /// Motions to design, each to complement those before it; written as TRAJECTORY-1.toml, ...
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub trajectories: u16,
     /// Random starts of the search
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub starts: u16,
     /// Evaluations that each start may take [default: up to 1180]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(hide_short_help = true, long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub evaluations: Option<u64>,
     /// Seed of the starts
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Trajectory to write
     #[arg(
@@ -116,23 +120,23 @@ pub struct Args {
     )]
     pub output: Option<PathBuf>,
     /// Write the motion sample by sample, positions, speeds and accelerations
-    #[arg(long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
     pub samples: Option<PathBuf>,
     /// Write the motion for ROS 2, as trajectory_msgs/msg/JointTrajectory
-    #[arg(long, value_name = "FILE.yaml|.mcap", value_parser = arguments::message_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.yaml|.mcap", value_parser = arguments::message_file)]
     pub trajectory_message: Option<PathBuf>,
     /// Write the motion as a program for a controller of Universal Robots
-    #[arg(long, value_name = "FILE.script", value_parser = arguments::script_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::script_file)]
     pub urscript: Option<PathBuf>,
     /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
     /// [control], else 1000]
-    #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
+    #[arg(hide_short_help = true, long, value_name = "HZ", value_parser = arguments::positive)]
     pub rate: Option<f64>,
     /// Duration of a one-joint experiment, or of a checked motion that sets none [s]
-    #[arg(long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
+    #[arg(hide_short_help = true, long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Option<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
@@ -203,6 +207,10 @@ struct Bench<'a> {
     context: &'a Context,
     file: RobotFile,
     machine: ForeseenRobot,
+    /// Name of the file that the robot is from.
+    robot: String,
+    model: Option<ModelFile>,
+    aim: Option<Aim>,
     rate_hz: f64,
     inputs: Vec<Provenance>,
 }
@@ -213,7 +221,7 @@ struct Bench<'a> {
 /// Every [`CliError`]; a search that is stopped writes the best motion that it has first.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all = Names::of(args);
-    let mut read: Vec<&Path> = vec![&args.robot];
+    let mut read: Vec<&Path> = args.robot.iter().map(PathBuf::as_path).collect();
     read.extend(args.model.as_deref());
     read.extend(args.check.as_deref());
     read.extend(args.offsets.as_deref());
@@ -221,18 +229,35 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs: Vec<&Path> = all.iter().flat_map(Names::paths).collect();
     context.check_outputs(&read, &outputs)?;
 
-    let robot = files::robot(&args.robot)?;
-    let mut inputs = vec![robot.provenance];
-    let model = match &args.model {
-        Some(path) => {
-            let given = files::model_of(path, &robot.value, context)?;
+    let model = args.model.as_deref();
+    let model = model.map(|path| files::model(path, context)).transpose()?;
+    let mut inputs = Vec::new();
+    let (robot, mut file) = match (&args.robot, &model) {
+        (None, Some(given)) => (given.name.clone(), given.value.robot.clone()),
+        (path, _) => {
+            let path = path.as_deref().unwrap_or(Path::new(ROBOT));
+            let given = files::robot(path)?;
             inputs.push(given.provenance);
-            Some((given.name, given.value))
+            let name = path.file_name().unwrap_or_default();
+            (name.to_string_lossy().into_owned(), given.value)
         }
-        None => None,
     };
-    let named = model.as_ref().map(|(name, model)| (name.as_str(), model));
-    let mut machine = machine(&robot.value, named)?;
+    if let Some(given) = &model {
+        given.value.belongs_to(&given.name, &file)?;
+        inputs.push(given.provenance.clone());
+    }
+    let named = model
+        .as_ref()
+        .map(|given| (given.name.as_str(), &given.value));
+    let aim = args
+        .aim
+        .as_ref()
+        .map(|text| Aim::of(text, &file))
+        .transpose()?;
+    if let (Some(_), Some((_, model))) = (&aim, named) {
+        aim::within_seen(&mut file, model);
+    }
+    let mut machine = machine(&file, named)?;
     let names = machine.coordinate_names();
     if let Some(from) = args.from.as_ref().filter(|from| from.len() != names.len()) {
         return Err(
@@ -245,21 +270,35 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         std::f64::consts::TAU * args.frequency,
         usize::from(args.harmonics),
     );
-    given::noise(&robot.value, &usual, &mut machine);
+    given::noise(&file, &usual, &mut machine);
+    let rate_hz = args.rate.or(file.control.rate_hz).unwrap_or(RATE_HZ);
+    if let (Some(_), Some((_, model))) = (&aim, named) {
+        aim::noise(model, rate_hz, &mut machine);
+    }
     let mut bench = Bench {
         args,
         context,
-        rate_hz: args.rate.or(robot.value.control.rate_hz).unwrap_or(RATE_HZ),
-        file: robot.value,
+        rate_hz,
+        file,
         machine,
+        robot,
+        model: model.map(|given| given.value),
+        aim,
         inputs,
     };
-    match (&args.check, &args.joint) {
+    let joint = match (&args.joint, &bench.aim) {
+        (_, Some(Aim::Ladder { joint, .. })) => Some(joint.clone()),
+        (joint, _) => joint.clone(),
+    };
+    match (&args.check, joint) {
         (Some(path), _) => check(&mut bench, path, &all[0]),
-        (None, Some(joint)) => ladder(&bench, joint, &all[0]),
+        (None, Some(joint)) => ladder(&bench, &joint, &all[0]),
         (None, None) => designs(&mut bench, &all),
     }
 }
+
+/// The robot where neither a robot file nor a model is given.
+const ROBOT: &str = "configs/cft.toml";
 
 /// Rate of a log where nothing says [Hz].
 const RATE_HZ: f64 = 1000.0;
@@ -301,7 +340,10 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
 fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
     LadderTask {
         joint: joint.to_owned(),
-        seconds: bench.args.seconds,
+        seconds: match &bench.aim {
+            Some(Aim::Ladder { seconds, .. }) => *seconds,
+            _ => bench.args.seconds,
+        },
         seed: bench.args.seed,
         rate_hz: bench.rate_hz,
         reserve: bench.args.margin,
@@ -316,7 +358,8 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
     bench.context.check()?;
     let trajectory = Trajectory::SingleJoint(found.file);
     let args = bench.args;
-    let motion = Motion::of_file(&bench.machine, &trajectory, args.seconds, args.seed)?;
+    let seconds = ladder_task(bench, joint).seconds;
+    let motion = Motion::of_file(&bench.machine, &trajectory, seconds, args.seed)?;
     let friction = LawForeseen {
         joint: joint.to_owned(),
         parameters: found.expected,
@@ -352,6 +395,12 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     let mut any = false;
     for name in &args.with {
         given::add(bench, name, &mut given, &mut warnings)?;
+        any = true;
+    }
+    if let (Some(Aim::Weak), Some(model)) = (&bench.aim, &bench.model) {
+        let (known, criterion) = aim::weak(bench, model)?;
+        given.add_known(&known.information);
+        task.criterion = criterion;
         any = true;
     }
     let weights = weights(&bench.machine, &task.criterion);

@@ -229,6 +229,9 @@ fn motion(writer: &mut Writer, fit: &MotionFit) {
         table.row([what.as_str(), &from, &to, fit.unit]);
     }
     writer.table(table);
+    if !fit.taken {
+        writer.paragraph("It runs no better than least squares, which stands in the model.");
+    }
     let added = fit.effects.iter().flat_map(|effect| {
         let numbers = effect.parameters.iter().filter(|(_, p)| !p.bound);
         numbers.map(move |(key, p)| {
