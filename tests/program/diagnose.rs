@@ -431,3 +431,66 @@ fn a_turned_torque_and_a_dead_one_are_faults_of_the_data_and_no_physics() {
         assert!(!at.join("none.toml").exists(), "{log}");
     }
 }
+
+/// A small case; none, said aloud, where the cases are not there.
+fn small_case(name: &str) -> Option<PathBuf> {
+    let folder = PathBuf::from(cft_ident_support::ROOT).join("../shared/cases/ident");
+    let folder = folder.join(name);
+    if folder.exists() {
+        return Some(folder);
+    }
+    println!("SKIPPED: {name} is not there");
+    None
+}
+
+/// The effects that were written and the held-out errors before and after, for a log of one joint.
+fn one_joint(case: &Path, robot: &str, fitted: &str, held_out: &str) -> (Vec<Value>, [f64; 2]) {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |file: &str| case.join(file).to_string_lossy().into_owned();
+    let (fitted, held_out) = (of(fitted), of(held_out));
+    run(
+        folder.path(),
+        &["lsq", &fitted, "-r", &of(robot), "-o", "m.toml"],
+    );
+    let found = run(
+        folder.path(),
+        &["diagnose", &fitted, "-m", "m.toml", "--holdout", &held_out],
+    );
+    let steps = found["steps"].as_array().unwrap().iter();
+    let written = steps.filter(|step| step["written"] == true).cloned();
+    let error = |when: &str| {
+        let joint = &found[when]["holdout"]["joints"][0];
+        joint["relative_error"].as_f64().unwrap()
+    };
+    (written.collect(), [error("before"), error("after")])
+}
+
+#[test]
+fn a_weight_that_no_gravity_is_declared_for_is_a_weight_and_no_spring() {
+    let Some(case) = small_case("gravity-called-spring") else {
+        return;
+    };
+    let (written, [before, after]) = one_joint(&case, "s1.toml", "gr1.csv", "gr2.csv");
+    assert_eq!(written.len(), 1, "{written:?}");
+    assert_eq!(written[0]["effect"], "weight");
+    // 6.0 cos(q + 0.3) Nm
+    let size = |key: &str| {
+        let value = &written[0]["parameters"][key]["value"];
+        value.as_f64().unwrap()
+    };
+    let moment = size("sin").hypot(size("cos"));
+    assert!((moment - 6.0).abs() < 0.1, "{moment}");
+    assert!(before > 0.3 && after < 0.03, "{before} {after}");
+}
+
+#[test]
+fn a_drift_is_found_though_the_residual_remembers_it_for_the_whole_log() {
+    let Some(case) = small_case("warmup-span-clock") else {
+        return;
+    };
+    let (written, [before, after]) =
+        one_joint(&case, "l1.toml", "dr.csv@0..70%", "dr.csv@70..100%");
+    assert_eq!(written.len(), 1, "{written:?}");
+    assert_eq!(written[0]["effect"], "drift");
+    assert!(before > 0.3 && after < 0.02, "{before} {after}");
+}

@@ -1,6 +1,7 @@
 //! Stretches of a log in which several joints leave many times their usual residual: something pushes the robot there.
 
 use super::accumulate::{BlockFactor, BlockFactors};
+use super::columns::Own;
 use super::solution::FitError;
 use super::solve::{Weighting, fit};
 
@@ -47,14 +48,15 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
         return Ok(Vec::new());
     }
     let mut kept: Vec<BlockFactor> = blocks.iter().copied().cloned().collect();
-    let mut ratios = Vec::new();
+    let (mut ratios, mut usual) = (Vec::new(), Vec::new());
+    let mut theta = nalgebra::DVector::zeros(0);
     for round in 0..=LIMITS.rounds {
         let part = BlockFactors {
             blocks: std::mem::take(&mut kept),
             ..factors.without_blocks()
         };
-        let theta = fit(&part, Weighting::Wls)?.theta;
-        ratios = over_median(factors, &blocks, &theta);
+        theta = fit(&part, Weighting::Wls)?.theta;
+        (ratios, usual) = over_median(factors, &blocks, &theta);
         if round == LIMITS.rounds {
             break;
         }
@@ -65,17 +67,37 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
         order.sort_unstable();
         kept = order.iter().map(|k| blocks[*k].clone()).collect();
     }
+    for (j, usual) in usual.iter().enumerate() {
+        let friction = BY_FRICTION * coulomb(factors, &theta, j);
+        for ratios in &mut ratios {
+            if ratios[j] * usual < friction {
+                ratios[j] = 0.0;
+            }
+        }
+    }
     Ok(joined(&blocks, &ratios))
 }
 
-/// Root mean square residual of each block and joint over the median of the joint; 0 where it does not move.
+/// Coulomb levels by which the torque of a joint that sticks or turns may be off: from one side to the other.
+const BY_FRICTION: f64 = 2.0;
+
+/// Coulomb level of a joint by a fit; 0 where it is not fitted.
+fn coulomb(factors: &BlockFactors, theta: &nalgebra::DVector<f64>, j: usize) -> f64 {
+    let mut own = factors.columns.own[j].iter();
+    let at = own.position(|own| *own == Own::Coulomb);
+    at.map_or(0.0, |at| theta[factors.columns.first_own(j) + at].abs())
+}
+
+/// Root mean square residual of each block and joint over the median of the joint, 0 where it does not move; and the
+/// medians.
 fn over_median(
     factors: &BlockFactors,
     blocks: &[&BlockFactor],
     theta: &nalgebra::DVector<f64>,
-) -> Vec<Vec<f64>> {
+) -> (Vec<Vec<f64>>, Vec<f64>) {
     let n = factors.columns.joints;
     let mut all = vec![vec![0.0; n]; blocks.len()];
+    let mut usual = vec![0.0; n];
     for j in 0..n {
         let own = factors.own_unknowns(theta, j);
         let mut seen = Vec::with_capacity(blocks.len());
@@ -93,8 +115,9 @@ fn over_median(
         for out in &mut all {
             out[j] = if median > 0.0 { out[j] / median } else { 0.0 };
         }
+        usual[j] = median;
     }
-    all
+    (all, usual)
 }
 
 /// Blocks that jump, those next to each other as one.
@@ -137,7 +160,7 @@ fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<Jump> {
 mod tests {
     use super::*;
     use crate::inertia::accumulate::Accumulator;
-    use crate::inertia::columns::{Own, RegressorColumns};
+    use crate::inertia::columns::RegressorColumns;
     use crate::robot::tree::{Coordinate, Link, Tree, space};
     use crate::robot::{JointKind, Robot};
 
