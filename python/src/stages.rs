@@ -216,7 +216,10 @@ pub fn validate(
             control,
             &mut |_, _| {},
         );
-        let found = found.map_err(of_stage)?;
+        let mut found = found.map_err(of_stage)?;
+        let inputs = (&logs[..], &found.inputs[..]);
+        found.free_run =
+            identify::free_run(&machine, &augmented, inputs, control).map_err(of_stage)?;
         let document = Document::new("validate", &found.inputs, &found.warnings, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::validate::validate(&stages::validate::Validate {

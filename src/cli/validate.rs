@@ -188,6 +188,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(error) = failed {
         return Err(error.into());
     }
+    let inputs = (&logs[..], &found.inputs[..]);
+    found.free_run = identify::free_run(&machine, &model, inputs, context.control())?;
     if let Some(window) = args.open_loop {
         let control = context.control();
         let simulated = identify::open_loop(&machine, &model, &logs, window, control)?;

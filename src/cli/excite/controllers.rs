@@ -92,7 +92,6 @@ fn sampled(
 
 /// What is to be known before the robot moves; what nobody has checked comes first.
 fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
-    let file = bench.args.robot.file_name().unwrap_or_default();
     let [first, second] = judged.first_words();
     vec![
         escape_whole(first),
@@ -100,7 +99,7 @@ fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
         match &judged.broken()[..] {
             [] => format!(
                 "Checked: the limits of {}{} along the whole motion{}. {} s at {} Hz, by cft-ident {}.",
-                escape(&file.to_string_lossy()),
+                escape(&bench.robot),
                 match judged.torques_foreseen {
                     true => "",
                     false => ", but for torques,",

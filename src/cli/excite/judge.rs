@@ -66,6 +66,9 @@ pub(super) fn head(judged: &Judgement) -> String {
 
 fn criterion_name(bench: &Bench) -> String {
     use clap::ValueEnum;
+    if let Some(aim) = &bench.args.aim {
+        return format!("for {aim}");
+    }
     let value = bench.args.criterion.to_possible_value();
     value.map_or(String::new(), |value| value.get_name().to_owned())
 }

@@ -1,6 +1,7 @@
 //! `cft-ident excite`: a motion that makes the parameters as certain as the limits allow, judged
 //! before the robot moves; or the same judgement of a motion that is there.
 
+mod aim;
 mod controllers;
 mod given;
 mod judge;
@@ -15,7 +16,7 @@ use super::exit::Exit;
 use super::outcome::Outcome;
 use super::{arguments, files, keep_what_there_is};
 use cft_ident_files::config::trajectory::FourierSection;
-use cft_ident_files::config::{RobotFile, Trajectory};
+use cft_ident_files::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_plant::excite::blend::Blend;
 use cft_ident_plant::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
@@ -31,6 +32,7 @@ use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::{Report, stages};
 
+use aim::Aim;
 use judge::{head, judged, refuse_broken};
 use names::Names;
 
@@ -38,6 +40,7 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident excite -r configs/cft.toml -o excitation.toml --plot excitation.svg
   cft-ident excite -r configs/cft.toml --joint q4 -o ladder.toml
+  cft-ident excite -m model.toml --for weak -o next.toml
   cft-ident excite --check configs/table3.toml";
 
 /// Design a motion for identification that keeps every limit, or check one that exists.
@@ -49,18 +52,19 @@ Example:
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// Robot file, or a built-in one
-    #[arg(
-        short,
-        long,
-        value_name = "ROBOT.toml",
-        default_value = "configs/cft.toml"
-    )]
-    pub robot: PathBuf,
+    /// Robot file, or a built-in one [default: the robot of the model, without a model configs/cft.toml]
+    #[arg(short, long, value_name = "ROBOT.toml")]
+    pub robot: Option<PathBuf>,
     /// Model file that torques and volts are foreseen with, limits kept for the 95 % band of its parameters
     /// [default: nominal numbers, or the inertials of the robot file; without any, torques are not foreseen]
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
+    /// What the next motion is for: the weak parameters of the model, whose intervals it narrows together with the
+    /// logs that there are, or an effect that the logs do not tell from its like. Limits that the robot file does not
+    /// give are the positions, speeds and torques of the model's logs
+    #[arg(long = "for", value_name = "weak|EFFECT:JOINT", requires = "model",
+          conflicts_with_all = ["check", "joint", "criterion", "parameters"])]
+    pub aim: Option<String>,
     /// Trajectory to judge instead of a design; status 1 when it breaks a limit
     #[arg(long, value_name = "TRAJECTORY.toml", conflicts_with_all = ["output", "with", "trajectories"])]
     pub check: Option<PathBuf>,
@@ -203,6 +207,10 @@ struct Bench<'a> {
     context: &'a Context,
     file: RobotFile,
     machine: ForeseenRobot,
+    /// Name of the file that the robot is from.
+    robot: String,
+    model: Option<ModelFile>,
+    aim: Option<Aim>,
     rate_hz: f64,
     inputs: Vec<Provenance>,
 }
@@ -213,7 +221,7 @@ struct Bench<'a> {
 /// Every [`CliError`]; a search that is stopped writes the best motion that it has first.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all = Names::of(args);
-    let mut read: Vec<&Path> = vec![&args.robot];
+    let mut read: Vec<&Path> = args.robot.iter().map(PathBuf::as_path).collect();
     read.extend(args.model.as_deref());
     read.extend(args.check.as_deref());
     read.extend(args.offsets.as_deref());
@@ -221,18 +229,35 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs: Vec<&Path> = all.iter().flat_map(Names::paths).collect();
     context.check_outputs(&read, &outputs)?;
 
-    let robot = files::robot(&args.robot)?;
-    let mut inputs = vec![robot.provenance];
-    let model = match &args.model {
-        Some(path) => {
-            let given = files::model_of(path, &robot.value, context)?;
+    let model = args.model.as_deref();
+    let model = model.map(|path| files::model(path, context)).transpose()?;
+    let mut inputs = Vec::new();
+    let (robot, mut file) = match (&args.robot, &model) {
+        (None, Some(given)) => (given.name.clone(), given.value.robot.clone()),
+        (path, _) => {
+            let path = path.as_deref().unwrap_or(Path::new(ROBOT));
+            let given = files::robot(path)?;
             inputs.push(given.provenance);
-            Some((given.name, given.value))
+            let name = path.file_name().unwrap_or_default();
+            (name.to_string_lossy().into_owned(), given.value)
         }
-        None => None,
     };
-    let named = model.as_ref().map(|(name, model)| (name.as_str(), model));
-    let mut machine = machine(&robot.value, named)?;
+    if let Some(given) = &model {
+        given.value.belongs_to(&given.name, &file)?;
+        inputs.push(given.provenance.clone());
+    }
+    let named = model
+        .as_ref()
+        .map(|given| (given.name.as_str(), &given.value));
+    let aim = args
+        .aim
+        .as_ref()
+        .map(|text| Aim::of(text, &file))
+        .transpose()?;
+    if let (Some(_), Some((_, model))) = (&aim, named) {
+        aim::within_seen(&mut file, model);
+    }
+    let mut machine = machine(&file, named)?;
     let names = machine.coordinate_names();
     if let Some(from) = args.from.as_ref().filter(|from| from.len() != names.len()) {
         return Err(
@@ -245,21 +270,35 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         std::f64::consts::TAU * args.frequency,
         usize::from(args.harmonics),
     );
-    given::noise(&robot.value, &usual, &mut machine);
+    given::noise(&file, &usual, &mut machine);
+    let rate_hz = args.rate.or(file.control.rate_hz).unwrap_or(RATE_HZ);
+    if let (Some(_), Some((_, model))) = (&aim, named) {
+        aim::noise(model, rate_hz, &mut machine);
+    }
     let mut bench = Bench {
         args,
         context,
-        rate_hz: args.rate.or(robot.value.control.rate_hz).unwrap_or(RATE_HZ),
-        file: robot.value,
+        rate_hz,
+        file,
         machine,
+        robot,
+        model: model.map(|given| given.value),
+        aim,
         inputs,
     };
-    match (&args.check, &args.joint) {
+    let joint = match (&args.joint, &bench.aim) {
+        (_, Some(Aim::Ladder { joint, .. })) => Some(joint.clone()),
+        (joint, _) => joint.clone(),
+    };
+    match (&args.check, joint) {
         (Some(path), _) => check(&mut bench, path, &all[0]),
-        (None, Some(joint)) => ladder(&bench, joint, &all[0]),
+        (None, Some(joint)) => ladder(&bench, &joint, &all[0]),
         (None, None) => designs(&mut bench, &all),
     }
 }
+
+/// The robot where neither a robot file nor a model is given.
+const ROBOT: &str = "configs/cft.toml";
 
 /// Rate of a log where nothing says [Hz].
 const RATE_HZ: f64 = 1000.0;
@@ -301,7 +340,10 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
 fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
     LadderTask {
         joint: joint.to_owned(),
-        seconds: bench.args.seconds,
+        seconds: match &bench.aim {
+            Some(Aim::Ladder { seconds, .. }) => *seconds,
+            _ => bench.args.seconds,
+        },
         seed: bench.args.seed,
         rate_hz: bench.rate_hz,
         reserve: bench.args.margin,
@@ -316,7 +358,8 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
     bench.context.check()?;
     let trajectory = Trajectory::SingleJoint(found.file);
     let args = bench.args;
-    let motion = Motion::of_file(&bench.machine, &trajectory, args.seconds, args.seed)?;
+    let seconds = ladder_task(bench, joint).seconds;
+    let motion = Motion::of_file(&bench.machine, &trajectory, seconds, args.seed)?;
     let friction = LawForeseen {
         joint: joint.to_owned(),
         parameters: found.expected,
@@ -352,6 +395,12 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     let mut any = false;
     for name in &args.with {
         given::add(bench, name, &mut given, &mut warnings)?;
+        any = true;
+    }
+    if let (Some(Aim::Weak), Some(model)) = (&bench.aim, &bench.model) {
+        let (known, criterion) = aim::weak(bench, model)?;
+        given.add_known(&known.information);
+        task.criterion = criterion;
         any = true;
     }
     let weights = weights(&bench.machine, &task.criterion);

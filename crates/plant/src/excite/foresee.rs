@@ -193,7 +193,7 @@ pub fn foresee(
 }
 
 /// Inverse of G on the directions that are excited, and which unknowns have no part in the others.
-fn inverse(g: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), ExciteError> {
+pub(super) fn inverse(g: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), ExciteError> {
     let p = g.nrows();
     let scale: Vec<f64> = (0..p)
         .map(|i| {

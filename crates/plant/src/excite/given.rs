@@ -12,6 +12,8 @@ use super::machine::ForeseenRobot;
 pub struct GivenInformation {
     /// p x p per joint.
     joints: Vec<DMatrix<f64>>,
+    /// What a model knows, p x p, in rows of unit noise.
+    known: DMatrix<f64>,
 }
 
 impl GivenInformation {
@@ -20,7 +22,13 @@ impl GivenInformation {
         let p = machine.unknowns();
         Self {
             joints: vec![DMatrix::zeros(p, p); machine.coordinates()],
+            known: DMatrix::zeros(p, p),
         }
+    }
+
+    /// Adds what a model knows: the inverse of its covariance.
+    pub fn add_known(&mut self, information: &DMatrix<f64>) {
+        self.known += information;
     }
 
     /// Adds a log's sums, whose filtered and decimated rows stand for `samples` of the log.
@@ -47,10 +55,9 @@ impl GivenInformation {
         }
     }
 
-    /// Sum over the joints, each joint's rows times its weight.
+    /// Sum over the joints, each joint's rows times its weight, and what a model knows.
     pub fn weighted(&self, weights: &[f64]) -> DMatrix<f64> {
-        let p = self.joints.first().map_or(0, DMatrix::nrows);
-        let mut sum = DMatrix::zeros(p, p);
+        let mut sum = self.known.clone();
         for (g, weight) in self.joints.iter().zip(weights) {
             sum += g * (weight * weight);
         }

@@ -7,6 +7,7 @@
 //! | [`machine`], [`limits`] | coordinates to joints, torques and volts; what is bounded |
 //! | [`foreseen`] | the numbers that torques are foreseen with |
 //! | [`criterion`], [`information`] | J_k, J_d, traces, and their slopes |
+//! | [`known`] | what a model knows already, and what is weak in it |
 //! | [`search`] | many starts, an augmented Lagrangian around L-BFGS, repair |
 //! | [`usage`], [`peak`] | how near each limit a motion comes, between samples too |
 //! | [`space`] | points above a floor and in a box, links apart |
@@ -20,6 +21,7 @@ mod from_files;
 pub mod given;
 pub mod information;
 pub mod judgement;
+pub mod known;
 pub mod ladder;
 mod lagrangian;
 pub mod limits;
@@ -40,9 +42,10 @@ pub use foreseen::TorqueSource;
 pub use from_files::{machine, series_of, trajectory};
 pub use given::GivenInformation;
 pub use judgement::{Judgement, Judgements, LawForeseen, MotionTerms, judge};
+pub use known::Known;
 pub use motion::Motion;
 pub use objective::{NoValue, PriorInformation};
-pub use start::usual_torque;
+pub use start::{usual_motion, usual_torque};
 
 use crate::simulate::SimulateError;
 use cft_ident_files::config::{ConfigError, did_you_mean};

@@ -47,6 +47,14 @@ pub(super) fn random_motion(
         .unwrap_or_else(|| series.scaled(0.0))
 }
 
+/// A random motion that fills the limits: what stands for a usual one.
+pub fn usual_motion(machine: &ForeseenRobot, fundamental: f64, harmonics: usize) -> Series {
+    let n = machine.coordinates();
+    let channels = &machine.channels;
+    let variables = Variables::new(channels, n, fundamental, harmonics, vec![None; n]);
+    random_motion(machine, channels, &variables, USUAL_SEED, 0)
+}
+
 /// Root mean square of every joint's torque over random motions that fill the limits \[N or N m\]:
 /// what a share of the torque refers to before there is a motion.
 pub fn usual_torque(machine: &ForeseenRobot, fundamental: f64, harmonics: usize) -> Vec<f64> {

@@ -74,7 +74,17 @@ pub fn by_motion(
         error => IdentifyError::ByMotion(error),
     })?;
     drop(work);
-    take(machine, found, &fit, window.is_some());
+    // what least squares does better on blocks set aside, though it has seen them, is not taken from it
+    let taken = fit.after.blocks < fit.before.blocks;
+    found.by_motion = Some(motion_fit(machine, &fit, (window.is_some(), taken)));
+    if !taken {
+        found.warnings.push(
+            "fit to the motion: on blocks set aside it runs no better than least squares of torques, which stands in the model"
+                .to_owned(),
+        );
+        return Ok(());
+    }
+    take(found, &fit);
     let file = found.model(machine, None);
     let model = refined(&file, &machine.name)?;
     let errors = validate(machine, (&model, None), logs, control, &mut |_, _| {})?;
@@ -98,7 +108,7 @@ pub fn by_motion(
 }
 
 /// Puts the numbers of a fit to the motion in place of those of least squares.
-fn take(machine: &LoggedRobot, found: &mut IdentifiedDynamics, fit: &AxisFit, given: bool) {
+fn take(found: &mut IdentifiedDynamics, fit: &AxisFit) {
     let model = &fit.model;
     let mut values = model.model.theta.clone();
     if let JointFriction::ViscousCoulomb(law) = &model.model.friction[0] {
@@ -120,7 +130,6 @@ fn take(machine: &LoggedRobot, found: &mut IdentifiedDynamics, fit: &AxisFit, gi
     }
     let u = found.unknowns.len();
     found.covariance = fit.covariance.view((0, 0), (u, u)).into_owned();
-    let AxisFit { before, after, .. } = *fit;
     if fit.apart < FEW * fit.free.len() as f64 {
         found.warnings.push(format!(
             "fit to the motion: the logs hold {:.0} windows of {} s behind one another for {} numbers; their standard deviations are rough; give longer logs",
@@ -135,13 +144,11 @@ fn take(machine: &LoggedRobot, found: &mut IdentifiedDynamics, fit: &AxisFit, gi
             fit.steps
         ));
     }
-    if after.blocks >= before.blocks {
-        found.warnings.push(
-            "fit to the motion: on blocks set aside it is no better than least squares of torques; take that, without --open-loop"
-                .to_owned(),
-        );
-    }
-    found.by_motion = Some(MotionFit {
+}
+
+/// A fit to the motion as documents hold it: whether its windows were given, and whether it is in the model.
+fn motion_fit(machine: &LoggedRobot, fit: &AxisFit, (given, taken): (bool, bool)) -> MotionFit {
+    MotionFit {
         joint: machine.robot.joint_names()[0].clone(),
         unit: machine.robot.joint_kind(0).position_unit(),
         window_s: fit.window_s,
@@ -149,13 +156,17 @@ fn take(machine: &LoggedRobot, found: &mut IdentifiedDynamics, fit: &AxisFit, gi
         windows: fit.windows as u64,
         windows_apart: fit.apart,
         blocks: BLOCKS as u64,
-        before,
-        after,
+        before: fit.before,
+        after: fit.after,
+        taken,
         status: fit.ending,
         steps: fit.steps as u64,
-        effects: effects(machine, model, fit),
+        effects: match taken {
+            true => effects(machine, &fit.model, fit),
+            false => Vec::new(),
+        },
         tried: fit.tried.clone(),
-    });
+    }
 }
 
 /// Effects as a model file holds them; what the fit left where it was is held.

@@ -142,7 +142,7 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
         Some(FrictionColumns {
             viscous: first + at(Own::Viscous)?,
             coulomb: first + at(Own::Coulomb)?,
-            speed: fastest.get(j).copied().unwrap_or(f64::INFINITY),
+            speed: fastest[j],
         })
     };
     let each = columns.own.iter().enumerate();
@@ -152,7 +152,7 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
 /// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached.
 ///
 /// # Errors
-/// [`cft_ident_core::inertia::solution::FitError`].
+/// [`FitError`].
 pub(super) fn consistent(
     machine: &LoggedRobot,
     estimated: &Estimated,

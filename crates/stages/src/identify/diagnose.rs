@@ -13,10 +13,12 @@ use super::known_friction::before_these;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, own_laws, refined};
+use super::open_loop::{is_in_si, spoiled, whole};
 use super::position_cutoff::known;
 use super::prior::{information, moved_alone, open};
 use super::repeated::each_row_once;
 use super::temperatures;
+use crate::open_loop::{FreeRun, Span, free_run};
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
     self, Case, DiagnoseError, Diagnosis, FoundEffect, Heard, LogRole, ParameterPrior, Unknown,
@@ -24,7 +26,7 @@ use cft_ident_core::diagnose::{
 };
 use cft_ident_core::effect::{self, AugmentedModel, EffectNumber};
 use cft_ident_core::judge::NUMBERS;
-use cft_ident_core::motion::ParallelFilters;
+use cft_ident_core::motion::{ParallelFilters, Stretch};
 use cft_ident_core::robot::drive::JointDrive;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::model::JointFriction;
@@ -77,6 +79,8 @@ pub struct Diagnosed {
     pub given: AugmentedModel,
     /// What the refined model leaves of data set aside.
     pub held: Held,
+    /// The motion that the models make of measured torques on held-out data, or on all where there are none.
+    pub free_run: Option<FreeRun>,
     /// What a refined model keeps of the friction before these logs.
     friction_prior: Vec<FrictionPrior>,
     /// Effects of the user's own that were tried.
@@ -131,7 +135,7 @@ pub fn diagnose(
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
     // what is looked for stands beside the plain fit
-    let plain = file.as_fitted();
+    let (as_given, plain) = (file, file.as_fitted());
     let file = &plain;
     let given = refined(file, name)?;
     check_candidates(&settings.candidates, machine, (name, file))?;
@@ -235,6 +239,7 @@ pub fn diagnose(
         logs,
         given: case.given,
         held: Held::default(),
+        free_run: None,
         friction_prior,
         candidates: settings.candidates.clone(),
         hold_friction: settings.hold_friction,
@@ -251,6 +256,10 @@ pub fn diagnose(
         );
         found.held = or_warning(tried, &mut found.in_memory.warnings)?;
     }
+    let _work = control.begin("free run", None);
+    found.free_run = found.run_freely(machine, (name, as_given))?;
+    let spoiled = found.free_run.as_ref().and_then(spoiled);
+    found.in_memory.warnings.extend(spoiled);
     Ok(DiagnoseEnd::Diagnosed(Box::new(found)))
 }
 
@@ -341,6 +350,51 @@ fn drives(machine: &LoggedRobot) -> Vec<JointDrive> {
 }
 
 impl Diagnosed {
+    /// The free run of the model given and of the one that is written, with the parameters in use.
+    fn run_freely(
+        &self,
+        machine: &LoggedRobot,
+        (name, given): (&str, &ModelFile),
+    ) -> Result<Option<FreeRun>, IdentifyError> {
+        if !is_in_si(machine) {
+            return Ok(None);
+        }
+        let before = refined(given, name)?;
+        let after = match self.diagnosis.written().next() {
+            None => None,
+            Some(_) => Some(refined(&self.model(machine, given), name)?),
+        };
+        let stretches = &self.in_memory.stretches;
+        let spans = self.held_out_spans();
+        Ok(free_run(&before, after.as_ref(), stretches, &spans))
+    }
+
+    /// Held-out spans of the stretches; all of them where nothing is held out.
+    fn held_out_spans(&self) -> Vec<Span> {
+        let (inputs, stretches) = (&self.in_memory.inputs, &self.in_memory.stretches);
+        let of_log = |s: &Stretch| inputs[s.log].role == Some(DataRole::HeldOut);
+        let aside = |s: &Stretch, t: f64| {
+            let mut blocks = self.diagnosis.set_aside.iter();
+            blocks.any(|a| {
+                a.role == LogRole::Holdout && a.log == s.log && (a.from_s..=a.to_s).contains(&t)
+            })
+        };
+        let mut spans = Vec::new();
+        for (number, s) in stretches.iter().enumerate() {
+            let held = |k: &usize| of_log(s) || aside(s, s.own_time(*k));
+            let mut from = (0..s.len()).find(held);
+            while let Some(begin) = from {
+                let until = (begin..s.len()).find(|k| !held(k)).unwrap_or(s.len());
+                spans.push((number, begin, until));
+                from = (until..s.len()).find(held);
+            }
+        }
+        match spans.is_empty() {
+            true => whole(stretches),
+            false => spans,
+        }
+    }
+
     /// Estimated parameters of an effect with their standard deviations.
     pub fn told(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
         let effect = &step.estimate;

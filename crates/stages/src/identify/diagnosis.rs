@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use super::diagnose::{DataFault, Diagnosed};
 use super::logged_robot::LoggedRobot;
 use super::separate::separating_command;
+use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
     Dependence, Errors, FoundEffect, FrictionChange, JointChange, LeftCandidate, LogRole, Signal,
@@ -31,6 +32,8 @@ pub struct DiagnosisResult {
     pub holdout_had_a_say: bool,
     /// What the parts of the data are.
     pub blocks: Option<BlocksResult>,
+    /// The motion that the models make of the measured torques in windows; null where the logs do not allow it.
+    pub free_run: Option<FreeRun>,
     /// Friction that changes from a time on.
     pub changes: Vec<ChangeResult>,
     pub unexplained: Vec<UnexplainedResult>,
@@ -232,6 +235,7 @@ impl DataFault {
             written: None,
             holdout_had_a_say: false,
             blocks: None,
+            free_run: None,
             changes: Vec::new(),
             unexplained: Vec::new(),
             dependence: Vec::new(),
@@ -300,6 +304,7 @@ impl Diagnosed {
                 parts_needed: d.parts_needed,
                 block_s: d.block_s,
             }),
+            free_run: self.free_run.clone(),
             changes: d.changes.iter().map(change).collect(),
             unexplained: left.collect(),
             dependence: d.dependence.iter().map(|d| dependence(names, d)).collect(),

@@ -50,12 +50,16 @@ struct Pieces {
 }
 
 impl Pieces {
-    /// So many of all rows.
-    fn of(most: u64, rows: u64, log: &Provenance) -> Self {
-        Self {
-            length_s: log.duration_s / PIECES,
-            share: (most as f64 / rows.max(1) as f64).min(1.0),
-        }
+    /// So many rows of these logs together.
+    fn of_each(most: u64, logs: &[Provenance]) -> Vec<Self> {
+        let rows: u64 = logs.iter().map(|log| log.samples).sum();
+        let share = (most as f64 / rows.max(1) as f64).min(1.0);
+        let length = |log: &Provenance| log.duration_s / PIECES;
+        let each = logs.iter().map(|log| Self {
+            length_s: length(log),
+            share,
+        });
+        each.collect()
     }
 
     fn keep(&self, block: &mut Block, first: f64) {
@@ -101,13 +105,50 @@ pub(super) fn on_other_logs(
     Ok((held, inputs))
 }
 
+/// Logs smoothed by these settings; of long ones pieces all along them.
+///
+/// # Errors
+/// Logs that cannot be used.
+pub(super) fn read_pieces(
+    machine: &LoggedRobot,
+    settings: &FilterSettings,
+    model: &AugmentedModel,
+    (logs, inputs): (&[Log], &[Provenance]),
+    control: &Control,
+) -> Result<Vec<Stretch>, IdentifyError> {
+    let n = machine.robot.joints();
+    let pieces = Pieces::of_each(MOST_ROWS, inputs);
+    let mut all = Vec::new();
+    for ((index, log), pieces) in logs.iter().enumerate().zip(&pieces) {
+        let mut open = machine.open(log, control)?;
+        let mut first = None;
+        let (mut found, _) = stretches(index, n, settings, &mut |block| {
+            let more = open.read(block)?;
+            if let Some(t) = block.t.first() {
+                pieces.keep(block, *first.get_or_insert(*t));
+            }
+            Ok(more)
+        })
+        .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+        open.count_run_time(&mut found);
+        if model.takes_temperatures() {
+            let temperatures = machine.temperatures_for(model, log, open.origin())?;
+            for stretch in &mut found {
+                stretch.temperature = temperatures.along(&stretch.t, n);
+            }
+        }
+        all.extend(found);
+    }
+    Ok(all)
+}
+
 struct Trial<'a> {
     machine: &'a LoggedRobot,
     settings: FilterSettings,
     file: &'a ModelFile,
     model: &'a AugmentedModel,
     logs: &'a [Log],
-    pieces: Vec<Pieces>,
+    inputs: &'a [Provenance],
     observed: Vec<Pieces>,
     control: &'a Control,
 }
@@ -116,29 +157,26 @@ impl<'a> Trial<'a> {
     fn new(
         machine: &'a LoggedRobot,
         (file, model): (&'a ModelFile, &'a AugmentedModel),
-        (logs, inputs): (&'a [Log], &[Provenance]),
+        (logs, inputs): (&'a [Log], &'a [Provenance]),
         control: &'a Control,
     ) -> Self {
-        let rows = inputs.iter().take(logs.len()).map(|log| log.samples).sum();
-        let each = |most: u64| {
-            let inputs = inputs.iter();
-            inputs.map(|log| Pieces::of(most, rows, log)).collect()
-        };
+        let inputs = &inputs[..logs.len().min(inputs.len())];
         Self {
             machine,
             settings: machine.settings(),
             file,
             model,
             logs,
-            pieces: each(MOST_ROWS),
-            observed: each(MOST_OBSERVED),
+            inputs,
+            observed: Pieces::of_each(MOST_OBSERVED, inputs),
             control,
         }
     }
 
     fn run(&self, folds: usize) -> Result<Held, IdentifyError> {
         let work = self.control.begin("held-out data", None);
-        let stretches = self.read()?;
+        let logs = (self.logs, self.inputs);
+        let stretches = read_pieces(self.machine, &self.settings, self.model, logs, self.control)?;
         let folds = Folds::of(&stretches, folds);
         let failed = |error| IdentifyError::motion(&self.logs[0].name(), error);
         let models = match folds.count() {
@@ -180,35 +218,6 @@ impl<'a> Trial<'a> {
             friction: friction.collect(),
             offset: offset.collect(),
         }
-    }
-
-    /// Pieces of the logs, smoothed.
-    fn read(&self) -> Result<Vec<Stretch>, IdentifyError> {
-        let n = self.machine.robot.joints();
-        let mut all = Vec::new();
-        for (index, log) in self.logs.iter().enumerate() {
-            let mut open = self.machine.open(log, self.control)?;
-            let mut first = None;
-            let (mut found, _) = stretches(index, n, &self.settings, &mut |block| {
-                let more = open.read(block)?;
-                if let Some(t) = block.t.first() {
-                    let first = *first.get_or_insert(*t);
-                    self.pieces[index].keep(block, first);
-                }
-                Ok(more)
-            })
-            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
-            open.count_run_time(&mut found);
-            if self.model.takes_temperatures() {
-                let temperatures =
-                    (self.machine).temperatures_for(self.model, log, open.origin())?;
-                for stretch in &mut found {
-                    stretch.temperature = temperatures.along(&stretch.t, n);
-                }
-            }
-            all.extend(found);
-        }
-        Ok(all)
     }
 
     /// What each block leaves of the torques by the model of the others.

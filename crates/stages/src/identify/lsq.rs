@@ -18,6 +18,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{new_model, refined};
 use super::motion_fit::MotionFit;
+use super::open_loop::is_in_si;
 use super::own_settings::CutoffCosts;
 use super::passes::Passes;
 use super::position_cutoff::PositionCutoff;
@@ -29,7 +30,7 @@ use super::unknowns::{FittedUnknown, columns, unknowns};
 use super::weakest::{WeakestPart, weakest};
 use crate::setup::Finding;
 use cft_ident_core::inertia::accumulate::RelativeResidual;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::essential::{Essential, essential};
 use cft_ident_core::inertia::gains::by_gains;
 use cft_ident_core::inertia::instruments::ReferenceSource;
@@ -196,15 +197,9 @@ pub fn lsq(
     let (essential, essential_error) = essentials(&estimated)?;
     let resting = estimated.basis.sums.resting_shares();
     // in amperes nothing says what a body can be
-    let in_si = machine.file.without_gains().is_empty()
-        && (0..machine.robot.joints())
-            .all(|j| machine.file.torque_unit(j) == machine.robot.joint_kind(j).torque_unit());
-    let consistent = match settings.consistent && in_si {
+    let consistent = match settings.consistent && is_in_si(machine) {
         true => {
-            let fastest = match below_zero(&estimated) {
-                true => machine.fastest(logs, control)?,
-                false => Vec::new(),
-            };
+            let fastest = machine.fastest(logs, control)?;
             Some(consistent(machine, &estimated, &fastest)?)
         }
         false => None,
@@ -408,21 +403,6 @@ fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
             told.join(", ")
         )
     })
-}
-
-/// Whether some friction of a fit is below zero, so that its sign over the speeds of the logs is to be looked at.
-fn below_zero(estimated: &Estimated) -> bool {
-    let columns = &estimated.basis.sums.columns;
-    let own = columns.own.iter().enumerate();
-    let mut places = own.flat_map(|(j, own)| {
-        let first = columns.first_own(j);
-        let of_friction = |(_, own): &(usize, &Own)| **own != Own::Offset;
-        own.iter()
-            .enumerate()
-            .filter(of_friction)
-            .map(move |(k, _)| first + k)
-    });
-    places.any(|at| estimated.fit.theta[at] < 0.0)
 }
 
 /// Friction and inertias that are below zero by more than two deviations, as a warning.

@@ -103,7 +103,7 @@ pub use lsq::{EssentialFit, IdentifiedDynamics, LsqSettings, lsq};
 pub use model::{new_model, refined, refined_or_friction};
 pub use motion_fit::MotionFit;
 pub use open_log::OpenLog;
-pub use open_loop::open_loop;
+pub use open_loop::{free_run, open_loop};
 pub use passes::SimulatedLoop;
 pub use payload::{GainOff, LeftOfJoint, Number95, Payload, PayloadReading, payload};
 pub use position_cutoff::PositionCutoff;

@@ -26,6 +26,8 @@ pub struct MotionFit {
     /// The model of least squares.
     pub before: PositionErrors,
     pub after: PositionErrors,
+    /// It is in the model: on blocks set aside it runs better than least squares.
+    pub taken: bool,
     pub status: Ending,
     pub steps: u64,
     /// Friction that was added.

@@ -14,7 +14,7 @@ use super::reduced::reduced_log::ReducedLog;
 use super::repeated::repeated_rows;
 use super::unknowns::columns;
 use crate::band::{Band, NO_BAND, Reach};
-use crate::open_loop::OpenLoop;
+use crate::open_loop::{FreeRun, OpenLoop};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::columns::Own;
 use cft_ident_core::number;
@@ -36,6 +36,8 @@ pub struct Validated {
     /// Positions that the model makes of the measured torques, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub open_loop: Option<OpenLoop>,
+    /// The motion that the model makes of the measured torques in windows; null where the logs do not allow it.
+    pub free_run: Option<FreeRun>,
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
@@ -401,6 +403,7 @@ fn reconstruct(
     let mut found = Validated {
         by_use,
         open_loop: None,
+        free_run: None,
         validation: all.finish(summary),
         inputs,
         warnings,

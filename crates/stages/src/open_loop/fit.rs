@@ -32,7 +32,7 @@ const SETTLED: f64 = 1e-4;
 const DAMPING: StepControl = StepControl::damping(6.0, 4.0, [1e-6, 1e8]);
 
 /// A span of a stretch: its number, first sample and the one after the last.
-pub(super) type Span = (usize, usize, usize);
+pub type Span = (usize, usize, usize);
 
 /// Windows of so many seconds in spans of stretches.
 pub(super) fn windows(stretches: &[Stretch], spans: &[Span], length_s: f64) -> Vec<Span> {

@@ -6,15 +6,18 @@
 //! until all agree (Moreau 1988): a joint that rests stays at rest, however long the step. A model is told by it
 //! where torques alone hardly tell: errors of slow friction and of gravity add up.
 //!
-//! [`fit_axis`] moves the numbers of a single axis until its motion is that of the log.
+//! [`free_run`] says how the error grows in windows, and whether a changed model runs worse. [`fit_axis`] moves the
+//! numbers of a single axis until its motion is that of the log.
 
 mod choose;
 mod fit;
+mod free_run;
 mod numbers;
 mod stepper;
 mod windows;
 
 pub use choose::{AxisError, AxisFit, BLOCKS, PositionErrors, TriedAxis, fit_axis};
-
+pub use fit::Span;
+pub use free_run::{Change, FREE_RUN_S, FreeRun, JointFreeRun, PositionError, free_run};
 pub use stepper::Stepper;
 pub use windows::{JointDrift, OpenLoop, WindowLength, along};

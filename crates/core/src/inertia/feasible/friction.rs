@@ -10,8 +10,19 @@ use crate::inertia::solution::FitError;
 pub struct FrictionColumns {
     pub viscous: usize,
     pub coulomb: usize,
-    /// \[m/s or rad/s\]
+    /// Infinite where it is to take power at every speed \[m/s or rad/s\].
     pub speed: f64,
+}
+
+impl FrictionColumns {
+    /// What is below zero where the friction drives at its greatest speed.
+    fn at_speed(&self, coulomb: f64, viscous: f64) -> f64 {
+        match self.speed.is_finite() {
+            true => coulomb + self.speed * viscous,
+            // whatever the level at rest, the slope decides
+            false => viscous,
+        }
+    }
 }
 
 /// What of a joint's friction is held at nothing.
@@ -59,14 +70,14 @@ pub fn with_friction(
         let mut found = feasible(&restricted)?;
         let mut next = held.clone();
         for ((of, held), next) in friction.iter().zip(&held).zip(&mut next) {
-            if *held == Held::AtSpeed {
+            if *held == Held::AtSpeed && of.speed.is_finite() {
                 found.theta[of.coulomb] = -of.speed * found.theta[of.viscous];
             }
             let at_rest = found.theta[of.coulomb];
             // exactly nothing where it is held there
             let at_speed = match held {
                 Held::AtSpeed => 0.0,
-                _ => at_rest + of.speed * found.theta[of.viscous],
+                _ => of.at_speed(at_rest, found.theta[of.viscous]),
             };
             *next = held.after(at_rest, at_speed);
         }
@@ -81,17 +92,72 @@ pub fn with_friction(
 fn restricted(factor: &DMatrix<f64>, friction: &[FrictionColumns], held: &[Held]) -> DMatrix<f64> {
     let mut out = factor.clone();
     for (of, held) in friction.iter().zip(held) {
-        if *held == Held::AtSpeed {
-            // f_c = - f_v times the speed
-            let both = out.column(of.viscous) - out.column(of.coulomb) * of.speed;
-            out.set_column(of.viscous, &both);
-        }
-        if *held != Held::Free {
-            out.column_mut(of.coulomb).fill(0.0);
+        match held {
+            Held::AtSpeed if of.speed.is_finite() => {
+                // f_c = - f_v times the speed
+                let both = out.column(of.viscous) - out.column(of.coulomb) * of.speed;
+                out.set_column(of.viscous, &both);
+                out.column_mut(of.coulomb).fill(0.0);
+            }
+            Held::AtSpeed => out.column_mut(of.viscous).fill(0.0),
+            Held::AtRest | Held::Whole => out.column_mut(of.coulomb).fill(0.0),
+            Held::Free => {}
         }
         if *held == Held::Whole {
             out.column_mut(of.viscous).fill(0.0);
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::{JointKind, Robot};
+
+    /// What a single joint makes of rows that want this friction, asked to take power up to `speed`.
+    fn found(wanted: [f64; 2], speed: f64) -> Vec<f64> {
+        let robot = Robot::single_joint("q1", JointKind::Revolute);
+        let map = robot.standard_map();
+        let mut factor = DMatrix::identity(4, 4);
+        for (k, value) in [0.5, wanted[0], wanted[1]].into_iter().enumerate() {
+            factor[(k, 3)] = value;
+        }
+        let task = ConsistencyProblem {
+            map: &map,
+            bodies: &[None],
+            factor: &factor,
+            effective: 1.0,
+        };
+        let columns = [FrictionColumns {
+            viscous: 1,
+            coulomb: 2,
+            speed,
+        }];
+        let found = with_friction(&task, &columns).unwrap();
+        found.theta.iter().copied().collect()
+    }
+
+    #[test]
+    fn friction_takes_power_up_to_its_speed_and_every_number_is_finite() {
+        for wanted in [
+            [0.3, 0.2],
+            [-0.3, 0.2],
+            [0.3, -0.2],
+            [-0.3, -0.2],
+            [0.0, 0.0],
+        ] {
+            for speed in [0.0, 1.0, 1e3, f64::INFINITY] {
+                let theta = found(wanted, speed);
+                assert!(theta.iter().all(|x| x.is_finite()), "{wanted:?} {speed}");
+                let (viscous, coulomb) = (theta[1], theta[2]);
+                let fast = if speed.is_finite() { speed } else { 1e6 };
+                assert!(coulomb >= 0.0, "{wanted:?} {speed}: {theta:?}");
+                assert!(
+                    coulomb + fast * viscous >= -1e-12,
+                    "{wanted:?} {speed}: {theta:?}"
+                );
+            }
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 pub mod effects;
 pub mod fit;
+pub mod free_run;
 pub mod friction;
 pub mod parameters;
 pub mod provenance;

@@ -6,7 +6,9 @@ use super::step_words::{alternatives, grade, in_words, worsened};
 use super::{first_screen, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
-use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
+use crate::report::sections::{
+    fit, free_run, friction, parameters, provenance, residual, sketch, torque,
+};
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer, summary};
 use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, LeftCandidate, SplitErrors};
@@ -41,6 +43,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut page = report.page();
     first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
+    free_run::section(&mut page, of.found.free_run.as_ref());
     report
 }
 
@@ -100,6 +103,7 @@ pub fn told(report: &mut Report, machine: &LoggedRobot, found: &Diagnosed) {
     for (i, step) in d.steps.iter().enumerate() {
         step_told(&mut detail, machine, found, (i + 1, step));
     }
+    free_run::section(&mut detail, found.free_run.as_ref());
     detail.list(doubts(machine, found));
     report
         .terminal()
@@ -110,9 +114,6 @@ pub fn told(report: &mut Report, machine: &LoggedRobot, found: &Diagnosed) {
     let mut terminal = report.terminal();
     terminal.line("");
     terminal.note("", &first_screen::next(machine, found), 2);
-    if let Some(command) = first_screen::next_command(machine, found) {
-        terminal.code(&command);
-    }
 }
 
 /// Errors joint by joint, those of a screen.

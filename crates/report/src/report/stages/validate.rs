@@ -2,7 +2,9 @@
 
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, JointTorque, TorqueFigure};
 use crate::report::sections::quality::{self, Inspected};
-use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
+use crate::report::sections::{
+    fit, free_run, friction, parameters, provenance, residual, sketch, torque,
+};
 use crate::report::table::unbroken;
 use crate::report::{Report, Writer, summary, usual};
 use cft_ident_core::effect::AugmentedModel;
@@ -56,6 +58,7 @@ pub fn validate(of: &Validate) -> Report {
         let caption = format!("{}, which the model was made from", caption(&used.logs));
         detail.table(summary::torque_errors(&caption, &used.errors.joints));
     }
+    free_run::section(&mut report.detail(), of.found.free_run.as_ref());
     overall(&mut report.detail(), judged);
     let mut page = report.page();
     page.figure(&bars(of).svg());
@@ -65,6 +68,7 @@ pub fn validate(of: &Validate) -> Report {
         let caption = format!("errors on {logs}, which the model was made from");
         errors(&mut page, &used.errors, &caption);
     }
+    free_run::section(&mut page, of.found.free_run.as_ref());
     report
 }
 

@@ -1,0 +1,100 @@
+//! What the next motion is for: weak parameters of a model, or an effect that the logs do not tell from its like.
+
+use super::Bench;
+use crate::cli::error::CliError;
+use cft_ident_core::effect::entry;
+use cft_ident_files::config::{ModelFile, RobotFile};
+use cft_ident_logs::log::escape;
+use cft_ident_plant::excite::information::Information;
+use cft_ident_plant::excite::machine::ForeseenRobot;
+use cft_ident_plant::excite::{Criterion, ExciteError, Known, usual_motion};
+use cft_ident_stages::identify::LoggedRobot;
+
+/// Samples of a period of the motion that stands for a usual one.
+const SAMPLES: usize = 100;
+
+/// What the next motion is for.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Aim {
+    /// The parameters that are not identified.
+    Weak,
+    /// An effect of a joint, which a ladder of speeds of that joint alone separates.
+    Ladder { joint: String, seconds: f64 },
+}
+
+impl Aim {
+    /// `weak`, or `EFFECT:JOINT`.
+    pub fn of(text: &str, file: &RobotFile) -> Result<Self, CliError> {
+        let Some((name, joint)) = text.split_once(':') else {
+            return match text {
+                "weak" => Ok(Self::Weak),
+                _ => Err(CliError::usage(format!(
+                    "--for takes `weak` or EFFECT:JOINT, and not `{}`",
+                    escape(text)
+                ))),
+            };
+        };
+        let effect = entry(name).ok_or_else(|| {
+            CliError::usage(format!("no effect is called `{}`", escape(name)))
+                .hint("`diagnose` names the effects that it finds")
+        })?;
+        let joints = file.robot().joint_names().to_vec();
+        if !joints.iter().any(|known| known == joint) {
+            return Err(
+                CliError::usage(format!("the robot has no joint `{}`", escape(joint)))
+                    .hint(format!("its joints are {}", escape(&joints.join(", ")))),
+            );
+        }
+        match effect.ladder {
+            Some(ladder) => Ok(Self::Ladder {
+                joint: joint.to_owned(),
+                seconds: f64::from(ladder.seconds),
+            }),
+            None => Err(CliError::input(format!(
+                "no motion of {} alone separates {name} from its like",
+                escape(joint)
+            ))
+            .hint(format!("what does: {}", effect.separate_by))),
+        }
+    }
+}
+
+/// Limits where the robot file gives none: what the logs of the model have seen.
+pub(super) fn within_seen(file: &mut RobotFile, model: &ModelFile) {
+    for held in &model.held_out {
+        let limits = file.limits.entry(held.joint.clone()).or_default();
+        limits.position = limits.position.or(Some(held.positions_seen));
+        limits.speed = limits.speed.or(Some(held.speed_seen));
+        limits.torque = limits.torque.or(Some(held.torque_seen));
+    }
+}
+
+/// The noise of every joint as the fit of a model left it: its rows are independent at twice the cut-off.
+pub(super) fn noise(model: &ModelFile, rate_hz: f64, machine: &mut ForeseenRobot) {
+    let logged = LoggedRobot::new("", model.robot.clone());
+    let rows = (rate_hz / (2.0 * logged.settings().cutoff_hz)).max(1.0);
+    let names = machine.model.robot.joint_names();
+    for (noise, name) in machine.noise.iter_mut().zip(names) {
+        if let Some(std) = model.residual_std.get(name).filter(|std| **std > 0.0) {
+            *noise = std * rows.sqrt();
+        }
+    }
+}
+
+/// What a model knows, and the criterion that narrows what is weak in it.
+pub(super) fn weak(bench: &Bench, model: &ModelFile) -> Result<(Known, Criterion), CliError> {
+    let (args, machine) = (bench.args, &bench.machine);
+    let known = Known::of(machine, model);
+    if known.weak.is_empty() {
+        return Err(CliError::input(
+            "every parameter of the model is identified: no motion is called for".to_owned(),
+        )
+        .hint("`--for EFFECT:JOINT` separates an effect; without --for a motion is designed for all parameters"));
+    }
+    let fundamental = std::f64::consts::TAU * args.frequency;
+    let series = usual_motion(machine, fundamental, usize::from(args.harmonics));
+    let usual = Information::of_period(machine, &series, SAMPLES).map_err(ExciteError::Robot)?;
+    let rows = bench.rate_hz * series.period() * f64::from(args.periods);
+    let factors = known.factors(machine, (&usual, rows))?;
+    Ok((known, Criterion::AOptimal(factors)))
+}
