@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::arms;
 use cft_ident::number::{percent, significant, value_and_std};
+use cft_ident::report::usual::{Measured, Over, PUBLISHED, Published};
 use serde_json::Value;
 
 pub type Rendered = Result<String, String>;
@@ -24,6 +25,7 @@ pub fn render(words: &[&str]) -> Rendered {
         ["arm-errors", names @ ..] => arms::errors(names),
         ["arm-friction", names @ ..] => arms::friction(names),
         ["arm-parameters", names @ ..] => arms::named(names),
+        ["usual"] => Ok(usual()),
         ["left-out", result] => Ok(left_out(&json(result)?)),
         ["replay", result] => Ok(replay(&json(result)?)),
         ["text", name] => {
@@ -462,6 +464,37 @@ fn study(study: &Value) -> Rendered {
         text(&study["command"]),
         table(&headers, &lines)
     ))
+}
+
+/// Errors of published models.
+fn usual() -> String {
+    let error = |value: Option<f64>| value.map_or("-".to_owned(), percent);
+    let line = |row: &Published| {
+        vec![
+            row.machine.to_owned(),
+            match row.measured {
+                Measured::Sensors => "joint sensors".to_owned(),
+                Measured::Currents => "motor currents".to_owned(),
+            },
+            match row.over {
+                Over::All => "all torques".to_owned(),
+                Over::Joints => "rms over joints".to_owned(),
+            },
+            error(row.fitted),
+            error(row.unseen),
+            row.source.to_owned(),
+        ]
+    };
+    let lines: Vec<Vec<String>> = PUBLISHED.iter().map(line).collect();
+    let columns = [
+        "<machine",
+        "<torques from",
+        "<error over",
+        "fitted",
+        "not fitted",
+        "<source",
+    ];
+    table(&columns, &lines)
 }
 
 /// A cell as it is where it is text, with four digits where it is a number.

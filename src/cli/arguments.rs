@@ -52,7 +52,7 @@ impl fmt::Display for Destination {
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct LeaveOut {
     /// Leave out a stretch of every LOG, in seconds after its first row; may be given more than once
-    #[arg(long, value_name = "FROM..TOs", value_parser = stretch)]
+    #[arg(hide_short_help = true, long, value_name = "FROM..TOs", value_parser = stretch)]
     pub leave_out: Vec<[f64; 2]>,
 }
 

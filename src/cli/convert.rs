@@ -40,10 +40,15 @@ pub struct Args {
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: Option<String>,
     /// Topic to write, where a recording holds the joint states of several machines
-    #[arg(long, value_name = "NAME", conflicts_with = "robot")]
+    #[arg(
+        hide_short_help = true,
+        long,
+        value_name = "NAME",
+        conflicts_with = "robot"
+    )]
     pub topic: Option<String>,
     /// Leave out rows without a time, or with more or fewer fields than the header names, and go on
-    #[arg(long)]
+    #[arg(hide_short_help = true, long)]
     pub drop_rows: bool,
 }
 

@@ -35,34 +35,34 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
     /// Log that judges what is added and is never fitted; may be given more than once
-    #[arg(long, value_name = "LOG")]
+    #[arg(hide_short_help = true, long, value_name = "LOG")]
     pub veto: Vec<LogSpec>,
     /// Log that is evaluated once, after everything is decided; may be given more than once
     #[arg(long, value_name = "LOG")]
     pub holdout: Vec<LogSpec>,
     /// Effects of your own to try beside the known ones: [[candidate]] tables with formulas in q, v, a, load and t
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(hide_short_help = true, long, value_name = "FILE.toml")]
     pub candidates: Option<PathBuf>,
     /// Keep the inertial parameters of the given model: finds payload, gain and tilt
     #[arg(long)]
     pub keep: bool,
     /// Leave the friction of the model file as it is; its covariance stays in the deviations
-    #[arg(long, conflicts_with = "keep")]
+    #[arg(hide_short_help = true, long, conflicts_with = "keep")]
     pub hold_friction: bool,
     /// Write the midpoint between the given model and the refined one
-    #[arg(long)]
+    #[arg(hide_short_help = true, long)]
     pub cautious: bool,
     /// Write this effect whatever the data say, as NAME or NAME:JOINT; may be given more than once
-    #[arg(long, value_name = "EFFECT:JOINT")]
+    #[arg(hide_short_help = true, long, value_name = "EFFECT:JOINT")]
     pub accept: Vec<String>,
     /// Go on with the set-up as it is declared, whatever the torques say
-    #[arg(long)]
+    #[arg(hide_short_help = true, long)]
     pub as_declared: bool,
     /// Refined model file to write: the given one, byte for byte, where nothing is confirmed
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
     /// Draw the residual before and after; may be given more than once
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]

@@ -57,16 +57,21 @@ pub struct Args {
     pub urdf: Option<PathBuf>,
     /// URDF of the same robot whose meshes, names and frames the one of --urdf keeps: only inertials and
     /// friction are replaced
-    #[arg(long, value_name = "FILE.urdf", requires = "urdf")]
+    #[arg(
+        hide_short_help = true,
+        long,
+        value_name = "FILE.urdf",
+        requires = "urdf"
+    )]
     pub urdf_source: Option<PathBuf>,
     /// MJCF file of MuJoCo to write
     #[arg(long, value_name = "FILE.xml", group = "into", value_parser = arguments::mjcf_file)]
     pub mjcf: Option<PathBuf>,
     /// SDF file of Gazebo to write
-    #[arg(long, value_name = "FILE.sdf", group = "into", value_parser = arguments::sdf_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.sdf", group = "into", value_parser = arguments::sdf_file)]
     pub sdf: Option<PathBuf>,
     /// USD file of Isaac Sim to write, as text
-    #[arg(long, value_name = "FILE.usda", group = "into", value_parser = arguments::usd_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.usda", group = "into", value_parser = arguments::usd_file)]
     pub usd: Option<PathBuf>,
     /// C99 header to write
     #[arg(long, value_name = "FILE.h", group = "into", value_parser = arguments::header_file)]
@@ -75,13 +80,13 @@ pub struct Args {
     #[arg(long, value_name = "FILE.rs", group = "into", value_parser = arguments::rust_file)]
     pub rust: Option<PathBuf>,
     /// Rate at which rows arrive [Hz]: header and module get the observer of `watch` for it
-    #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
+    #[arg(hide_short_help = true, long, value_name = "HZ", value_parser = arguments::positive)]
     pub observer: Option<f64>,
     /// False alarms an hour that the limits of the observer are for
-    #[arg(long, value_name = "PER_HOUR", default_value_t = 1.0, requires = "observer", value_parser = arguments::positive)]
+    #[arg(hide_short_help = true, long, value_name = "PER_HOUR", default_value_t = 1.0, requires = "observer", value_parser = arguments::positive)]
     pub false_alarms: f64,
     /// Leave out the [[effect]] tables of the model; the files say so
-    #[arg(long)]
+    #[arg(hide_short_help = true, long)]
     pub without_effects: bool,
 }
 

@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
     /// Draw the friction curves; may be given more than once
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
@@ -46,7 +46,7 @@ pub struct Args {
     #[command(flatten)]
     pub setup: setup::SetupArgs,
     /// Seed of the starting points
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
 }
 

@@ -21,7 +21,7 @@ Example:
 ///
 /// Where the robot file says that friction is fitted together with the inertias, -m is left out.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE, override_usage = "cft-ident lsq [OPTIONS] -r ROBOT.toml -o MODEL.toml LOG...")]
+#[command(visible_alias = "fit", after_help = EXAMPLE, override_usage = "cft-ident lsq [OPTIONS] -r ROBOT.toml -o MODEL.toml LOG...")]
 pub struct Args {
     /// Logs, or reduced ones (PART.cfi); a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
@@ -39,20 +39,20 @@ pub struct Args {
     pub estimator: EstimatorKind,
     /// Fit the gain of every torque channel too, from a log in which the last link carries a known mass
     /// [kg] besides those without it; with no log given, ratios of gains alone
-    #[arg(long, value_name = "LOG:mass=KG[+-STD]", num_args = 0..=1, conflicts_with = "model")]
+    #[arg(hide_short_help = true, long, value_name = "LOG:mass=KG[+-STD]", num_args = 0..=1, conflicts_with = "model")]
     pub fit_gains: Option<Option<KnownPayload>>,
     /// Leave the friction of the model file as it is; its covariance stays in the deviations
-    #[arg(long, requires = "model")]
+    #[arg(hide_short_help = true, long, requires = "model")]
     pub hold_friction: bool,
     /// The plain fit alone: no physically consistent parameters beside it, which torques are computed with
-    #[arg(long)]
+    #[arg(hide_short_help = true, long)]
     pub unconstrained: bool,
     /// Accepted and without effect: physically consistent parameters are always there
     #[arg(long, hide = true)]
     pub feasible: bool,
     /// Then fit a single axis to the motion that its torques make, in windows of so many seconds that begin
     /// at measured states [default: blocks set aside choose the length]
-    #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true,
+    #[arg(hide_short_help = true, long, value_name = "SECONDS", num_args = 0..=1, require_equals = true,
           value_parser = arguments::positive, conflicts_with_all = ["model", "fit_gains"])]
     pub open_loop: Option<Option<f64>>,
     /// Model file to write

@@ -93,14 +93,15 @@ fn logs(specs: &[LogSpec]) -> Result<Vec<Log>, CliError> {
 
 const EXAMPLES: &str = "\
 Begin with a real arm:    cft-ident example ur10
-Shell and manual pages:   cft-ident completions bash, cft-ident man DIR
+Shell and manual pages:   cft-ident generate completions bash
+                          cft-ident generate man DIR
 
-The help of each command ends with examples. Their files are those that
+The help of each command ends with examples; --help-all has every option. Their files are those that
 `cft-ident identify` leaves in cft-ident-run/.";
 
 /// Identification of robot dynamics from logged joint positions and torques.
 #[derive(Debug, Parser)]
-#[command(name = "cft-ident", version, max_term_width = 80, after_help = EXAMPLES)]
+#[command(name = "cft-ident", version, max_term_width = 80, after_help = EXAMPLES, disable_help_flag = true)]
 pub struct Cli {
     #[command(flatten)]
     common: Common,
@@ -123,11 +124,17 @@ struct Common {
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     verbose: bool,
     /// Open the report in a browser when it is written
-    #[arg(long, global = true)]
+    #[arg(long, global = true, hide_short_help = true)]
     open: bool,
     /// Number of threads; the result does not depend on it [default: all]
-    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(hide_short_help = true, long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Print the help that fits a screen
+    #[arg(short, long, global = true, action = clap::ArgAction::HelpShort)]
+    help: Option<bool>,
+    /// Print the help with every option
+    #[arg(long, global = true, action = clap::ArgAction::HelpLong)]
+    help_all: Option<bool>,
 }
 
 /// Makes the enum of the commands: of each its name and the module with its `Args` and its `run`.
@@ -380,8 +387,11 @@ mod tests {
         assert_eq!((args.seed, args.seconds), (3, Some(20.0)));
     }
 
+    /// Lines of a screen.
+    const SCREEN: usize = 45;
+
     #[test]
-    fn every_help_fits_80_columns_and_has_an_example() {
+    fn every_help_fits_80_columns_and_a_screen_and_has_an_example() {
         let all = super::Cli::command();
         for command in all.get_subcommands().filter(|c| !c.is_hide_set()) {
             let mut alone = command.clone().max_term_width(80);
@@ -389,6 +399,9 @@ mod tests {
             assert!(text.contains("Example:\n  cft-ident "), "{text}");
             let long = text.lines().find(|line| line.chars().count() > 80);
             assert_eq!(long, None);
+            let short = alone.render_help().to_string();
+            let lines = short.lines().count();
+            assert!(lines <= SCREEN, "{lines} lines:\n{short}");
         }
     }
 

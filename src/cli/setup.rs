@@ -15,7 +15,7 @@ pub struct SetupArgs {
     #[arg(long, value_name = "NEW-ROBOT.toml")]
     pub fix_setup: Option<PathBuf>,
     /// Go on with the set-up as it is declared, whatever the torques say
-    #[arg(long, conflicts_with = "fix_setup")]
+    #[arg(hide_short_help = true, long, conflicts_with = "fix_setup")]
     pub as_declared: bool,
 }
 

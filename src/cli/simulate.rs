@@ -47,17 +47,17 @@ pub struct Args {
     #[arg(long = "move", value_name = "JOINT", group = "motion")]
     pub move_joint: Option<String>,
     /// Part of its range that JOINT moves over, about the middle [default: 1]
-    #[arg(long, value_name = "PART", value_parser = arguments::part, requires = "move_joint")]
+    #[arg(hide_short_help = true, long, value_name = "PART", value_parser = arguments::part, requires = "move_joint")]
     pub travel: Option<f64>,
     /// Log whose volts u_1..u_4 drive the motors, without a controller
-    #[arg(long, value_name = "LOG", group = "motion")]
+    #[arg(hide_short_help = true, long, value_name = "LOG", group = "motion")]
     pub volts: Option<LogSpec>,
     /// Duration [s] [default: that of the motion, else 20]
     #[arg(long, value_name = "S", value_parser = arguments::positive)]
     pub seconds: Option<f64>,
     /// Start of every motor coordinate: x_c1,x_c2,x_c3,x_c4 [m, m, rad, m], or the joint of a single
     /// one [default: at rest on the motion]
-    #[arg(
+    #[arg(hide_short_help = true,
         long,
         value_name = "X,...",
         value_delimiter = ',',
@@ -66,7 +66,7 @@ pub struct Args {
     )]
     pub position: Vec<f64>,
     /// Speeds of the same at the start [m/s, m/s, rad/s, m/s] [default: 0]
-    #[arg(
+    #[arg(hide_short_help = true,
         long,
         value_name = "V,...",
         value_delimiter = ',',
@@ -79,7 +79,12 @@ pub struct Args {
     #[arg(long = "effect", value_name = "NAME[:JOINT][:key=value,...]")]
     pub effects: Vec<EffectSpec>,
     /// Effects of your own for --effect: [[candidate]] tables with formulas, whose numbers --effect gives
-    #[arg(long, value_name = "FILE.toml", requires = "effects")]
+    #[arg(
+        hide_short_help = true,
+        long,
+        value_name = "FILE.toml",
+        requires = "effects"
+    )]
     pub candidates: Option<PathBuf>,
     /// Seed of every random number
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -39,13 +39,13 @@ pub struct Args {
     /// Simulate the motion from the measured torques too, in windows of so many seconds that begin at
     /// measured states, and say by how much positions are off [default: single axes from begin to
     /// end, others 0.25]
-    #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true, value_parser = arguments::positive)]
+    #[arg(hide_short_help = true, long, value_name = "SECONDS", num_args = 0..=1, require_equals = true, value_parser = arguments::positive)]
     pub open_loop: Option<Option<f64>>,
     /// Write measured and reconstructed torque, the residual and the 95 % band
     #[arg(short, long, value_name = "RESIDUAL.csv|.mcap", value_parser = arguments::log_file)]
     pub output: Option<PathBuf>,
     /// Draw measured and reconstructed torque; may be given more than once
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]

@@ -75,41 +75,41 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = CriterionName::Condition)]
     pub criterion: CriterionName,
     /// With a-optimal: only this parameter, by its relative error; may be given more than once
-    #[arg(long = "parameter", value_name = "NAME")]
+    #[arg(hide_short_help = true, long = "parameter", value_name = "NAME")]
     pub parameters: Vec<String>,
     /// Fundamental frequency [Hz]
-    #[arg(long, value_name = "HZ", default_value_t = 0.4, value_parser = frequency)]
+    #[arg(hide_short_help = true, long, value_name = "HZ", default_value_t = 0.4, value_parser = frequency)]
     pub frequency: f64,
     /// Harmonics of each coordinate
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=32))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=32))]
     pub harmonics: u16,
     /// Whole periods between the ends
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub periods: u32,
     /// Keep the offsets of this trajectory, such as configs/table3.toml
-    #[arg(long, value_name = "TRAJECTORY.toml")]
+    #[arg(hide_short_help = true, long, value_name = "TRAJECTORY.toml")]
     pub offsets: Option<PathBuf>,
     /// Share of every limit that the design leaves free, for what a controller strays
-    #[arg(long, value_name = "SHARE", default_value_t = 0.05, value_parser = share)]
+    #[arg(hide_short_help = true, long, value_name = "SHARE", default_value_t = 0.05, value_parser = share)]
     pub margin: f64,
     /// Pose from which the robot goes straight to the first point, coordinate by coordinate [m or rad]: limits are
     /// kept on the way too
-    #[arg(long, value_name = "X,X,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = arguments::finite)]
+    #[arg(hide_short_help = true, long, value_name = "X,X,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = arguments::finite)]
     pub from: Option<Vec<f64>>,
     /// Log or trajectory (.toml) that is used together with the design; may be given more than once
-    #[arg(long, value_name = "LOG|TRAJECTORY.toml")]
+    #[arg(hide_short_help = true, long, value_name = "LOG|TRAJECTORY.toml")]
     pub with: Vec<String>,
     /// Motions to design, each to complement those before it; written as TRAJECTORY-1.toml, ...
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub trajectories: u16,
     /// Random starts of the search
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub starts: u16,
     /// Evaluations that each start may take [default: up to 1180]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(hide_short_help = true, long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub evaluations: Option<u64>,
     /// Seed of the starts
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Trajectory to write
     #[arg(
@@ -120,23 +120,23 @@ pub struct Args {
     )]
     pub output: Option<PathBuf>,
     /// Write the motion sample by sample, positions, speeds and accelerations
-    #[arg(long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
     pub samples: Option<PathBuf>,
     /// Write the motion for ROS 2, as trajectory_msgs/msg/JointTrajectory
-    #[arg(long, value_name = "FILE.yaml|.mcap", value_parser = arguments::message_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.yaml|.mcap", value_parser = arguments::message_file)]
     pub trajectory_message: Option<PathBuf>,
     /// Write the motion as a program for a controller of Universal Robots
-    #[arg(long, value_name = "FILE.script", value_parser = arguments::script_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::script_file)]
     pub urscript: Option<PathBuf>,
     /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
     /// [control], else 1000]
-    #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
+    #[arg(hide_short_help = true, long, value_name = "HZ", value_parser = arguments::positive)]
     pub rate: Option<f64>,
     /// Duration of a one-joint experiment, or of a checked motion that sets none [s]
-    #[arg(long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
+    #[arg(hide_short_help = true, long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Option<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]

@@ -250,6 +250,13 @@ impl Described {
                 "`{}` is the time, for it runs evenly (time in [log] of robot.toml)",
                 escape(name)
             )),
+            ClockSource::Rate {
+                hz,
+                coarse: Some(name),
+            } => Some(format!(
+                "rows lie evenly at {hz} Hz, for the clock of `{}` is too coarse for them (rate_hz in [log] of robot.toml)",
+                escape(name)
+            )),
             _ => None,
         });
         of_joints.chain(torque).chain(clock).collect()

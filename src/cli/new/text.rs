@@ -313,8 +313,18 @@ impl Draft<'_> {
     fn clock(&self, seen: &SeenColumns, out: &mut String) {
         match &seen.clock {
             ClockSource::Messages => {}
-            ClockSource::Rate(rate) => {
-                let _ = writeln!(out, "rate_hz = {rate:?}   # the log has no times");
+            ClockSource::Rate { hz, coarse: None } => {
+                let _ = writeln!(out, "rate_hz = {hz:?}   # the log has no times");
+            }
+            ClockSource::Rate {
+                hz,
+                coarse: Some(name),
+            } => {
+                let _ = writeln!(
+                    out,
+                    "rate_hz = {hz:?}   # CHECK IT: rows lie evenly? the clock of {} is too coarse for them",
+                    escape(name)
+                );
             }
             ClockSource::Column {
                 name,

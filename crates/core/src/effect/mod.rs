@@ -75,6 +75,7 @@ catalogue! {
     backlash,
     ripple,
     position_friction,
+    weight,
     spring,
     counterbalance,
     coupling,

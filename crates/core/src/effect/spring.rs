@@ -2,6 +2,7 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::physics::Rule;
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {
@@ -13,6 +14,10 @@ pub static ENTRY: Entry = Entry {
         Key::size("k3", Unit::Cubic),
     ],
     search: Search::Refined,
+    must: &[Rule::not_negative(
+        "k",
+        "a spring pulls back; a torque that falls with the position is a weight",
+    )],
     ladder: Some(Ladder::USUAL),
     separate_by: "log a slow sweep over the whole travel with two payloads (gravity scales, a spring \
                   does not)",

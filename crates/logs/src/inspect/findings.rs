@@ -87,6 +87,9 @@ pub struct Findings {
     pub jitter: Option<f64>,
     /// Steps longer than 2.5 median ones.
     pub gaps: Vec<Gap>,
+    /// Rate of the rows where the clock is too coarse for them [Hz].
+    #[serde(skip)]
+    pub even_rate_hz: Option<f64>,
     /// The channels, in the order of the columns.
     pub channels: Vec<ChannelFacts>,
     /// What the joints do, in the order of their position channels.

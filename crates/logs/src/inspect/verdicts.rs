@@ -67,6 +67,7 @@ fn conclude(judge: &LogJudge) -> Findings {
         duration_s: judge.clock.duration(),
         rate_hz: rate,
         jitter: rate.map(|_| clock.jitter),
+        even_rate_hz: even_rate(judge, &clock),
         gaps: clock
             .gaps
             .iter()
@@ -199,6 +200,15 @@ fn joints(judge: &LogJudge) -> Vec<JointMotion> {
         .collect()
 }
 
+/// The rate of the rows where the clock is too coarse for them.
+fn even_rate(judge: &LogJudge, clock: &ClockFacts) -> Option<f64> {
+    let seen = &judge.clock;
+    let rate = (seen.rows.saturating_sub(1)) as f64 / seen.duration();
+    // a clock that stands still now and then is another fault
+    let coarse = 4 * seen.repeated.rows() > seen.rows && seen.duration() > 10.0 * clock.dt;
+    coarse.then(|| round_within(rate, rate * 2.0 * clock.dt / seen.duration()))
+}
+
 fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     let seen = &judge.clock;
     if seen.without_time > 0 {
@@ -220,16 +230,12 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             rows_text(rows, 1)
         )
     };
-    let rate = (seen.rows.saturating_sub(1)) as f64 / seen.duration();
-    // a clock that stands still now and then is another fault
-    let coarse = 4 * seen.repeated.rows() > seen.rows && seen.duration() > 10.0 * clock.dt;
-    let remedy = &match coarse {
-        true => format!(
+    let remedy = &match even_rate(judge, clock) {
+        Some(rate) => format!(
             "the clock moves in steps of {}, too coarse for rows at {rate} Hz: where rows lie evenly, `rate_hz = {rate}` in [log] of the robot file, in place of `time`",
             seconds(clock.dt),
-            rate = round_within(rate, rate * 2.0 * clock.dt / seen.duration()),
         ),
-        false => "delete duplicate rows; where rows lie evenly, `rate_hz = ..` in [log] of the robot file, in place of `time`".to_owned(),
+        None => "delete duplicate rows; where rows lie evenly, `rate_hz = ..` in [log] of the robot file, in place of `time`".to_owned(),
     };
     draft.stretches(
         FaultKind::RepeatedTime,

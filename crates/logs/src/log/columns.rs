@@ -172,13 +172,19 @@ pub(super) fn choose(names: &[String], layout: &Layout) -> Layout {
     }
 }
 
-/// `q1 [deg]` and `q1 (deg)` are q1 in deg.
+/// `q1 [deg]` and `q1 (deg)` are q1 in deg; `effort[2]` and `position[name=q1]` are places in messages.
 pub(super) fn name_and_unit(name: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some((base, unit)) = name
             .strip_suffix(close)
             .and_then(|head| head.rsplit_once(open))
         {
+            let of_path = !base.ends_with(' ')
+                && !unit.is_empty()
+                && unit.bytes().all(|b| b.is_ascii_digit());
+            if of_path || unit.contains('=') {
+                break;
+            }
             return (base.trim_end(), Some(unit.trim()));
         }
     }

@@ -28,7 +28,9 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// Arrays or a Parquet file that are no table of numbers.
-    #[error("{file}: cannot be read: {problem}; write it as CSV, a column for each channel")]
+    #[error(
+        "{file}: cannot be read: {problem}; copy it again from where it was recorded, or write it as CSV, a column for each channel"
+    )]
     Table { file: String, problem: String },
     /// A part of a recording that is not what was written.
     #[error(

@@ -295,7 +295,16 @@ impl Mapping {
     /// Whether nothing in the file is a guess.
     pub fn is_sure(&self, seen: Option<&SeenColumns>) -> bool {
         let clock = seen.map(|seen| &seen.clock);
-        let guessed = matches!(clock, Some(ClockSource::Column { guessed: true, .. }));
+        let guessed = matches!(
+            clock,
+            Some(
+                ClockSource::Column { guessed: true, .. }
+                    | ClockSource::Rate {
+                        coarse: Some(_),
+                        ..
+                    }
+            )
+        );
         self.checks.is_empty() && self.torque_check.is_none() && !guessed
     }
 

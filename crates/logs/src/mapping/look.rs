@@ -27,8 +27,8 @@ pub enum ClockSource {
         seconds: f64,
         guessed: bool,
     },
-    /// Rows lie evenly \[Hz\].
-    Rate(f64),
+    /// Rows lie evenly \[Hz\]; the column of times that is too coarse for them, where there is one.
+    Rate { hz: f64, coarse: Option<String> },
 }
 
 /// What the user says of the log.
@@ -141,12 +141,19 @@ pub fn look(
         }
     }
     let clock = match (time, asked.rate_hz) {
+        (Some((at, ..)), _) if findings.even_rate_hz.is_some() => ClockSource::Rate {
+            hz: findings.even_rate_hz.unwrap_or_default(),
+            coarse: Some(log.names()[at].clone()),
+        },
         (Some((at, seconds, guessed)), _) => ClockSource::Column {
             name: log.names()[at].clone(),
             seconds,
             guessed,
         },
-        (None, Some(rate)) if !log.is_recording() => ClockSource::Rate(rate),
+        (None, Some(rate)) if !log.is_recording() => ClockSource::Rate {
+            hz: rate,
+            coarse: None,
+        },
         _ => ClockSource::Messages,
     };
     let others = groups.into_iter().map(|group| group.topic);
@@ -159,7 +166,7 @@ pub fn look(
         },
         topic,
         headerless,
-        rate_hz: findings.rate_hz,
+        rate_hz: findings.even_rate_hz.or(findings.rate_hz),
         duration_s: findings.duration_s,
         name,
         provenance: log.provenance()?,

@@ -59,11 +59,15 @@ pub(crate) fn mapped(path: &Path) -> Layout {
     let seen = look(&spec, &asked, Some(3), &|| false).unwrap();
     let mapping = Mapping::of(Some(&known()), Some(&seen));
     let mut layout = Layout::joint_columns(&JOINTS);
-    if let ClockSource::Column { name, seconds, .. } = &seen.clock {
-        layout.time.column.clone_from(name);
-        layout.time.factor = *seconds;
-        layout.time.unit = String::new();
-        layout.section.time_unit = None;
+    layout.time.unit = String::new();
+    layout.section.time_unit = None;
+    match &seen.clock {
+        ClockSource::Column { name, seconds, .. } => {
+            layout.time.column.clone_from(name);
+            layout.time.factor = *seconds;
+        }
+        ClockSource::Rate { hz, .. } => layout.section.rate_hz = Some(*hz),
+        ClockSource::Messages => {}
     }
     for (k, joint) in mapping.joints.iter().enumerate() {
         if seen.is_recording() {
@@ -225,6 +229,9 @@ fn text_logs_are_read_whatever_surrounds_the_table_and_a_coarse_clock_names_its_
         let motion = Motion::drawn(&mut rng);
         let (path, head, coarse) = text_log(&mut rng, &motion, folder.path());
         let mut layout = mapped(&path);
+        // the message names the rate that a look finds
+        let even = layout.section.rate_hz.take();
+        assert_eq!(even.is_some(), coarse, "seed {seed}");
         let found = match (read(&path, &layout), coarse) {
             (Ok(found), _) => found,
             (Err(error), false) => panic!("seed {seed}: {error}\n{head}"),
@@ -235,7 +242,8 @@ fn text_logs_are_read_whatever_surrounds_the_table_and_a_coarse_clock_names_its_
                     .nth(1)
                     .unwrap_or_else(|| panic!("{text}"));
                 let rate: f64 = rate.split('`').next().unwrap().parse().unwrap();
-                layout.section.rate_hz = Some(rate);
+                assert_eq!(Some(rate), even, "seed {seed}");
+                layout.section.rate_hz = even;
                 read(&path, &layout).unwrap()
             }
         };

@@ -158,11 +158,7 @@ fn windows(stretches: &[Stretch], spans: &[Span]) -> Vec<Span> {
 }
 
 /// Errors of every joint in one window; none where the motion goes astray.
-fn one(
-    model: &AugmentedModel,
-    stretch: &Stretch,
-    (_, begin, end): Span,
-) -> Option<Vec<Sums>> {
+fn one(model: &AugmentedModel, stretch: &Stretch, (_, begin, end): Span) -> Option<Vec<Sums>> {
     // where the model's torque comes late, the torque that moves it at t is logged later
     let mut tau = stretch.tau.clone();
     for (j, tau) in tau.iter_mut().enumerate() {
@@ -284,7 +280,10 @@ mod tests {
     #[test]
     fn a_log_of_few_windows_compares_nothing_and_a_long_one_is_looked_at_all_along() {
         let short = [stretch(1)];
-        assert_eq!(free_run(&model(0.2), None, &short, &[(0, 0, short[0].len())]), None);
+        assert_eq!(
+            free_run(&model(0.2), None, &short, &[(0, 0, short[0].len())]),
+            None
+        );
         let long = [stretch(100)];
         let found = windows(&long, &[(0, 0, long[0].len())]);
         assert_eq!(found.len(), MOST);

@@ -140,7 +140,13 @@ mod tests {
 
     #[test]
     fn friction_takes_power_up_to_its_speed_and_every_number_is_finite() {
-        for wanted in [[0.3, 0.2], [-0.3, 0.2], [0.3, -0.2], [-0.3, -0.2], [0.0, 0.0]] {
+        for wanted in [
+            [0.3, 0.2],
+            [-0.3, 0.2],
+            [0.3, -0.2],
+            [-0.3, -0.2],
+            [0.0, 0.0],
+        ] {
             for speed in [0.0, 1.0, 1e3, f64::INFINITY] {
                 let theta = found(wanted, speed);
                 assert!(theta.iter().all(|x| x.is_finite()), "{wanted:?} {speed}");

@@ -256,8 +256,13 @@ impl MessageFiles {
         });
         let missing = self.missing.first().map(|_| {
             format!(
-                "metadata.yaml lists {}, which are not in the folder: what they hold is lost",
-                list(self.missing.iter().map(String::as_str))
+                "metadata.yaml lists {} and the folder lacks {}: what was in it is lost",
+                list(self.missing.iter().map(String::as_str)),
+                if self.missing.len() == 1 {
+                    "it"
+                } else {
+                    "them"
+                },
             )
         });
         broken.chain(missing).collect()

@@ -99,7 +99,7 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
 }
 
 fn broken(error: parquet::errors::ParquetError) -> io::Error {
-    damaged(&error.to_string())
+    damaged(&format!("the Parquet file is cut off or damaged ({error})"))
 }
 
 /// The rows of the columns of a file that hold numbers, and which of them are nanoseconds.

@@ -138,6 +138,7 @@ catalogue! {
     gain,
     position_friction,
     ripple,
+    weight,
     spring,
     counterbalance,
     backlash,

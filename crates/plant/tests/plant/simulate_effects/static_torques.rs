@@ -37,6 +37,9 @@ fn offset_ripple_and_spring_follow_their_formulas_at_every_row() {
         let x = q[1] - 0.2;
         at(1, 3.0 * x + 5.0 * x * x * x)
     });
+    assert_missing("weight:q4:sin=2,cos=-3", 0.0, EXACT, |_, (q, ..)| {
+        at(2, 2.0 * q[2].sin() - 3.0 * q[2].cos())
+    });
 }
 
 #[test]

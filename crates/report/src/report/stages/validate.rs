@@ -2,7 +2,9 @@
 
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, JointTorque, TorqueFigure};
 use crate::report::sections::quality::{self, Inspected};
-use crate::report::sections::{fit, free_run, friction, parameters, provenance, residual, sketch, torque};
+use crate::report::sections::{
+    fit, free_run, friction, parameters, provenance, residual, sketch, torque,
+};
 use crate::report::table::unbroken;
 use crate::report::{Report, Writer, summary, usual};
 use cft_ident_core::effect::AugmentedModel;

@@ -1,0 +1,38 @@
+//! `weight`: the moment of a weight that the declared model has no column for, as on a hinge declared without gravity.
+
+use super::entry::{Entry, Family, Key, Ladder};
+use super::law::Law;
+use super::unit::Unit;
+use crate::robot::JointKind;
+
+pub static ENTRY: Entry = Entry {
+    name: "weight",
+    families: &[Family::Position],
+    keys: &[
+        Key::size("sin", Unit::Torque),
+        Key::size("cos", Unit::Torque),
+    ],
+    ladder: Some(Ladder::USUAL),
+    separate_by: "log a slow sweep over the whole travel with two payloads (a weight grows with them, a spring does not)",
+    formula: "sin * sin(q) + cos * cos(q)",
+    source: "a link that hangs on the joint, where the robot file states no gravity",
+    at_rest: true,
+    said: |f| format!("gravity on {}, {}", f.at, f.amplitude()),
+    remedy: "state `gravity` and how the axis lies in the robot file, or keep the refined model",
+    measurable: true,
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    fits: |robot, _, place| place.kind(robot) == JointKind::Revolute,
+    code: Some(|to| {
+        let q = to.q();
+        to.added(format!("{} * sin({q}) + {} * cos({q})", to.x(0), to.x(1)));
+    }),
+    ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, _, _, out| {
+        let Some(j) = place.joint() else { return };
+        for (k, q) in scene.stretch.q[j].iter().enumerate() {
+            (out[0][k], out[1][k]) = q.sin_cos();
+        }
+    })
+};
