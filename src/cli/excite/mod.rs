@@ -246,8 +246,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         given.value.belongs_to(&given.name, &file)?;
         inputs.push(given.provenance.clone());
     }
-    let named = model.as_ref().map(|given| (given.name.as_str(), &given.value));
-    let aim = args.aim.as_ref().map(|text| Aim::of(text, &file)).transpose()?;
+    let named = model
+        .as_ref()
+        .map(|given| (given.name.as_str(), &given.value));
+    let aim = args
+        .aim
+        .as_ref()
+        .map(|text| Aim::of(text, &file))
+        .transpose()?;
     if let (Some(_), Some((_, model))) = (&aim, named) {
         aim::within_seen(&mut file, model);
     }

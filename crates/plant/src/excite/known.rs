@@ -32,9 +32,8 @@ impl Known {
         let p = names.len();
         let covariance = file.covariance_of(&names);
         let found = |name: &String| file.parameters.iter().find(|q| q.key() == *name);
-        let open = |q: &Parameter| {
-            matches!(q.verdict, Some(Verdict::Weak | Verdict::NotIdentifiable))
-        };
+        let open =
+            |q: &Parameter| matches!(q.verdict, Some(Verdict::Weak | Verdict::NotIdentifiable));
         let weak = names.iter().enumerate();
         let weak = weak.filter(|(_, name)| found(name).is_some_and(open));
         let variance = |i: usize| Some(covariance[i * p + i]).filter(|x| *x > 0.0);
