@@ -7,7 +7,7 @@ use cft_ident_logs::log::{Block, Channel, Layout, LogSpec, RawReader, Reader};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::log_drawn::{DRAWN, Motion, ROWS, mapped, names, read, same};
+use crate::log_drawn::{Motion, ROWS, drawn, mapped, names, read, same};
 
 fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(cft_ident_support::ROOT).join("fixtures/tables");
@@ -237,7 +237,7 @@ fn arrays(rng: &mut ChaCha8Rng, motion: &Motion) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn drawn_archives_of_arrays_are_read_exactly_and_cut_ones_are_refused() {
-    for seed in 300..300 + DRAWN {
+    for seed in 3000..3000 + drawn() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.npz");
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

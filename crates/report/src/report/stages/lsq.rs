@@ -113,7 +113,9 @@ const NEXT: &str = "Next: `cft-ident validate` on a log that was not fitted, for
 fn words(of: &Lsq) -> (String, bool) {
     let joints = &of.found.joints;
     let square: f64 = joints.iter().map(|j| j.relative_error.powi(2)).sum();
-    let rms = number::percent((square / joints.len().max(1) as f64).sqrt());
+    let rms = (square / joints.len().max(1) as f64).sqrt();
+    let unusual = rms > usual::range(usual::Measured::Currents)[1];
+    let rms = number::percent(rms);
     let worst = joints.iter();
     let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
     let mut text = match worst.filter(|_| joints.len() > 1) {
@@ -128,13 +130,16 @@ fn words(of: &Lsq) -> (String, bool) {
     let useless = joints.iter().filter(|j| j.relative_error >= 1.0);
     let useless: Vec<&str> = useless.map(|j| j.joint.as_str()).collect();
     let apart = far_off(of.found);
-    let good = useless.is_empty() && apart.is_none();
+    let good = useless.is_empty() && apart.is_none() && !unusual;
     text += &match (useless.is_empty(), apart) {
         (false, _) => format!(
             " The model cannot be used for {}: no torque at all would be as near.",
             useless.join(", ")
         ),
         (true, Some(apart)) => apart,
+        (true, None) if unusual => {
+            " That is more than usual: look at what the model lacks before it is used.".to_owned()
+        }
         (true, None) => " The model can be used for motions like these.".to_owned(),
     };
     let open = of.found.unknowns.iter();
