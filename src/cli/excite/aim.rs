@@ -59,13 +59,18 @@ impl Aim {
     }
 }
 
-/// Limits where the robot file gives none: what the logs of the model have seen.
+/// Limits where the robot file gives none: what the logs of the model have seen, and no faster turns than theirs.
 pub(super) fn within_seen(file: &mut RobotFile, model: &ModelFile) {
     for held in &model.held_out {
         let limits = file.limits.entry(held.joint.clone()).or_default();
         limits.position = limits.position.or(Some(held.positions_seen));
         limits.speed = limits.speed.or(Some(held.speed_seen));
         limits.torque = limits.torque.or(Some(held.torque_seen));
+        // that of an oscillation over these positions with this speed
+        let [low, high] = held.positions_seen;
+        let swing = held.speed_seen * held.speed_seen / (0.5 * (high - low));
+        let swing = Some(swing).filter(|a| a.is_finite() && *a > 0.0);
+        limits.acceleration = limits.acceleration.or(swing);
     }
 }
 

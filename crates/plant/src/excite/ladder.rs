@@ -135,7 +135,7 @@ pub fn design_ladder(
     }
     let expected = expectation(machine, task, joint, &rungs)?;
     Ok(DesignedLadder {
-        file: move_of(&task.joint, &rungs),
+        file: move_of(machine, task, &rungs),
         expected,
         usual: before.iter().map(|e| e.relative_std).collect(),
         evaluations,
@@ -176,12 +176,18 @@ struct Rungs {
     turn: f64,
 }
 
-fn move_of(joint: &str, rungs: &Rungs) -> SingleJointMove {
+fn move_of(machine: &ForeseenRobot, task: &LadderTask, rungs: &Rungs) -> SingleJointMove {
+    let mut names = machine.model.robot.joint_names().iter();
+    let joint = names.position(|name| *name == task.joint);
+    // where the motors are the joints, the reserve is that of every limit
+    let mut limits = machine.channels.iter();
+    let limit = limits.find(|c| c.quantity == Quantity::Acceleration && Some(c.index) == joint);
+    let limit = limit.filter(|_| machine.mechanism.motors_at_joints());
     SingleJointMove {
-        joint: joint.to_owned(),
+        joint: task.joint.clone(),
         speeds: rungs.speeds.clone(),
         range: None,
-        acceleration: None,
+        acceleration: limit.map(|c| three_digits((1.0 - task.reserve) * c.upper)),
         turn_s: Some(rungs.turn),
     }
 }
@@ -250,7 +256,7 @@ fn expectation(
     joint: usize,
     rungs: &Rungs,
 ) -> Result<Vec<Expected>, ExciteError> {
-    let along = reference(machine, task, &move_of(&task.joint, rungs))?;
+    let along = reference(machine, task, &move_of(machine, task, rungs))?;
     let (expected, used) = expected(machine, task, joint, &along)?;
     if used > 1.0 - task.reserve {
         return Err(ExciteError::NothingExcited {
