@@ -40,7 +40,7 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident excite -r configs/cft.toml -o excitation.toml --plot excitation.svg
   cft-ident excite -r configs/cft.toml --joint q4 -o ladder.toml
-  cft-ident excite -m model.toml --for weak -o next.toml
+  cft-ident excite -m refined.toml --for ripple:q5 -o next.toml
   cft-ident excite --check configs/table3.toml";
 
 /// Design a motion for identification that keeps every limit, or check one that exists.
