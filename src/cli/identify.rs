@@ -7,15 +7,13 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::beside_truth::{BesideTruth, load_truth, true_value};
 use super::{
     CliError, Context, Outcome, campaign, logs_of, names_of, new, pictures, setup, validate,
 };
 use cft_ident_files::config::campaign::{CampaignLogs, CampaignSettings};
-use cft_ident_files::config::model_file::Parameter;
-use cft_ident_files::config::{self, Campaign, ModelFile};
+use cft_ident_files::config::{self, Campaign};
 use cft_ident_logs::log::{LogSpec, Span};
-use cft_ident_plant::simulate::TruthFile;
-use cft_ident_plant::simulate::effects::EffectValue;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::residual;
 use cft_ident_report::report::stages;
@@ -508,47 +506,6 @@ pub struct Identified<'a> {
     files: Vec<String>,
 }
 
-/// Parameters against their truth.
-#[derive(Debug, Serialize, JsonSchema)]
-struct BesideTruth {
-    parameters: Vec<TrueParameter>,
-    /// Effects that the simulated robot has.
-    effects: Vec<EffectValue>,
-}
-
-/// One parameter against its truth.
-#[derive(Debug, Serialize, JsonSchema)]
-struct TrueParameter {
-    name: String,
-    joint: Option<String>,
-    theta: Option<u32>,
-    value: f64,
-    std: Option<f64>,
-    truth: f64,
-    standard_deviations_off: Option<f64>,
-}
-
-impl BesideTruth {
-    fn of(model: &ModelFile, truth: &TruthFile) -> Self {
-        let parameter = |p: &Parameter| {
-            let true_value = true_value(Some(truth), p)?;
-            Some(TrueParameter {
-                name: p.name.clone(),
-                joint: p.joint.clone(),
-                theta: p.theta,
-                value: p.value,
-                std: p.std,
-                truth: true_value,
-                standard_deviations_off: p.std.map(|std| (p.value - true_value) / std),
-            })
-        };
-        BesideTruth {
-            parameters: model.parameters.iter().filter_map(parameter).collect(),
-            effects: truth.effects.clone(),
-        }
-    }
-}
-
 /// Writes what a stage leaves; `unseen` names the validation logs.
 fn keep(
     end: StageEnd,
@@ -581,24 +538,4 @@ fn write(
     context.write_text(&folder.join(name), text)?;
     files.push(name.to_owned());
     Ok(())
-}
-
-/// Reads the truth of simulated logs.
-fn load_truth(path: &Path) -> Result<TruthFile, CliError> {
-    let unusable = |e: &dyn std::fmt::Display| {
-        CliError::input(format!("{}: {e}", path.display())).hint(
-            "leave `truth` out of the campaign file, or name a .truth.toml that simulate wrote",
-        )
-    };
-    let text = config::text(path).map_err(|e| unusable(&e))?;
-    TruthFile::parse(&text).map_err(|e| unusable(&e.message()))
-}
-
-/// The truth of a parameter, where it is known.
-fn true_value(truth: Option<&TruthFile>, parameter: &Parameter) -> Option<f64> {
-    truth?
-        .parameters
-        .iter()
-        .find(|p| p.name == parameter.name && p.joint == parameter.joint)
-        .map(|p| p.value)
 }

@@ -26,6 +26,7 @@ pub mod validate;
 pub mod watch;
 
 mod arguments;
+mod beside_truth;
 mod browser;
 mod colour;
 mod columns;

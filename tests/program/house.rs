@@ -35,7 +35,10 @@ const ROOMS: &[(&str, &str)] = &[
     ("setup", "math robot motion inertia judge"),
     ("mapping", "robot log inspect"),
     ("simulate", "math number robot log config effect"),
-    ("excite", "math number robot log config inertia simulate"),
+    (
+        "excite",
+        "math number verdict robot log config inertia simulate",
+    ),
     ("compare", "math robot config motion effect verdict"),
     ("track", ""),
     (
@@ -75,7 +78,7 @@ const DOORS: &[(&str, &str)] = &[
     // one to read, one to write
     ("mcap", "log/recording/format/mcap.rs|output/mcap.rs"),
     ("rusqlite", "log/recording/format/bag.rs"),
-    ("flate2", "log/content.rs|output/log.rs"),
+    ("flate2", "log/content.rs|log/table/zip.rs|output/log.rs"),
     ("zstd", "log/content.rs|output/log.rs"),
     ("resvg", "report/figure/png.rs"),
     ("sha2", "log/source.rs"),

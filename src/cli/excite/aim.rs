@@ -7,7 +7,7 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::information::Information;
 use cft_ident_plant::excite::machine::ForeseenRobot;
-use cft_ident_plant::excite::{Criterion, ExciteError, Known, usual_motion};
+use cft_ident_plant::excite::{Criterion, ExciteError, InformationBefore, usual_motion};
 use cft_ident_stages::identify::LoggedRobot;
 
 /// Samples of a period of the motion that stands for a usual one.
@@ -87,9 +87,12 @@ pub(super) fn noise(model: &ModelFile, rate_hz: f64, machine: &mut ForeseenRobot
 }
 
 /// What a model knows, and the criterion that narrows what is weak in it.
-pub(super) fn weak(bench: &Bench, model: &ModelFile) -> Result<(Known, Criterion), CliError> {
+pub(super) fn weak(
+    bench: &Bench,
+    model: &ModelFile,
+) -> Result<(InformationBefore, Criterion), CliError> {
     let (args, machine) = (bench.args, &bench.machine);
-    let known = Known::of(machine, model);
+    let known = InformationBefore::of(machine, model);
     if known.weak.is_empty() {
         return Err(CliError::input(
             "every parameter of the model is identified: no motion is called for".to_owned(),

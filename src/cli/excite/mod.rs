@@ -3,6 +3,7 @@
 
 mod aim;
 mod controllers;
+mod criterion;
 mod given;
 mod judge;
 mod names;
@@ -25,14 +26,15 @@ use cft_ident_plant::excite::search::{FoundMotion, Task, design};
 use cft_ident_plant::excite::series::Series;
 use cft_ident_plant::excite::usage::check_pose;
 use cft_ident_plant::excite::{
-    Criterion, ExciteError, GivenInformation, Judgement, Judgements, LawForeseen, Motion,
-    PriorInformation, foresee, machine, series_of, trajectory, usual_torque,
+    ExciteError, GivenInformation, Judgement, Judgements, LawForeseen, Motion, PriorInformation,
+    foresee, machine, series_of, trajectory, usual_torque,
 };
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::{Report, stages};
 
 use aim::Aim;
+use criterion::{criterion, weights};
 use judge::{head, judged, refuse_broken};
 use names::Names;
 
@@ -541,62 +543,6 @@ fn written(
             .line(&format!("written: {}", path.display()));
     }
     Ok(report)
-}
-
-/// 1/noise per joint where the criterion weighs rows, else ones.
-fn weights(machine: &ForeseenRobot, criterion: &Criterion) -> Vec<f64> {
-    if criterion.weighted() {
-        machine.noise.iter().map(|s| 1.0 / s).collect()
-    } else {
-        vec![1.0; machine.coordinates()]
-    }
-}
-
-fn criterion(bench: &Bench) -> Result<Criterion, CliError> {
-    let args = bench.args;
-    let names = bench.machine.unknown_names();
-    let chosen: Vec<usize> = args
-        .parameters
-        .iter()
-        .map(|name| {
-            names.iter().position(|n| n == name).ok_or_else(|| {
-                CliError::usage(format!("no parameter is called {name}"))
-                    .hint(format!("the parameters are {}", names.join(", ")))
-            })
-        })
-        .collect::<Result<_, _>>()?;
-    if !chosen.is_empty() && args.criterion != CriterionName::AOptimal {
-        return Err(CliError::usage(
-            "--parameter belongs to --criterion a-optimal",
-        ));
-    }
-    Ok(match args.criterion {
-        CriterionName::Condition => Criterion::Condition,
-        CriterionName::ConditionNormalised => Criterion::ConditionNormalised,
-        CriterionName::DOptimal => Criterion::DOptimal,
-        CriterionName::AOptimal if chosen.is_empty() => Criterion::AOptimal(vec![1.0; names.len()]),
-        CriterionName::AOptimal => {
-            let values = bench.machine.unknown_values();
-            if !bench.machine.source.known() {
-                return Err(CliError::usage(
-                    "--parameter asks for relative errors, and no value of a parameter is known",
-                )
-                .hint("give a model with -m, or a URDF with inertials"));
-            }
-            let mut factors = vec![0.0; names.len()];
-            for k in chosen {
-                if values[k] == 0.0 {
-                    return Err(CliError::usage(format!(
-                        "{} is 0 in the model, so its relative error has no meaning",
-                        names[k]
-                    ))
-                    .hint("give a model with -m in which it is not"));
-                }
-                factors[k] = 1.0 / (values[k] * values[k]);
-            }
-            Criterion::AOptimal(factors)
-        }
-    })
 }
 
 /// Offsets that a file fixes.

@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-13;
 
 /// What the logs of a model have told.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct InformationBefore {
     /// Inverse covariance of the unknowns (p x p); 0 of what the model knows no deviation of.
     pub information: DMatrix<f64>,
     /// Variance of each unknown.
@@ -25,7 +25,7 @@ pub struct Known {
     pub weak: Vec<usize>,
 }
 
-impl Known {
+impl InformationBefore {
     /// Of the unknowns of a design.
     pub fn of(machine: &ForeseenRobot, file: &ModelFile) -> Self {
         let names = machine.unknown_names();
@@ -37,7 +37,7 @@ impl Known {
         let weak = names.iter().enumerate();
         let weak = weak.filter(|(_, name)| found(name).is_some_and(open));
         let variance = |i: usize| Some(covariance[i * p + i]).filter(|x| *x > 0.0);
-        Known {
+        InformationBefore {
             weak: weak.map(|(i, _)| i).collect(),
             information: inverse_of(&covariance, p),
             variances: (0..p).map(variance).collect(),

@@ -42,7 +42,7 @@ pub use foreseen::TorqueSource;
 pub use from_files::{machine, series_of, trajectory};
 pub use given::GivenInformation;
 pub use judgement::{Judgement, Judgements, LawForeseen, MotionTerms, judge};
-pub use known::Known;
+pub use known::InformationBefore;
 pub use motion::Motion;
 pub use objective::{NoValue, PriorInformation};
 pub use start::{usual_motion, usual_torque};

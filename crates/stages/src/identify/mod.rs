@@ -56,6 +56,7 @@ mod prior;
 mod reduce;
 mod reduced;
 mod reference;
+mod refined_model;
 mod repeated;
 mod residual;
 mod separate;

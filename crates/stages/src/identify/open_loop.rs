@@ -7,7 +7,7 @@ use super::in_memory::read_each;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::position_cutoff::known;
-use crate::open_loop::{self, FreeRun, OpenLoop, Span, WindowLength, along};
+use crate::open_loop::{self, FreeRun, OpenLoop, RunSpan, WindowLength, along};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{FilterSettings, Stretch};
 use cft_ident_core::number;
@@ -78,7 +78,7 @@ pub(super) fn is_in_si(machine: &LoggedRobot) -> bool {
 }
 
 /// Every stretch from its begin to its end.
-pub(super) fn whole(stretches: &[Stretch]) -> Vec<Span> {
+pub(super) fn whole(stretches: &[Stretch]) -> Vec<RunSpan> {
     let each = stretches.iter().enumerate();
     each.map(|(s, stretch)| (s, 0, stretch.len())).collect()
 }

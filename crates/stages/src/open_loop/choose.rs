@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::fit::{Fitted, Span, apart, errors, fit, rms, windows};
+use super::fit::{Fitted, RunSpan, apart, errors, fit, rms, windows};
 use super::numbers::{Columns, columns, numbers};
 use cft_ident_core::effect::{
     Added, AugmentedModel, Cover, Family, LAWS, Law, Place, Role, Search,
@@ -165,10 +165,10 @@ pub fn fit_axis(
     let fitted = trial
         .fit(&model, &columns, (&all, score.1), true)?
         .ok_or(AxisError::Astray)?;
-    let of_start = |windows: &[Span], positions| {
+    let of_start = |windows: &[RunSpan], positions| {
         errors(start, stretches, windows, positions).ok_or(AxisError::Astray)
     };
-    let blocks: Vec<Span> = (0..BLOCKS).flat_map(|b| trial.block(b)).collect();
+    let blocks: Vec<RunSpan> = (0..BLOCKS).flat_map(|b| trial.block(b)).collect();
     Ok(AxisFit {
         window_s: score.1,
         free: columns.free,
@@ -199,13 +199,13 @@ struct Trial<'a> {
 
 impl Trial<'_> {
     /// All samples.
-    fn whole(&self) -> Vec<Span> {
+    fn whole(&self) -> Vec<RunSpan> {
         let each = self.stretches.iter().enumerate();
         each.map(|(s, stretch)| (s, 0, stretch.len())).collect()
     }
 
     /// One of the blocks: a quarter of each stretch.
-    fn block(&self, block: usize) -> Vec<Span> {
+    fn block(&self, block: usize) -> Vec<RunSpan> {
         let at = |of: &Stretch, b: usize| b * (of.len() - 1) / BLOCKS;
         let each = self.stretches.iter().enumerate();
         let spans = each.map(|(s, of)| (s, at(of, block), at(of, block + 1) + 1));
@@ -213,7 +213,7 @@ impl Trial<'_> {
     }
 
     /// What is before and behind one of the blocks.
-    fn without(&self, block: usize) -> Vec<Span> {
+    fn without(&self, block: usize) -> Vec<RunSpan> {
         let out = self
             .block(block)
             .into_iter()
@@ -233,7 +233,7 @@ impl Trial<'_> {
         &self,
         model: &AugmentedModel,
         columns: &Columns,
-        (spans, length): (&[Span], f64),
+        (spans, length): (&[RunSpan], f64),
         told: bool,
     ) -> Result<Option<Fitted>, AxisError> {
         if (self.stop)() {

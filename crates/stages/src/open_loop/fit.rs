@@ -32,10 +32,10 @@ const SETTLED: f64 = 1e-4;
 const DAMPING: StepControl = StepControl::damping(6.0, 4.0, [1e-6, 1e8]);
 
 /// A span of a stretch: its number, first sample and the one after the last.
-pub type Span = (usize, usize, usize);
+pub type RunSpan = (usize, usize, usize);
 
 /// Windows of so many seconds in spans of stretches.
-pub(super) fn windows(stretches: &[Stretch], spans: &[Span], length_s: f64) -> Vec<Span> {
+pub(super) fn windows(stretches: &[Stretch], spans: &[RunSpan], length_s: f64) -> Vec<RunSpan> {
     let total: usize = spans.iter().map(|(_, from, to)| to - from).sum();
     let mut all = Vec::new();
     for &(s, from, to) in spans {
@@ -63,7 +63,7 @@ fn every(begin: usize, end: usize, positions: usize) -> usize {
 pub(super) fn errors(
     model: &AugmentedModel,
     stretches: &[Stretch],
-    windows: &[Span],
+    windows: &[RunSpan],
     positions: usize,
 ) -> Option<Vec<f64>> {
     let mut out = Vec::new();
@@ -123,7 +123,7 @@ struct At {
 pub(super) fn fit(
     start: &AugmentedModel,
     stretches: &[Stretch],
-    windows: &[Span],
+    windows: &[RunSpan],
     columns: &Columns,
     told: bool,
 ) -> Option<Fitted> {
@@ -196,7 +196,7 @@ pub(super) fn fit(
 }
 
 /// Windows behind one another that spans of stretches hold.
-pub(super) fn apart(windows: &[Span], stretches: &[Stretch], length_s: f64) -> f64 {
+pub(super) fn apart(windows: &[RunSpan], stretches: &[Stretch], length_s: f64) -> f64 {
     let spans = (0..stretches.len()).filter_map(|s| {
         let of = || windows.iter().filter(|w| w.0 == s);
         let (from, to) = (of().map(|w| w.1).min()?, of().map(|w| w.2).max()?);
@@ -206,7 +206,7 @@ pub(super) fn apart(windows: &[Span], stretches: &[Stretch], length_s: f64) -> f
 }
 
 /// Covariance of the numbers by the sum of the windows' scores.
-fn covariance(at: &At, stretches: &[Stretch], windows: &[Span], free: &[usize]) -> DMatrix<f64> {
+fn covariance(at: &At, stretches: &[Stretch], windows: &[RunSpan], free: &[usize]) -> DMatrix<f64> {
     let normal = at.slopes.tr_mul(&at.slopes);
     let inverse = RankRevealingInverse::of(&normal);
     let mut first = 0;

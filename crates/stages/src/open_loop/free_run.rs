@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::fit::Span;
+use super::fit::RunSpan;
 use super::stepper::Stepper;
 use super::windows::run;
 use cft_ident_core::effect::{AugmentedModel, shifted};
@@ -47,7 +47,7 @@ pub struct JointFreeRun {
     pub after: Option<PositionError>,
     /// Mean change of a window's rms, above 0 where the model after runs worse.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub change: Option<Change>,
+    pub change: Option<PositionErrorChange>,
 }
 
 /// Error of simulated positions.
@@ -72,7 +72,7 @@ pub struct ErrorAfter {
 
 /// A change with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Change {
+pub struct PositionErrorChange {
     /// \[m or rad\]
     pub value: f64,
     pub interval_95: [f64; 2],
@@ -81,7 +81,7 @@ pub struct Change {
 impl FreeRun {
     /// Joints that run worse with the model after, by the whole interval.
     pub fn worse(&self) -> impl Iterator<Item = &JointFreeRun> {
-        let worse = |c: &Change| c.interval_95[0] > 0.0;
+        let worse = |c: &PositionErrorChange| c.interval_95[0] > 0.0;
         let joints = self.joints.iter();
         joints.filter(move |joint| joint.change.as_ref().is_some_and(worse))
     }
@@ -108,14 +108,14 @@ pub fn free_run(
     given: &AugmentedModel,
     after: Option<&AugmentedModel>,
     stretches: &[Stretch],
-    spans: &[Span],
+    spans: &[RunSpan],
 ) -> Option<FreeRun> {
     let windows = windows(stretches, spans);
     if windows.len() < LEAST {
         return None;
     }
     let models: Vec<&AugmentedModel> = std::iter::once(given).chain(after).collect();
-    let each = |window: &Span| -> Option<Vec<Vec<Sums>>> {
+    let each = |window: &RunSpan| -> Option<Vec<Vec<Sums>>> {
         let of = |model: &&AugmentedModel| one(model, &stretches[window.0], *window);
         models.iter().map(of).collect()
     };
@@ -142,7 +142,7 @@ pub fn free_run(
 }
 
 /// Windows one behind the other, as many as are simulated.
-fn windows(stretches: &[Stretch], spans: &[Span]) -> Vec<Span> {
+fn windows(stretches: &[Stretch], spans: &[RunSpan]) -> Vec<RunSpan> {
     let mut all = Vec::new();
     for &(s, from, until) in spans {
         let size = (FREE_RUN_S / stretches[s].dt).round() as usize + 1;
@@ -158,7 +158,7 @@ fn windows(stretches: &[Stretch], spans: &[Span]) -> Vec<Span> {
 }
 
 /// Errors of every joint in one window; none where the motion goes astray.
-fn one(model: &AugmentedModel, stretch: &Stretch, (_, begin, end): Span) -> Option<Vec<Sums>> {
+fn one(model: &AugmentedModel, stretch: &Stretch, (_, begin, end): RunSpan) -> Option<Vec<Sums>> {
     // where the model's torque comes late, the torque that moves it at t is logged later
     let mut tau = stretch.tau.clone();
     for (j, tau) in tau.iter_mut().enumerate() {
@@ -213,7 +213,7 @@ fn error(windows: &[Sums]) -> PositionError {
 }
 
 /// Mean change of a window's rms, window by window.
-fn change(before: &[Sums], after: &[Sums]) -> Option<Change> {
+fn change(before: &[Sums], after: &[Sums]) -> Option<PositionErrorChange> {
     let pairs = before.iter().zip(after);
     let changes: Vec<f64> = pairs.map(|(a, b)| b.rms() - a.rms()).collect();
     let n = changes.len() as f64;
@@ -223,7 +223,7 @@ fn change(before: &[Sums], after: &[Sums]) -> Option<Change> {
     let value = changes.iter().sum::<f64>() / n;
     let square: f64 = changes.iter().map(|x| (x - value).powi(2)).sum();
     let half = NORMAL_95 * (square / (n - 1.0) / n).sqrt();
-    Some(Change {
+    Some(PositionErrorChange {
         value,
         interval_95: [value - half, value + half],
     })

@@ -17,7 +17,9 @@ mod stepper;
 mod windows;
 
 pub use choose::{AxisError, AxisFit, BLOCKS, PositionErrors, TriedAxis, fit_axis};
-pub use fit::Span;
-pub use free_run::{Change, FREE_RUN_S, FreeRun, JointFreeRun, PositionError, free_run};
+pub use fit::RunSpan;
+pub use free_run::{
+    FREE_RUN_S, FreeRun, JointFreeRun, PositionError, PositionErrorChange, free_run,
+};
 pub use stepper::Stepper;
 pub use windows::{JointDrift, OpenLoop, WindowLength, along};

@@ -3,7 +3,7 @@
 use crate::report::Writer;
 use crate::report::table::{Align, Table};
 use cft_ident_core::number;
-use cft_ident_stages::open_loop::{Change, FreeRun, PositionError};
+use cft_ident_stages::open_loop::{FreeRun, PositionError, PositionErrorChange};
 
 /// What a free run found, where there is one; nothing where every window went astray, but for a sentence.
 pub fn section(writer: &mut Writer, found: Option<&FreeRun>) {
@@ -66,7 +66,7 @@ fn compared(found: &FreeRun) -> Table {
     ])
     .caption(&caption(found));
     let rms = |error: &PositionError| number::significant(error.rms, 3);
-    let interval = |c: &Change| {
+    let interval = |c: &PositionErrorChange| {
         let [low, high] = c.interval_95.map(|x| number::significant(x, 2));
         format!("{low}..{high}")
     };

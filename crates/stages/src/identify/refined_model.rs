@@ -1,0 +1,253 @@
+//! The model that a diagnosis comes to, as a file.
+
+use super::consistent::project_by;
+use super::diagnose::Diagnosed;
+use super::error::IdentifyError;
+use super::logged_robot::LoggedRobot;
+use super::model::{in_file, new_model, refined};
+use super::open_loop::{is_in_si, whole};
+use crate::open_loop::{FreeRun, RunSpan, free_run};
+use cft_ident_core::diagnose::{FoundEffect, LogRole, Unknown};
+use cft_ident_core::effect::{AugmentedModel, EffectNumber};
+use cft_ident_core::motion::Stretch;
+use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
+use cft_ident_core::robot::model::JointFriction;
+use cft_ident_core::verdict::{Verdict, verdict_of};
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::candidates::CandidateSection;
+use cft_ident_files::config::model_file::{Estimate, Parameter};
+use cft_ident_logs::log::DataRole;
+
+impl Diagnosed {
+    /// The free run of the model given and of the one that is written, with the parameters in use.
+    pub(super) fn run_freely(
+        &self,
+        machine: &LoggedRobot,
+        (name, given): (&str, &ModelFile),
+    ) -> Result<Option<FreeRun>, IdentifyError> {
+        if !is_in_si(machine) {
+            return Ok(None);
+        }
+        let before = refined(given, name)?;
+        let after = match self.diagnosis.written().next() {
+            None => None,
+            Some(_) => Some(refined(&self.model(machine, given), name)?),
+        };
+        let stretches = &self.in_memory.stretches;
+        let spans = self.held_out_spans();
+        Ok(free_run(&before, after.as_ref(), stretches, &spans))
+    }
+
+    /// Held-out spans of the stretches; all of them where nothing is held out.
+    fn held_out_spans(&self) -> Vec<RunSpan> {
+        let (inputs, stretches) = (&self.in_memory.inputs, &self.in_memory.stretches);
+        let of_log = |s: &Stretch| inputs[s.log].role == Some(DataRole::HeldOut);
+        let aside = |s: &Stretch, t: f64| {
+            let mut blocks = self.diagnosis.set_aside.iter();
+            blocks.any(|a| {
+                a.role == LogRole::Holdout && a.log == s.log && (a.from_s..=a.to_s).contains(&t)
+            })
+        };
+        let mut spans = Vec::new();
+        for (number, s) in stretches.iter().enumerate() {
+            let held = |k: &usize| of_log(s) || aside(s, s.own_time(*k));
+            let mut from = (0..s.len()).find(held);
+            while let Some(begin) = from {
+                let until = (begin..s.len()).find(|k| !held(k)).unwrap_or(s.len());
+                spans.push((number, begin, until));
+                from = (until..s.len()).find(held);
+            }
+        }
+        match spans.is_empty() {
+            true => whole(stretches),
+            false => spans,
+        }
+    }
+
+    /// Estimated parameters of an effect with their standard deviations.
+    pub fn told(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
+        let effect = &step.estimate;
+        let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+        effect.numbers(&machine.robot, unit, Some(&step.covariance))
+    }
+
+    /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
+    pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
+        let diagnosis = &self.diagnosis;
+        if diagnosis.written().next().is_none() {
+            return file.clone();
+        }
+        let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
+        model.parameters.clone_from(&file.parameters);
+        // inertial parameters that are kept are as consistent as they were
+        let kept = !diagnosis
+            .unknowns
+            .iter()
+            .any(|u| matches!(u, Unknown::Theta(_)));
+        if !kept {
+            model.forget_consistent();
+        }
+        model.friction_prior.clone_from(&self.friction_prior);
+        // beside a part of an effect the declared numbers take up the rest, and are no estimates
+        let whole = self.is_whole();
+        let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
+        let mut undetermined = Vec::new();
+        for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
+            if self.hold_friction && matches!(unknown, Unknown::Friction { .. }) {
+                continue;
+            }
+            let Some((name, joint, value)) = fitted(&diagnosis.model, *unknown) else {
+                continue;
+            };
+            let there = |p: &&mut Parameter| p.name == name && p.joint == joint;
+            let Some(p) = model.parameters.iter_mut().find(there) else {
+                continue;
+            };
+            let found = diagnosis.covariance[(i, i)].max(0.0).sqrt();
+            if !whole {
+                let estimate = fitted(&diagnosis.estimates, *unknown).map_or(value, |f| f.2);
+                model.estimates.push(Estimate {
+                    name,
+                    joint,
+                    value: estimate,
+                    std: Some(found),
+                    unit: p.unit.clone(),
+                });
+                (p.value, p.std) = (value, None);
+                undetermined.push(p.key());
+                continue;
+            }
+            match put(p, value, found) {
+                Some(factor) => {
+                    widened.push(factor);
+                    keys.push(p.key());
+                    places.push(i);
+                }
+                None => undetermined.push(p.key()),
+            }
+        }
+        model.forget_covariance(&undetermined);
+        model.replace_covariance(&keys, &|a, b| {
+            widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
+        });
+        let joints = machine.robot.joint_names().iter();
+        for (joint, std) in joints.zip(&diagnosis.residual_std) {
+            model.residual_std.insert(joint.clone(), *std);
+        }
+        self.put_effects(machine, file, &mut model);
+        let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
+        let known = file.candidates.iter().chain(&self.candidates);
+        for candidate in known.filter(of_model) {
+            if !model.candidates.contains(candidate) {
+                model.candidates.push(candidate.clone());
+            }
+        }
+        self.held.write_into(&mut model);
+        if !kept && file.is_consistent() {
+            let key = |unknown: &Unknown| match fitted(&diagnosis.model, *unknown) {
+                Some((name, Some(joint), _)) => format!("{name}:{joint}"),
+                Some((name, None, _)) => name,
+                None => String::new(),
+            };
+            let unknowns: Vec<String> = diagnosis.unknowns.iter().map(key).collect();
+            if project_by(&mut model, &unknowns, &diagnosis.information).is_err() {
+                model.forget_consistent();
+            }
+        }
+        model
+    }
+
+    /// Whether every effect is written as it was estimated.
+    fn is_whole(&self) -> bool {
+        let model = &self.diagnosis.model;
+        let mut written = self.diagnosis.written();
+        written.all(|s| {
+            s.written
+                .is_some_and(|at| model.effects[at].linear == s.estimate.linear)
+        })
+    }
+
+    /// Effects that the given model had, and those that were found.
+    fn put_effects(&self, machine: &LoggedRobot, file: &ModelFile, model: &mut ModelFile) {
+        model.effects.clone_from(&file.effects);
+        model.estimates.extend(file.estimates.iter().cloned());
+        for step in self.diagnosis.written() {
+            let Some(effect) = step
+                .written
+                .and_then(|at| self.diagnosis.model.effects.get(at))
+            else {
+                continue;
+            };
+            let estimated = self.told(machine, step);
+            let whole = effect.linear == step.estimate.linear;
+            let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+            let numbers = match whole {
+                true => estimated.clone(),
+                false => effect.numbers(&machine.robot, unit, None),
+            };
+            let mut section = in_file(effect, machine, &numbers);
+            section.accepted_by_user = step.accepted_by_user;
+            if !whole {
+                section.shrinkage = Some(step.shrinkage);
+                let own = estimated.into_iter().filter(|n| n.std.is_some());
+                model.estimates.extend(own.map(|n| Estimate {
+                    name: format!("{} {}", section.name, n.key),
+                    joint: section.joint.clone(),
+                    value: n.value,
+                    std: n.std,
+                    unit: n.unit,
+                }));
+            }
+            model.effects.push(section);
+        }
+    }
+}
+
+/// Name, joint and value of an unknown that model files hold.
+fn fitted(model: &AugmentedModel, unknown: Unknown) -> Option<(String, Option<String>, f64)> {
+    let fitted = &model.model;
+    let robot = &fitted.robot;
+    let (name, joint, value) = match unknown {
+        Unknown::Theta(k) => (
+            robot.parameters()[k].name.to_string(),
+            None,
+            fitted.theta[k],
+        ),
+        Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
+        Unknown::Friction { joint, k } => match &fitted.friction[joint] {
+            JointFriction::None => return None,
+            JointFriction::DoubleTanh(law) => (
+                DoubleTanh::NAMES[k].to_owned(),
+                Some(joint),
+                law.parameters()[k],
+            ),
+            JointFriction::ViscousCoulomb(law) => (
+                ViscousCoulomb::NAMES[k].to_owned(),
+                Some(joint),
+                [law.viscous, law.coulomb][k],
+            ),
+        },
+    };
+    Some((name, joint.map(|j| robot.joint_names()[j].clone()), value))
+}
+
+/// Gives a parameter the value and the standard deviation that were found, and says by how much the
+/// latter is widened; none where other parameters explain the same torque in these logs.
+fn put(p: &mut Parameter, value: f64, found: f64) -> Option<f64> {
+    if !found.is_finite() {
+        p.value = value;
+        p.std = None;
+        p.verdict = Some(Verdict::NotIdentifiable);
+        return None;
+    }
+    // what smoothing and the encoders' steps did to the given model, they do to this one
+    let std = found.max(p.std.unwrap_or(0.0));
+    // a parameter without a torque worth mentioning is known well enough as it is
+    let negligible = p.is_negligible();
+    p.value = value;
+    p.std = Some(std);
+    if !negligible {
+        p.verdict = Some(verdict_of(value, std));
+    }
+    Some(if found > 0.0 { std / found } else { 1.0 })
+}
