@@ -40,7 +40,7 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident excite -r configs/cft.toml -o excitation.toml --plot excitation.svg
   cft-ident excite -r configs/cft.toml --joint q4 -o ladder.toml
-  cft-ident excite -m model.toml --for weak -o next.toml
+  cft-ident excite -m refined.toml --for ripple:q5 -o next.toml
   cft-ident excite --check configs/table3.toml";
 
 /// Design a motion for identification that keeps every limit, or check one that exists.
@@ -72,7 +72,7 @@ pub struct Args {
     #[arg(long, value_name = "JOINT", conflicts_with_all = ["check", "with", "trajectories", "offsets"])]
     pub joint: Option<String>,
     /// What the motion is to make small
-    #[arg(long, value_enum, default_value_t = CriterionName::Condition)]
+    #[arg(hide_short_help = true, long, value_enum, default_value_t = CriterionName::Condition)]
     pub criterion: CriterionName,
     /// With a-optimal: only this parameter, by its relative error; may be given more than once
     #[arg(hide_short_help = true, long = "parameter", value_name = "NAME")]

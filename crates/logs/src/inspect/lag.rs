@@ -6,7 +6,6 @@ use super::draft::{FaultList, seconds};
 use super::fault::FaultKind;
 use super::fault::Severity::Warning;
 use super::judge::LogJudge;
-use super::order::DELAY_EXPLAINS;
 use super::words::ChannelRole;
 use crate::log::DelayEstimator;
 
@@ -77,7 +76,6 @@ fn delay(window: &Window, pairs: &[(usize, usize)]) -> Option<f64> {
         }
         delay.add(*t, &q, &tau);
     }
-    // what hardly explains what is left is something else, such as a torque that goes by the position
     let found = delay.estimate()?;
-    (found.explains >= DELAY_EXPLAINS).then_some(found.delay_s)
+    Some(found.delay_s)
 }

@@ -18,7 +18,7 @@ const EXPLAINED: f64 = 0.5;
 /// A delay of fewer rows of the log is none...
 const DELAY_ROWS: f64 = 2.0;
 /// ... nor is one that explains a smaller share of what the model leaves.
-pub(super) const DELAY_EXPLAINS: f64 = 0.5;
+const DELAY_EXPLAINS: f64 = 0.5;
 
 /// What may be wrong with the order and signs of joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -30,8 +30,6 @@ pub struct DelayEstimate {
     pub delay_s: f64,
     /// Its standard deviation [s].
     pub std_s: f64,
-    /// Share of the squared residual without a delay that it explains.
-    pub explains: f64,
 }
 
 impl DelayEstimator {
@@ -60,7 +58,7 @@ impl DelayEstimator {
             None => format!(
                 "the delay between {positions} and {torques} cannot be determined from the motion ({removed})"
             ),
-            Some(DelayEstimate { delay_s, std_s, .. }) => format!(
+            Some(DelayEstimate { delay_s, std_s }) => format!(
                 "{torques} lags behind {positions} by {:.1} ms (standard deviation {:.1} ms), estimated from the motion; {removed}",
                 delay_s * 1e3,
                 std_s * 1e3
@@ -120,7 +118,6 @@ impl DelayEstimator {
         Some(DelayEstimate {
             delay_s: steps * dt,
             std_s: std * dt,
-            explains: 1.0 - residuals[least] / residuals[TRIALS].max(f64::MIN_POSITIVE),
         })
     }
 

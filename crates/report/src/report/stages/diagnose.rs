@@ -114,6 +114,9 @@ pub fn told(report: &mut Report, machine: &LoggedRobot, found: &Diagnosed) {
     let mut terminal = report.terminal();
     terminal.line("");
     terminal.note("", &first_screen::next(machine, found), 2);
+    if let Some(command) = first_screen::next_command(machine, found) {
+        terminal.code(&command);
+    }
 }
 
 /// Errors joint by joint, those of a screen.

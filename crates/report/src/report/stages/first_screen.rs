@@ -5,7 +5,7 @@ use crate::report::Writer;
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
 use cft_ident_core::diagnose::{Errors, FoundEffect};
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
+use cft_ident_stages::identify::{Diagnosed, LoggedRobot, separating_command};
 
 /// Errors per joint as bars, and the next thing to do.
 pub fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
@@ -43,6 +43,13 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
 fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
     let mut written = found.diagnosis.written();
     written.find(|step| !step.alternatives.is_empty())
+}
+
+/// The motion that [`next`] asks for, as a command; nothing where no motion of one joint will do.
+pub fn next_command(machine: &LoggedRobot, found: &Diagnosed) -> Option<String> {
+    let d = &found.diagnosis;
+    let step = unclear(found).filter(|_| d.determined && d.long_enough())?;
+    separating_command(&step.estimate, &machine.robot)
 }
 
 /// What to do next.
