@@ -9,11 +9,12 @@ use serde::Serialize;
 
 use super::beside_truth::{BesideTruth, load_truth, true_value};
 use super::{
-    CliError, Context, Outcome, campaign, logs_of, names_of, new, pictures, setup, validate,
+    CliError, Context, Outcome, campaign, held_out, logs_of, names_of, new, pictures, setup,
+    validate,
 };
-use cft_ident_files::config::campaign::{CampaignLogs, CampaignSettings};
+use cft_ident_files::config::campaign::CampaignSettings;
 use cft_ident_files::config::{self, Campaign};
-use cft_ident_logs::log::{LogSpec, Span};
+use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::residual;
 use cft_ident_report::report::stages;
@@ -72,11 +73,6 @@ pub struct Args {
 const FOLDER: &str = "cft-ident-run";
 /// Seed where none is named.
 const SEED: u64 = 1;
-/// Share of each log that is fitted; the rest of it is held out \[percent\].
-const FITTED: f64 = 75.0;
-/// Logs from which on the last is held out whole.
-const SEVERAL: usize = 3;
-
 /// What is run.
 struct Work {
     /// Name of it.
@@ -206,7 +202,7 @@ impl Work {
                 LoggedRobot::new(&robot.to_string_lossy(), found.file)
             }
         };
-        let logs = held_out(&args.logs);
+        let logs = held_out::parted(&args.logs);
         if logs.validation.is_empty() {
             warnings.push(
                 "no part of a log is held out: the error on data that were not fitted is not known"
@@ -235,54 +231,6 @@ impl Work {
             warnings,
         })
     }
-}
-
-/// Sets the last log aside where there are several, else the last part of each.
-fn held_out(logs: &[LogSpec]) -> CampaignLogs {
-    let mut out = CampaignLogs::default();
-    if let (Some((last, others)), true) = (logs.split_last(), logs.len() >= SEVERAL) {
-        out.identification = others.iter().map(LogSpec::to_string).collect();
-        out.validation = vec![last.to_string()];
-        return out;
-    }
-    for log in logs {
-        let parted = match log.span {
-            Span::Whole => Some((
-                Span::Percent {
-                    from: 0.0,
-                    to: FITTED,
-                },
-                Span::Percent {
-                    from: FITTED,
-                    to: 100.0,
-                },
-            )),
-            Span::Percent { from, to } => {
-                let middle = from + 0.01 * FITTED * (to - from);
-                Some((
-                    Span::Percent { from, to: middle },
-                    Span::Percent { from: middle, to },
-                ))
-            }
-            Span::Seconds { from, to } if to.is_finite() => {
-                let middle = from + 0.01 * FITTED * (to - from);
-                Some((
-                    Span::Seconds { from, to: middle },
-                    Span::Seconds { from: middle, to },
-                ))
-            }
-            Span::Seconds { .. } => None,
-        };
-        let part = |span: Span| log.of_span(span).to_string();
-        match parted {
-            Some((fitted, rest)) => {
-                out.identification.push(part(fitted));
-                out.validation.push(part(rest));
-            }
-            None => out.identification.push(log.to_string()),
-        }
-    }
-    out
 }
 
 /// A path of a campaign file: relative to the file's folder, or a file that comes with the tool.

@@ -34,6 +34,7 @@ mod context;
 mod error;
 mod exit;
 mod files;
+mod held_out;
 mod known_payload;
 mod outcome;
 mod outputs;

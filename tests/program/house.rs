@@ -79,6 +79,7 @@ const DOORS: &[(&str, &str)] = &[
     ("mcap", "log/recording/format/mcap.rs|output/mcap.rs"),
     ("rusqlite", "log/recording/format/bag.rs"),
     ("flate2", "log/content.rs|log/table/zip.rs|output/log.rs"),
+    ("parquet", "log/table/parquet.rs|output/parquet.rs"),
     ("zstd", "log/content.rs|output/log.rs"),
     ("resvg", "report/figure/png.rs"),
     ("sha2", "log/source.rs"),

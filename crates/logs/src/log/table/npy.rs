@@ -3,9 +3,9 @@
 use std::io::{self, BufReader, Read, Write};
 
 use super::super::held_files::OpenFile;
+use super::lines::{damaged, number};
 use super::literal::Literal;
 use super::zip::{self, Member};
-use super::{damaged, number};
 
 /// Largest head of an array [bytes].
 const HEAD: usize = 1 << 16;
@@ -179,7 +179,7 @@ impl Element {
                     });
                 }
                 out.size = out.size.checked_add(size)?;
-                if out.fields.len() > super::COLUMNS || out.size > HEAD {
+                if out.fields.len() > super::lines::COLUMNS || out.size > HEAD {
                     return None;
                 }
             }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::io::{self, Read};
 
+use super::lines::{COLUMNS, Table, unusable};
 use super::npy::{Array, Field};
-use super::{COLUMNS, Table, unusable};
 
 /// Columns of an array whose columns lie one behind the other, each of which is read from a place of its own.
 const APART: u64 = 256;

@@ -15,7 +15,7 @@ use parquet::record::reader::RowIter;
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 
-use super::{COLUMNS, Table, TableText, damaged, number, unusable};
+use super::lines::{COLUMNS, Table, TableText, damaged, number, unusable};
 
 /// Time between the last row of an episode and the first of the next [s]: longer than any filter reaches.
 const BETWEEN_EPISODES: f64 = 10.0;

@@ -3,7 +3,7 @@
 use std::io::{self, BufReader, Read};
 
 use super::super::held_files::OpenFile;
-use super::{damaged, unusable};
+use super::lines::{damaged, unusable};
 
 /// Largest comment behind the directory, and the directory's own end [bytes].
 const END: u64 = 65_557;
