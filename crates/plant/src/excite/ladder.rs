@@ -176,18 +176,23 @@ struct Rungs {
     turn: f64,
 }
 
-fn move_of(machine: &ForeseenRobot, task: &LadderTask, rungs: &Rungs) -> SingleJointMove {
+/// The acceleration that a ladder may take where the motors are the joints and something bounds it: less the reserve,
+/// as for every limit.
+fn acceleration(machine: &ForeseenRobot, task: &LadderTask) -> Option<f64> {
     let mut names = machine.model.robot.joint_names().iter();
     let joint = names.position(|name| *name == task.joint);
-    // where the motors are the joints, the reserve is that of every limit
     let mut limits = machine.channels.iter();
     let limit = limits.find(|c| c.quantity == Quantity::Acceleration && Some(c.index) == joint);
-    let limit = limit.filter(|_| machine.mechanism.motors_at_joints());
+    let limit = limit.filter(|_| machine.mechanism.motors_at_joints())?;
+    Some(three_digits((1.0 - task.reserve) * limit.upper))
+}
+
+fn move_of(machine: &ForeseenRobot, task: &LadderTask, rungs: &Rungs) -> SingleJointMove {
     SingleJointMove {
         joint: task.joint.clone(),
         speeds: rungs.speeds.clone(),
         range: None,
-        acceleration: limit.map(|c| three_digits((1.0 - task.reserve) * c.upper)),
+        acceleration: acceleration(machine, task),
         turn_s: Some(rungs.turn),
     }
 }
@@ -211,7 +216,8 @@ fn usual_speeds(
     task: &LadderTask,
     joint: usize,
 ) -> Result<Vec<f64>, ExciteError> {
-    let ladder = OneJointMove::new(joint, task.seconds, Some(task.seed));
+    let mut ladder = OneJointMove::new(joint, task.seconds, Some(task.seed));
+    ladder.acceleration = acceleration(machine, task);
     let Path::Ladder { ladder, .. } = ladder.reference(&machine.mechanism)?.path else {
         return Ok(Vec::new());
     };
