@@ -67,18 +67,19 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
         order.sort_unstable();
         kept = order.iter().map(|k| blocks[*k].clone()).collect();
     }
-    for (j, usual) in usual.iter().enumerate() {
-        let friction = BY_FRICTION * coulomb(factors, &theta, j);
-        for ratios in &mut ratios {
-            if ratios[j] * usual < friction {
-                ratios[j] = 0.0;
-            }
+    let friction = |j: usize| BY_FRICTION * coulomb(factors, &theta, j);
+    let friction: Vec<f64> = (0..usual.len()).map(friction).collect();
+    for ratios in &mut ratios {
+        let beyond = |j: usize| ratios[j] * usual[j] > friction[j];
+        if !(0..usual.len()).any(beyond) {
+            ratios.fill(0.0);
         }
     }
     Ok(joined(&blocks, &ratios))
 }
 
-/// Coulomb levels by which the torque of a joint that sticks or turns may be off: from one side to the other.
+/// Coulomb levels by which the torque of a joint that sticks or turns may be off, from one side to the other: a push
+/// leaves more at one joint at least.
 const BY_FRICTION: f64 = 2.0;
 
 /// Coulomb level of a joint by a fit; 0 where it is not fitted.
