@@ -7,6 +7,12 @@ pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.0, 0.3 * site.scale],
     build: |site, _, values| {
+        if !site.turns {
+            return Err(site.refuse(
+                ENTRY.name,
+                "its lever turns about an axis, and this joint slides; use `torque-offset`",
+            ));
+        }
         Built::plant(Weight {
             joint: site.joint(),
             moment: values[0].hypot(values[1]),
