@@ -132,9 +132,7 @@ impl Terms {
 
     /// Fits all terms to joints' sums, some of them held.
     pub fn fit(&self, sums: &[DMatrix<f64>], held: &[(usize, f64)]) -> TermFit {
-        let (mut normal, mut right) = self.normal(sums);
-        let diagonal: Vec<f64> = normal.diagonal().iter().copied().collect();
-        self.firm(&mut normal, &mut right, &diagonal);
+        let (normal, right) = self.firmed(sums);
         let mut bounds: Vec<Bound> = self.list.iter().map(|t| t.bound).collect();
         for (i, x) in held {
             bounds[*i] = Bound {
@@ -151,10 +149,14 @@ impl Terms {
 
     /// Information matrix of the terms: that of joints' sums and of what is known beforehand, in weighted rows.
     pub fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
+        self.firmed(sums).0
+    }
+
+    fn firmed(&self, sums: &[DMatrix<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let (mut normal, mut right) = self.normal(sums);
         let diagonal: Vec<f64> = normal.diagonal().iter().copied().collect();
         self.firm(&mut normal, &mut right, &diagonal);
-        normal
+        (normal, right)
     }
 
     /// What the fit has of its prior: the covariance of its values by that of the prior, over the squared unit in which

@@ -7,6 +7,7 @@
 //! | [`rank`] | singular values, rank, condition number | `faer` |
 //! | `rank_revealing` | inverse of a normal matrix with redundant columns | none |
 //! | `jacobi` | one-sided Jacobi singular values: fallback and test oracle | none |
+//! | [`covariance`] | the information that a covariance holds | none |
 //! | `bootstrap` | 95 % intervals of statistics of pieces of data | none |
 //! | `lanes` | loops compiled for the widest vectors of the processor | `pulp` |
 //! | [`descent`] | step control of the Gauss-Newton loops | none |
@@ -17,6 +18,7 @@
 
 pub mod bootstrap;
 pub mod causal;
+pub mod covariance;
 pub mod descent;
 pub mod formula;
 pub mod jacobi;

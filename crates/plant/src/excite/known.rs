@@ -1,7 +1,8 @@
 //! What an identified model knows of the unknowns of a design, and which of them are still weak.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
+use cft_ident_core::math::covariance::information_rows;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
@@ -10,9 +11,6 @@ use super::ExciteError;
 use super::foresee::inverse;
 use super::information::Information;
 use super::machine::ForeseenRobot;
-
-/// Share of the largest variance, unknowns scaled by their deviations, below which a direction is rounding.
-const ROUNDING: f64 = 1e-13;
 
 /// What the logs of a model have told.
 #[derive(Debug, Clone)]
@@ -34,12 +32,13 @@ impl InformationBefore {
         let found = |name: &String| file.parameters.iter().find(|q| q.key() == *name);
         let open =
             |q: &Parameter| matches!(q.verdict, Some(Verdict::Weak | Verdict::NotIdentifiable));
+        let rows = information_rows(&covariance, p);
         let weak = names.iter().enumerate();
         let weak = weak.filter(|(_, name)| found(name).is_some_and(open));
         let variance = |i: usize| Some(covariance[i * p + i]).filter(|x| *x > 0.0);
         InformationBefore {
             weak: weak.map(|(i, _)| i).collect(),
-            information: inverse_of(&covariance, p),
+            information: rows.tr_mul(&rows),
             variances: (0..p).map(variance).collect(),
         }
     }
@@ -66,40 +65,5 @@ impl InformationBefore {
             }
         }
         Ok(factors)
-    }
-}
-
-/// Inverse of a covariance on the directions that have a variance.
-fn inverse_of(covariance: &[f64], p: usize) -> DMatrix<f64> {
-    let scale = |i: usize| match covariance[i * p + i].max(0.0).sqrt() {
-        std if std > 0.0 => 1.0 / std,
-        _ => 0.0,
-    };
-    let scale: Vec<f64> = (0..p).map(scale).collect();
-    let correlation = DMatrix::from_fn(p, p, |i, j| covariance[i * p + j] * scale[i] * scale[j]);
-    let parts = SymmetricEigen::new(correlation);
-    let largest = parts.eigenvalues.amax();
-    let mut out = DMatrix::zeros(p, p);
-    for (k, size) in parts.eigenvalues.iter().enumerate() {
-        if *size > ROUNDING * largest {
-            let v = parts.eigenvectors.column(k);
-            out += v * v.transpose() / *size;
-        }
-    }
-    DMatrix::from_fn(p, p, |i, j| out[(i, j)] * scale[i] * scale[j])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_inverse_leaves_out_what_has_no_variance() {
-        let c = [4.0, 1.0, 0.0, 1.0, 9.0, 0.0, 0.0, 0.0, 0.0];
-        let found = inverse_of(&c, 3);
-        let wanted = DMatrix::from_row_slice(2, 2, &[4.0, 1.0, 1.0, 9.0]);
-        let wanted = wanted.try_inverse().unwrap();
-        assert!((found.view((0, 0), (2, 2)) - wanted).amax() < 1e-12);
-        assert_eq!(found.row(2).amax(), 0.0);
     }
 }

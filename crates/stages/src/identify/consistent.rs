@@ -14,6 +14,7 @@ use cft_ident_core::inertia::feasible::{
     ConsistencyProblem, Feasible, FrictionColumns, PRIOR_WEIGHT, with_friction,
 };
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
+use cft_ident_core::math::covariance::information_rows;
 use cft_ident_core::math::descent::Ending;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::bodies::StandardMap;
@@ -230,10 +231,6 @@ impl ConsistentLinks {
     }
 }
 
-/// Share of the largest variance (parameters scaled by their deviations) below which a direction is none that
-/// a covariance tells of: rounding.
-const ROUNDING: f64 = 1e-13;
-
 /// Puts beside the parameters of a model the physically consistent ones nearest to them in the metric of their
 /// covariance: for a model whose rows are gone. Nothing where it holds no covariance of inertial parameters.
 ///
@@ -251,7 +248,7 @@ pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
         .cloned()
         .collect();
     keys.extend(others);
-    let rows = rows_of_covariance(&model.covariance_of(&keys), keys.len());
+    let rows = information_rows(&model.covariance_of(&keys), keys.len());
     project_in(model, &keys, rows)
 }
 
@@ -345,30 +342,6 @@ fn rows_of_information(information: DMatrix<f64>) -> DMatrix<f64> {
     let mut rows = parts.eigenvectors.transpose();
     for (k, size) in parts.eigenvalues.iter().enumerate() {
         rows.row_mut(k).scale_mut(size.max(0.0).sqrt());
-    }
-    rows
-}
-
-/// Rows whose square is the information matrix of a covariance of `u` unknowns; what has no variance of its own
-/// has no row.
-fn rows_of_covariance(covariance: &[f64], u: usize) -> DMatrix<f64> {
-    let scale = |i: usize| match covariance[i * u + i].max(0.0).sqrt() {
-        std if std > 0.0 => 1.0 / std,
-        _ => 0.0,
-    };
-    let scale: Vec<f64> = (0..u).map(scale).collect();
-    let correlation = DMatrix::from_fn(u, u, |i, j| covariance[i * u + j] * scale[i] * scale[j]);
-    let parts = SymmetricEigen::new(correlation);
-    let largest = parts.eigenvalues.amax();
-    let mut rows = DMatrix::zeros(u, u);
-    for k in 0..u {
-        let size = parts.eigenvalues[k];
-        if size <= ROUNDING * largest {
-            continue;
-        }
-        for i in 0..u {
-            rows[(k, i)] = parts.eigenvectors[(i, k)] * scale[i] / size.sqrt();
-        }
     }
     rows
 }
