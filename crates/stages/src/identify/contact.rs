@@ -33,7 +33,8 @@ pub(super) fn contacts(
     if !linear || machine.robot.joints() < 2 || logs.iter().any(|log| log.reduced().is_some()) {
         return Ok(Vec::new());
     }
-    let mut passes = Passes::new(machine, logs, control);
+    let own = machine.own_settings(logs, &[], control)?;
+    let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
     passes.read(PositionFilter::Declared, &columns(machine, None), None)?;
     passes.contacts()
 }
