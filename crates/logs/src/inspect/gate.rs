@@ -88,6 +88,17 @@ impl Gate {
             .map(bridge)
             .collect();
         mending.failed = std::mem::take(&mut found.failed).into();
+        if !(mending.bridges.is_empty() && mending.failed.is_empty()) {
+            // what goes along takes no number that is mended
+            let (mut mended, mut block) = (open()?, Block::default());
+            mended.mend(&mending);
+            while mended.read(&mut block)? {
+                if stop() {
+                    return Ok(None);
+                }
+                also(&block, mended.layout());
+            }
+        }
         let off_told = found.of(Severity::Info);
         let off_told = off_told.filter(|fault| fault.kind == FaultKind::MotorOff);
         let off_told = off_told.cloned().collect();

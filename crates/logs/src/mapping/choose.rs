@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::column::LogColumn;
 use super::family::{Family, How, Key, families, fit};
 use super::fitting::{Taken, best, without_common_head};
+use super::left::{left, offered};
 use super::look::{ClockSource, SeenColumns};
 use super::units::{of_positions, of_torques, other_velocity, stated_position, stated_torque};
 use crate::inspect::ChannelRole;
@@ -105,7 +106,16 @@ impl Mapping {
         let Some(seen) = seen else {
             return out;
         };
-        let position = best(columns, ChannelRole::Position, false, &names, None);
+        let mut position = best(columns, ChannelRole::Position, false, &names, None);
+        if position.is_none() {
+            position = best(columns, ChannelRole::Position, true, &names, None);
+            if let Some(taken) = &position {
+                out.checks.push(format!(
+                    "positions: no measured ones are found, {} are commanded ones",
+                    escape(&taken.pattern)
+                ));
+            }
+        }
         let beside = position.as_ref().map(|taken| taken.pattern.clone());
         let beside = beside.as_deref();
         let velocity = best(columns, ChannelRole::Velocity, false, &names, beside)
@@ -121,10 +131,25 @@ impl Mapping {
                 ));
             }
         }
+        let one = position.is_some() != torque.is_some();
+        if let Some(taken) = left(columns, &names).filter(|_| one) {
+            let (place, what) = match torque.is_none() {
+                true => (&mut torque, "torques"),
+                false => (&mut position, "positions"),
+            };
+            if what == "torques" && taken.columns.iter().flatten().all(|c| c.commanded) {
+                out.torque_is = "commanded";
+            }
+            out.checks.push(format!(
+                "{what}: {} in the order of the joints, for they are what is left and no name says more",
+                escape(&taken.pattern)
+            ));
+            *place = Some(taken);
+        }
         let all = [position, velocity, torque];
         for (taken, (_, what)) in all.iter().zip(ROLES) {
             match taken {
-                Some(taken) => out.tell(taken, what, names.len(), seen.headerless),
+                Some(taken) => out.tell(taken, what, names.len(), seen.by_content),
                 None if what == "velocities" => {}
                 None => {
                     out.lacking.push(what);
@@ -138,8 +163,8 @@ impl Mapping {
         if !out.lacking.is_empty() {
             out.offered = offered(columns, names.len());
         }
-        if seen.headerless {
-            out.how = "by what they hold, for they have no names: CHECK IT";
+        if seen.by_content {
+            out.how = "by what they hold, for no name says it: CHECK IT";
         }
         let [position, velocity, torque] = all;
         // words of a joint's name are no units
@@ -194,10 +219,10 @@ impl Mapping {
     }
 
     /// Says how a family was taken.
-    fn tell(&mut self, taken: &Taken, what: &str, joints: usize, headerless: bool) {
+    fn tell(&mut self, taken: &Taken, what: &str, joints: usize, by_content: bool) {
         let pattern = escape(&taken.pattern);
         match taken.how {
-            _ if headerless => self
+            _ if by_content => self
                 .checks
                 .push(format!("{what}: found by what the columns hold")),
             How::Fits => {}
@@ -330,21 +355,6 @@ fn plain(known: &Known) -> JointColumns {
         in_messages: None,
         by_path: false,
     }
-}
-
-/// Families that are offered where no name says what they are.
-const OFFERED: usize = 6;
-
-/// Families of as many columns as joints whose names say nothing.
-fn offered(columns: &[LogColumn], joints: usize) -> Vec<String> {
-    let unsaid = |c: &&LogColumn| matches!(c.role, ChannelRole::Other | ChannelRole::Command);
-    let unsaid: Vec<&LogColumn> = columns.iter().filter(unsaid).collect();
-    let found = families(&unsaid, &[]);
-    let fitting = found.iter().filter(|family| family.members.len() == joints);
-    fitting
-        .take(OFFERED)
-        .map(|family| family.pattern.clone())
-        .collect()
 }
 
 /// A column of temperatures for every joint, where a family of them fits.

@@ -121,7 +121,7 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
     };
     for column in columns {
         let name = &column.name;
-        if name.starts_with('#') {
+        if column.by_content {
             // a column without a name: its content gave it a number
             let key = match column.joint.parse() {
                 Ok(number) => Key::Number(number),
@@ -347,7 +347,8 @@ pub(super) fn fit<'a>(
     }
     let names: Vec<&str> = (family.members.iter())
         .filter_map(|(key, _)| match key {
-            Key::Name(name) => Some(name.as_str()),
+            // one letter is an axis
+            Key::Name(name) => Some(name.as_str()).filter(|name| name.len() > 1),
             Key::Number(_) => None,
         })
         .collect();

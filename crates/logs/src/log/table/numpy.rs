@@ -62,8 +62,7 @@ impl ArrayTable {
     pub(super) fn new(arrays: Vec<Array>) -> io::Result<(Self, Vec<String>)> {
         let Some(rows) = rows_of(&arrays) else {
             return Err(unusable(
-                "it holds no array of numbers, as .npz files do (.xlsx files are archives too)"
-                    .to_owned(),
+                "it holds no array of numbers".to_owned(),
             ));
         };
         let mut out = Self {
