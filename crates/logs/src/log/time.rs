@@ -337,7 +337,10 @@ mod tests {
         ] {
             assert_eq!(iso(text), Some(expected), "{text}");
         }
+        assert_eq!(iso("29.2.2024 12:34:56.789"), Some(expected));
         assert_eq!(iso("1970-01-01T00:00"), Some(Instant::default()));
+        let of_day = iso("12:34:56.789").unwrap();
+        assert_eq!(of_day.seconds(), 45_296.789);
         assert_eq!(iso("1969-12-31T23:59:59Z"), Some(Instant::from_s_ns(-1, 0)));
         assert_eq!(
             iso("2000-03-01T00:00:00Z"),
@@ -348,7 +351,9 @@ mod tests {
     #[test]
     fn what_is_no_stamp_is_refused() {
         for text in [
-            "12:34:56",
+            "12:34",
+            "25:00:00",
+            "1.13.2024 00:00:00",
             "2024-13-01T00:00",
             "2024-01-01",
             "2024-01-01T25:00",

@@ -2,7 +2,8 @@
 
 use crate::inspect::ChannelRole;
 
-/// A clock is known from more rows than this, and too coarse where it moves by more than this share of a step at once.
+/// A clock is known from more rows than this, and too coarse where it moves by more than this share of a step at once;
+/// its longer and its shorter steps have at least this share each.
 const FEW: usize = 100;
 const COARSE: f64 = 0.1;
 /// Likeness of a column to the differences of another that makes it its velocity.
@@ -35,7 +36,11 @@ pub(super) fn rounded_step(times: &[f64]) -> Option<f64> {
     let rounding = steps().fold(0.0, f64::max) - least;
     let even = |(k, t): (usize, &f64)| (t - first - k as f64 * step).abs() <= 1.01 * rounding;
     let whole = (least / rounding - (least / rounding).round()).abs() < 0.01;
-    let coarse = times.len() > FEW && least >= 0.0 && rounding > COARSE * step && whole;
+    // seldom a longer step is a lost row, seldom a shorter one a row too many
+    let longer = (step - least) / rounding;
+    let longer = longer <= 1.0 - COARSE && (longer >= COARSE || least == 0.0);
+    let coarse = times.len() > FEW && least >= 0.0 && rounding > COARSE * step;
+    let coarse = coarse && whole && longer;
     (coarse && times.iter().enumerate().all(even)).then_some(step)
 }
 

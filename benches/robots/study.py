@@ -1,0 +1,148 @@
+"""Fits every URDF of a folder to torques that Pinocchio computed, and compares ranks and torques with Pinocchio's.
+
+    study.py TOOL FOLDER RESULT.json [SECONDS]
+
+For each robot, its root fixed: `new --urdf --log` on a simulated log (a sum of sines at every joint, 20 s at 200 Hz,
+inverse dynamics of Pinocchio, no noise), `lsq`, and `validate` on another motion. The rank is that of Pinocchio's
+regressor over random states. A robot that takes longer than SECONDS counts as not done.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+RATE, SECONDS = 200.0, 20.0
+EDGE = 1e-9
+
+
+def motion(model, seed):
+    """Configurations, velocities and accelerations along sums of sines about the middle of the ranges."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(RATE * SECONDS)) / RATE
+    free = [joint.nq != joint.nv for joint in list(model.joints)[1:]]
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    q, v, a = (np.zeros((len(t), model.nv)) for _ in range(3))
+    for k, joint in enumerate(list(model.joints)[1:]):
+        at = joint.idx_v
+        low, high = (-np.pi, np.pi) if free[k] else (lower[joint.idx_q], upper[joint.idx_q])
+        if not np.isfinite(high - low) or high - low > 2 * np.pi or high <= low:
+            low, high = -np.pi, np.pi
+        sliding = "P" in joint.shortname()
+        reach = min(0.4 * (high - low), 0.3 if sliding else 1.0)
+        frequency = rng.uniform(0.1, 1.0, 5)
+        share = rng.uniform(0.5, 1.0, 5)
+        amplitude = reach * share / share.sum()
+        phase = rng.uniform(0.0, 2 * np.pi, 5)
+        turn = 2 * np.pi * frequency
+        angle = np.outer(t, turn) + phase
+        q[:, at] = 0.5 * (low + high) + np.sin(angle) @ amplitude
+        v[:, at] = np.cos(angle) @ (amplitude * turn)
+        a[:, at] = -np.sin(angle) @ (amplitude * turn**2)
+    return t, q, v, a
+
+
+def configuration(model, angles):
+    q = pin.neutral(model)
+    for joint in list(model.joints)[1:]:
+        x = angles[joint.idx_v]
+        if joint.nq == 2:
+            q[joint.idx_q : joint.idx_q + 2] = np.cos(x), np.sin(x)
+        else:
+            q[joint.idx_q] = x
+    return q
+
+
+def write(model, path, seed):
+    data = model.createData()
+    t, q, v, a = motion(model, seed)
+    tau = np.array([pin.rnea(model, data, configuration(model, x), y, z) for x, y, z in zip(q, v, a)])
+    names = list(model.names)[1:]
+    header = ["t", *(f'"q_{name}"' for name in names), *(f'"tau_{name}"' for name in names)]
+    np.savetxt(path, np.column_stack([t, q, tau]), delimiter=",", header=",".join(header), comments="", fmt="%.12g")
+    return tau
+
+
+def rank(model, mimicked):
+    """Rank of the regressor of the inertial parameters over random states."""
+    data = model.createData()
+    rng = np.random.default_rng(1)
+    count = 4 + 30 * 10 * model.nv // max(model.nv, 1)
+    rows = []
+    for _ in range(max(60, min(count, 300))):
+        q = configuration(model, rng.uniform(-1, 1, model.nv))
+        v, a = rng.normal(size=model.nv), rng.normal(size=model.nv) * 3
+        rows.append(pin.computeJointTorqueRegressor(model, data, q, v, a))
+    stacked = np.linalg.qr(np.vstack(rows), mode="r")
+    scale = np.linalg.norm(stacked, axis=0)
+    singular = np.linalg.svd(stacked / np.where(scale > 0, scale, 1), compute_uv=False)
+    return int((singular > EDGE * singular[0]).sum())
+
+
+def run(tool, limit, folder, *arguments):
+    line = [tool, *map(str, arguments), "-q"]
+    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, timeout=limit)
+    if done.returncode != 0:
+        raise RuntimeError(done.stderr.strip().split("\n")[-1 if "error" not in done.stderr else 0][:200])
+    return json.loads(done.stdout) if "--json" in line else None
+
+
+def robot(tool, urdf, limit):
+    model = pin.buildModelFromUrdf(str(urdf))
+    found = {"robot": urdf.stem, "joints": model.nv}
+    if model.nv == 0:
+        return found | {"skipped": "no joint moves"}
+    tree = xml.etree.ElementTree.parse(urdf)
+    if any(joint.find("mimic") is not None for joint in tree.iter("joint")):
+        found["mimic"] = True
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        write(model, folder / "fit.csv", 1)
+        tau = write(model, folder / "other.csv", 2)
+        run(tool, limit, folder, "new", "robot", "--urdf", urdf, "--log", "fit.csv")
+        base = run(
+            tool, limit, folder, "lsq", "fit.csv", "-r", "robot.toml", "-o", "model.toml", "--unconstrained",
+            "--as-declared", "--json", "-",
+        )
+        errors = run(tool, limit, folder, "validate", "other.csv", "-m", "model.toml", "--json", "-")
+    friction = {"viscous", "coulomb", "offset"}
+    inertial = [p for p in base["parameters"] if p["name"] not in friction and not p["name"].startswith("Ia")]
+    found["rank"] = {"pinocchio": rank(model, found.get("mimic")), "cft_ident": len(inertial)}
+    moved = np.sqrt((tau**2).mean(axis=0))
+    known = dict(zip(list(model.names)[1:], moved))
+    worst = [j for j in errors["joints"] if known.get(j["joint"], 1.0) > 1e-6 * moved.max()]
+    found["largest_error"] = max((j["relative_error"] for j in worst), default=0.0)
+    return found
+
+
+def main(tool, folder, result, limit="120"):
+    tool, found = Path(tool).resolve(), []
+    for urdf in sorted(Path(folder).rglob("*.urdf"), key=lambda path: (path.stem, path)):
+        try:
+            one = robot(tool, urdf, float(limit))
+        except subprocess.TimeoutExpired:
+            one = {"robot": urdf.stem, "failed": f"takes longer than {limit} s"}
+        except Exception as error:
+            one = {"robot": urdf.stem, "failed": str(error)[:200]}
+        print(one, flush=True)
+        found.append(one)
+    fitted = [one for one in found if "largest_error" in one]
+    whole = [one for one in fitted if one["rank"]["cft_ident"] >= one["rank"]["pinocchio"]]
+    summary = {
+        "urdfs": len(found),
+        "fitted": len(fitted),
+        "full_rank": len(whole),
+        "within_half_a_percent": sum(one["largest_error"] < 0.005 for one in fitted),
+        "pinocchio": pin.__version__,
+        "robots": found,
+    }
+    Path(result).write_text(json.dumps(summary, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
