@@ -90,7 +90,8 @@ impl Gate {
             if found.bridges.is_empty() && found.failed.is_empty() {
                 break;
             }
-            let of_mended = |kind: FaultKind| matches!(kind, FaultKind::Spike | FaultKind::FailedRead);
+            let of_mended =
+                |kind: FaultKind| matches!(kind, FaultKind::Spike | FaultKind::FailedRead);
             let faults = found.faults.into_iter().filter(|fault| fault.cut);
             marked.extend(faults.filter(|fault| of_mended(fault.kind)));
             mended.extend(found.costs.into_iter().filter(|cost| of_mended(cost.kind)));

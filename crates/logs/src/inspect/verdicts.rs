@@ -348,9 +348,7 @@ fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
         return;
     }
     let (severity, then) = match track.channel.role {
-        _ if used && messages && track.rows > 0 => {
-            (Warning, "a fit leaves these messages out")
-        }
+        _ if used && messages && track.rows > 0 => (Warning, "a fit leaves these messages out"),
         _ if used => (Error, "a fit refuses the log"),
         ChannelRole::Temperature => (
             Warning,
@@ -361,8 +359,14 @@ fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
     let effect = |rows: u64, times: usize| {
         format!("{} without a finite number: {then}", rows_text(rows, times))
     };
-    let remedy =
-        "delete the rows without a measurement: a gap in time is handled, a made-up number is not";
+    let remedy = match messages {
+        true => {
+            "nothing where each message holds some of the joints; else look at what publishes them"
+        }
+        false => {
+            "delete the rows without a measurement: a gap in time is handled, a made-up number is not"
+        }
+    };
     draft.stretches(
         FaultKind::Nan,
         severity,

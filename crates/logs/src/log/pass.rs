@@ -231,9 +231,7 @@ impl LogPass {
     #[inline]
     pub(super) fn next(&mut self) -> Result<Option<f64>, LogError> {
         let mut stamp = self.rows.next()?;
-        if !std::mem::replace(&mut self.begun, true)
-            && stamp.is_some_and(|stamp| stamp.is_zero())
-        {
+        if !std::mem::replace(&mut self.begun, true) && stamp.is_some_and(|stamp| stamp.is_zero()) {
             self.unstamped = self.unstamped()?;
             for _ in 0..self.unstamped {
                 stamp = self.rows.next()?;

@@ -205,7 +205,9 @@ mod tests {
             assert!((found / step - 1.0).abs() < 1e-2, "{step}: {found}");
         }
         assert_eq!(rounded_step(&times(0.01, 1e-6)), None);
-        let uneven: Vec<f64> = (0..2000).map(|k| f64::from(k) + 0.3 * f64::from(k % 3)).collect();
+        let uneven: Vec<f64> = (0..2000)
+            .map(|k| f64::from(k) + 0.3 * f64::from(k % 3))
+            .collect();
         assert_eq!(rounded_step(&uneven), None);
         let late: Vec<f64> = (0..2000).map(|k| f64::from(k + k / 500)).collect();
         assert_eq!(rounded_step(&late), None);

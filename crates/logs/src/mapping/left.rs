@@ -23,10 +23,7 @@ fn unsaid<'a>(
 /// Their names, for the user to choose from.
 pub(super) fn offered(columns: &[LogColumn], joints: usize) -> Vec<String> {
     let found = unsaid(columns, joints, &|_| true).into_iter();
-    found
-        .take(OFFERED)
-        .map(|family| family.pattern)
-        .collect()
+    found.take(OFFERED).map(|family| family.pattern).collect()
 }
 
 /// The only one whose columns change, where there are several joints: what they lack, if they lack one kind alone.

@@ -7,7 +7,7 @@ use super::content;
 use super::error::MappingError;
 use super::units::wrap_of;
 use crate::inspect::words::{is_command, words};
-use crate::inspect::{self, ChannelColumn, ColumnPlan, InspectedChannel};
+use crate::inspect::{self, ChannelColumn, ChannelRole, ColumnPlan, InspectedChannel};
 use crate::log::{
     self, LogSection, LogSpec, Provenance, RawBlock, RawReader, StateGroup, escape, list,
 };
@@ -149,6 +149,10 @@ pub fn look(
         let rate = 1.0 / step;
         Some(log::round_within(rate, rate / times.len() as f64))
     });
+    let own_rate = match log.is_recording() {
+        true => rate_of_positions(&columns, &numbers, &sample),
+        false => None,
+    };
     let clock = match (time, even_rate_hz) {
         (Some((at, ..)), Some(hz)) => ClockSource::Rate {
             hz,
@@ -174,11 +178,22 @@ pub fn look(
         },
         topic,
         by_content,
-        rate_hz: even_rate_hz.or(findings.rate_hz),
+        rate_hz: even_rate_hz.or(own_rate).or(findings.rate_hz),
         duration_s: findings.duration_s,
         name,
         provenance: log.provenance()?,
     })
+}
+
+/// The rate of the positions, where rows of a recording hold those of some joints alone: its first column is the time.
+fn rate_of_positions(columns: &[LogColumn], numbers: &[usize], sample: &[Vec<f64>]) -> Option<f64> {
+    let t = sample.first()?;
+    let rows = |at: &usize| sample[*at].iter().filter(|x| x.is_finite()).count();
+    let of = columns.iter().zip(numbers);
+    let of = of.filter(|(column, _)| column.role == ChannelRole::Position && !column.commanded);
+    let most = of.map(|(_, at)| rows(at)).max()?;
+    let span = t.last()? - t.first()?;
+    (most < t.len() && most > 1 && span > 0.0).then(|| (most - 1) as f64 / span)
 }
 
 /// Whether no name says what a column holds, and there are positions and torques of every joint, or velocities too.

@@ -257,11 +257,20 @@ fn a_message_whose_number_is_none_is_left_out_and_told_and_a_recording_of_none_e
     let (block, reader) = read(&shown(&path), &one_joint(""));
     assert_eq!(block.t, [0.0, 1e-3, 2e-3, 4e-3]);
     let told = reader.warnings().concat();
-    for words in ["1 of 5 messages", "message 4", "no number as `position[name=q1]`"] {
+    for words in [
+        "1 of 5 messages",
+        "message 4",
+        "no number as `position[name=q1]`",
+    ] {
         assert!(told.contains(words), "{words}: {told}");
     }
     let message = refused(&recorded("none.mcap", &|_| true), &one_joint(""));
-    for words in ["none of 5 messages", "message 1", "position[name=q1]", "another one"] {
+    for words in [
+        "none of 5 messages",
+        "message 1",
+        "position[name=q1]",
+        "another one",
+    ] {
         assert!(message.contains(words), "{words}: {message}");
     }
 }

@@ -124,9 +124,8 @@ impl JoinedTopics {
                 continue;
             };
             let entry = (channel.column.clone(), path.to_owned());
-            let same = |(known, of): (&(String, _), &usize)| {
-                known.0 == topic && (!apart || *of == joint)
-            };
+            let same =
+                |(known, of): (&(String, _), &usize)| known.0 == topic && (!apart || *of == joint);
             match fields.iter().zip(&joints).position(same) {
                 Some(at) => fields[at].1.push(entry),
                 None => {
@@ -155,7 +154,7 @@ impl JoinedTopics {
     pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
         let mut recording = MessageFiles::open(paths, Wanted::default())?;
         let mut found: Vec<(String, Vec<(String, String)>)> = Vec::new();
-        let mut looked = 0;
+        let (mut looked, mut unread) = (0, None);
         while looked < LOOKED_AT
             && let Some(message) = recording.next()?
         {
@@ -165,9 +164,14 @@ impl JoinedTopics {
             if !asked || found.iter().any(|(known, _)| known == name) {
                 continue;
             }
-            if let Ok(reader) = reader_of(&message.topic.schema, &[]) {
-                let leaves = reader.leaves(message.data).into_iter();
-                found.push((name.clone(), leaves.map(|l| (l.path, l.label)).collect()));
+            match reader_of(&message.topic.schema, &[]) {
+                Ok(reader) => {
+                    let leaves = reader.leaves(message.data).into_iter();
+                    found.push((name.clone(), leaves.map(|l| (l.path, l.label)).collect()));
+                }
+                Err(reason) => {
+                    unread.get_or_insert((name.clone(), reason));
+                }
             }
         }
         found.retain(|(_, leaves)| !leaves.is_empty());
@@ -180,8 +184,18 @@ impl JoinedTopics {
             let topics = recording.seen.iter().map(|topic| topic.name.as_str());
             return Err(LogError::Topic {
                 file: source::shown_all(paths),
-                problem: "no message of it holds numbers that can be read".to_owned(),
-                remedy: format!("record the joints' states; the topics are {}", list(topics)),
+                problem: match unread {
+                    Some((topic, reason)) => format!(
+                        "messages of {} cannot be read: {}",
+                        escape(&topic),
+                        escape(&reason)
+                    ),
+                    None => "no message of it holds numbers that can be read".to_owned(),
+                },
+                remedy: format!(
+                    "record the joints' states, as CDR with ros2msg definitions, protobuf or JSON; the topics are {}",
+                    list(topics)
+                ),
             });
         }
         let alone = found.len() == 1;

@@ -161,7 +161,9 @@ impl JointStates {
         let mut sources = Vec::new();
         // topics of other joints each need no name of a topic before those of their joints
         let joints = found.iter().filter(|one| !one.is_columns());
-        let mut joints: Vec<&str> = joints.flat_map(|one| one.names.iter().map(|n| &**n)).collect();
+        let mut joints: Vec<&str> = joints
+            .flat_map(|one| one.names.iter().map(|n| &**n))
+            .collect();
         let all = joints.len();
         joints.sort_unstable();
         joints.dedup();

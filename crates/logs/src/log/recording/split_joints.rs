@@ -23,7 +23,10 @@ pub(in crate::log) fn of_joints(
         let holds = |one: &&FoundTopic| {
             one.topic.starts_with('/')
                 && one.names.iter().any(|own| own == name)
-                && needed.iter().zip(one.arrays).all(|(needed, filled)| filled || !needed)
+                && needed
+                    .iter()
+                    .zip(one.arrays)
+                    .all(|(needed, filled)| filled || !needed)
         };
         let mut all = found.iter().filter(holds);
         all.next().filter(|_| all.next().is_none())
@@ -40,7 +43,11 @@ pub(in crate::log) fn of_joints(
         return Ok(None);
     };
     let mut split = layout.clone();
-    let kinds = [&mut split.positions, &mut split.torques, &mut split.velocities];
+    let kinds = [
+        &mut split.positions,
+        &mut split.torques,
+        &mut split.velocities,
+    ];
     for (channels, (array, _)) in kinds.into_iter().zip(ARRAYS) {
         rename(channels, array, layout, &topics);
     }

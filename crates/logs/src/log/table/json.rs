@@ -121,9 +121,9 @@ impl<R: BufRead> JsonTable<R> {
             }
             if depth == 0 && !self.object.is_empty() {
                 let object = parsed(&self.object);
-                return object.map(Some).map_err(|error| {
-                    damaged(&format!("a JSON object cannot be read: {error}"))
-                });
+                return object
+                    .map(Some)
+                    .map_err(|error| damaged(&format!("a JSON object cannot be read: {error}")));
             }
         }
     }
@@ -178,7 +178,10 @@ mod tests {
     fn objects_are_rows_whatever_parts_them() {
         let lines = "{\"t\": 0, \"name\": \"}{\\\"\"}\n{\"t\": NaN, \"q\": [1, {\"x\": 2}]}\n";
         let found = rows(lines);
-        assert_eq!(found, rows(&format!("[{}]", lines.trim().replace('\n', ","))));
+        assert_eq!(
+            found,
+            rows(&format!("[{}]", lines.trim().replace('\n', ",")))
+        );
         assert_eq!((found.len(), &found[0]["t"]), (2, &Value::from(0)));
         assert!(found[1]["t"].is_null());
         let mut leaves = Vec::new();

@@ -157,7 +157,10 @@ fn is_nanoseconds(field: &Arc<Type>) -> bool {
 /// Whether a column holds instants.
 fn is_instant(field: &Arc<Type>) -> bool {
     let kind = field.get_basic_info().converted_type();
-    let instant = matches!(kind, ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIMESTAMP_MICROS);
+    let instant = matches!(
+        kind,
+        ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIMESTAMP_MICROS
+    );
     field.is_primitive() && (instant || is_nanoseconds(field))
 }
 

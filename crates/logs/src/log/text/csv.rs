@@ -438,7 +438,8 @@ impl TextFile {
             // a stream cannot be read again
             return self.line_hint();
         }
-        count_lines(&self.path, end.saturating_sub(1)).unwrap_or_else(|_| self.reader.position().line())
+        count_lines(&self.path, end.saturating_sub(1))
+            .unwrap_or_else(|_| self.reader.position().line())
     }
 
     /// Line of the current row where no comment or blank line stands right before it.

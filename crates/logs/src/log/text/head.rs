@@ -96,11 +96,7 @@ const OTHERS: [(&[u8], &str, &str); 17] = [
         "a recording of Rerun",
         "give the MCAP or CSV that it was made from",
     ),
-    (
-        b"GIF8",
-        "a picture",
-        "give the log itself",
-    ),
+    (b"GIF8", "a picture", "give the log itself"),
     (b"\x89PNG", "a picture", "give the log itself"),
     (b"%PDF", "a PDF document", "give the log itself"),
     (
