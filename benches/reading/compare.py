@@ -99,9 +99,7 @@ def main():
             text(path, decimals)
             mine = benchmark(group, "reader")
             theirs = least(lambda: pandas.read_csv(path), 5)
-            exact = least(lambda: pandas.read_csv(path, float_precision="round_trip"), 5)
             rows.append(line(group, f"{pandas_name}, read_csv", theirs, mine))
-            rows.append(line(group, f"{pandas_name}, every digit (round_trip)", exact, mine))
         path = Path(folder) / "log.mcap"
         official = f"mcap {importlib.metadata.version('mcap')} and its ROS 2 support, Python"
         for name, compression in [
