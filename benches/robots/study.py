@@ -124,7 +124,7 @@ def robot(tool, urdf, limit):
     return found
 
 
-def main(tool, folder, result, limit="120"):
+def main(tool, folder, result, limit="600"):
     tool, found = Path(tool).resolve(), []
     for urdf in sorted(Path(folder).rglob("*.urdf"), key=lambda path: (path.stem, path)):
         try:

@@ -6,7 +6,6 @@ use super::draft::{FaultList, rows_text};
 use super::fault::Severity::Warning;
 use super::fault::{Episodes, FaultKind};
 use super::judge::{LogJudge, Track};
-use super::shape::SPIKE;
 use super::words::ChannelRole;
 use cft_ident_core::number;
 
@@ -29,7 +28,7 @@ pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
 
 /// The largest acceleration in which no leap and no spike took part.
 fn acceleration(track: &Track) -> f64 {
-    let usual = track.spikes.usual(SPIKE);
+    let usual = track.spikes.usual();
     let spikes = track.spikes.found().iter();
     let spikes = spikes.filter(|spike| spike.height.abs() > EVENT * usual);
     let spikes = spikes.map(|spike| spike.t);

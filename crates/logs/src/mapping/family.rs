@@ -372,3 +372,21 @@ pub(super) fn fit<'a>(
         (How::InOrder, all.collect())
     })
 }
+
+/// A column of temperatures for every joint, where a family of them fits.
+pub(super) fn temperatures(columns: &[LogColumn], joints: &[&str]) -> Option<Vec<String>> {
+    let said = |c: &&LogColumn| {
+        let spoken = words(&c.name);
+        let warm =
+            |word: &Word| ["temp", "temps", "temperature", "temperatures"].contains(&&*word.text);
+        !c.commanded && spoken.iter().any(warm)
+    };
+    let of: Vec<&LogColumn> = columns.iter().filter(said).collect();
+    let mut found = families(&of, joints);
+    found.sort_by_key(|family| family.penalty);
+    let fitting = found.iter().filter_map(|family| fit(family, joints));
+    let mut whole = fitting.filter(|(how, _)| *how != How::InPart);
+    let (_, columns) = whole.next()?;
+    let name = |column: Option<&LogColumn>| Some(column?.name.clone());
+    columns.into_iter().map(name).collect()
+}

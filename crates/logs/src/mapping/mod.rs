@@ -7,6 +7,7 @@
 //! | `content` | roles of columns without names, by what they hold |
 //! | `family` | columns whose names differ in a number or a joint's name alone, and how well they fit |
 //! | `left` | columns whose names say nothing |
+//! | `shown` | the joints of a URDF, or those that a log shows |
 //! | `choose` | one family each for positions, velocities and torques |
 //! | `units` | units that names state, or that numbers suggest |
 //!
@@ -20,9 +21,11 @@ mod family;
 mod fitting;
 mod left;
 mod look;
+mod shown;
 mod units;
 
-pub use choose::{JointColumns, Known, Mapping};
+pub use choose::{JointColumns, Mapping};
 pub use column::LogColumn;
 pub use error::MappingError;
 pub use look::{Asked, ClockSource, SeenColumns, look};
+pub use shown::Known;

@@ -326,7 +326,7 @@ fn drawn_tables_of_parquet_are_read_exactly() {
             .collect();
         let mut log = LogWriter::with_notes(&path, &columns, &[]).unwrap();
         log.set_origin(Instant::from_ns(
-            [0, 1_750_000_000_123_456_789][rng.random_range(0..2)],
+            [0_i64, 1_750_000_000_123_456_789][rng.random_range(0..2)],
         ));
         for k in 0..ROWS {
             let q = (0..3).map(|j| motion.q[k][j] * scale[j]);

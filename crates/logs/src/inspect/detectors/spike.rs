@@ -26,8 +26,10 @@ const MOST: usize = 16_384;
 /// A row may be a spike where it is off by so many times what nine rows of ten are.
 const SUSPECT: f64 = 3.0;
 const MOST_ROWS: f64 = 0.9;
-/// Share of the rows that are no spikes by which a spike is measured.
+/// Share of the rows by which a spike is measured.
 const NEARLY_ALL: f64 = 0.995;
+/// A spike is so many times what nearly all other rows differ from their neighbours.
+pub(in crate::inspect) const SPIKE: f64 = 8.0;
 /// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
 /// smooth motion it does in the next rows too.
 const MOVES: f64 = 6.0;
@@ -150,24 +152,26 @@ impl Spikes {
         self.suspect = SUSPECT * self.differences_seen.quantile(MOST_ROWS);
     }
 
-    /// What nearly all rows differ from their neighbours, but for as many as stand above `times` that: spikes hide
-    /// each other where they are counted among the rest (Rosner 1983).
-    pub(in crate::inspect) fn usual(&self, times: f64) -> f64 {
-        let rows = self.differences_seen.total() as f64;
+    /// What nearly all rows differ from their neighbours. Where more of them are spikes than that leaves out, they are
+    /// set aside first: they hide each other where they are counted among the rest (Rosner 1983).
+    pub(in crate::inspect) fn usual(&self) -> f64 {
+        let rows = self.differences_seen.total().max(1) as f64;
         let apart = |aside: usize| {
-            let rest = 1.0 - aside as f64 / rows.max(1.0);
+            let rest = 1.0 - aside as f64 / rows;
             self.differences_seen.quantile(NEARLY_ALL * rest)
         };
         let mut aside = self.found.len();
         loop {
-            let usual = apart(aside);
-            let above = |spike: &&Spike| spike.height.abs() > times * usual;
-            let higher = self.found.iter().filter(above).count();
+            let least = SPIKE * apart(aside);
+            let higher = self.found.iter().filter(|s| s.height.abs() > least);
+            let higher = higher.count();
             if higher >= aside {
-                return usual;
+                break;
             }
             aside = higher;
         }
+        let hidden = aside as f64 > (1.0 - NEARLY_ALL) * rows;
+        apart(if hidden { aside } else { 0 })
     }
 
     /// Change of the joint's speed at a row, less half of those six rows before and after.

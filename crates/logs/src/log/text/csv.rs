@@ -25,6 +25,8 @@ struct Guard {
     inner: Bytes,
     /// Bytes handed out since the last row was complete.
     pending: usize,
+    /// The last of them.
+    last: u8,
 }
 
 impl fmt::Debug for Guard {
@@ -42,6 +44,8 @@ impl Read for Guard {
             match self.inner.read(buffer) {
                 Ok(count) => {
                     self.pending += count;
+                    let last = count.checked_sub(1).and_then(|at| buffer.get(at));
+                    self.last = last.copied().unwrap_or(self.last);
                     return Ok(count);
                 }
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -106,7 +110,11 @@ impl TextFile {
             .comment(Some(found.comment))
             .delimiter(found.delimiter)
             .buffer_capacity(BUFFER)
-            .from_reader(Guard { inner, pending: 0 });
+            .from_reader(Guard {
+                inner,
+                pending: 0,
+                last: b'\n',
+            });
         let mut rows = Self {
             path: path.to_owned(),
             reader,
@@ -212,9 +220,11 @@ impl TextFile {
                 continue;
             }
             let (found, end) = (self.fields(), self.end());
-            if found < self.header.len() && !self.goes_on()? {
+            let narrow = found < self.header.len();
+            let remark = narrow && (0..found).all(|index| self.number(index).is_none());
+            if narrow && !self.goes_on()? && (remark || self.reader.get_ref().last != b'\n') {
                 self.told.push(format!(
-                    "line {}, the last one, is cut off or no row, and is passed over",
+                    "line {}, the last one, is cut off or a remark, and is passed over",
                     self.line_at(end)
                 ));
                 return Ok(false);
