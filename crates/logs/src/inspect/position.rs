@@ -28,7 +28,7 @@ pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
 
 /// The largest acceleration in which no leap and no spike took part.
 fn acceleration(track: &Track) -> f64 {
-    let usual = track.spikes.usual();
+    let usual = track.spikes.usual(track.deviation());
     let spikes = track.spikes.found().iter();
     let spikes = spikes.filter(|spike| spike.height.abs() > EVENT * usual);
     let spikes = spikes.map(|spike| spike.t);

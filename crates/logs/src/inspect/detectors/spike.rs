@@ -30,6 +30,8 @@ const MOST_ROWS: f64 = 0.9;
 const NEARLY_ALL: f64 = 0.995;
 /// A spike is so many times what nearly all other rows differ from their neighbours.
 pub(in crate::inspect) const SPIKE: f64 = 8.0;
+/// One of a torque, and one of many, has at least this share of the channel's deviation.
+pub(in crate::inspect) const SPIKE_SHARE: f64 = 0.1;
 /// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
 /// smooth motion it does in the next rows too.
 const MOVES: f64 = 6.0;
@@ -153,8 +155,9 @@ impl Spikes {
     }
 
     /// What nearly all rows differ from their neighbours. Where more of them are spikes than that leaves out, they are
-    /// set aside first: they hide each other where they are counted among the rest (Rosner 1983).
-    pub(in crate::inspect) fn usual(&self) -> f64 {
+    /// set aside first: they hide each other where they are counted among the rest (Rosner 1983). `deviation` is that
+    /// of the channel.
+    pub(in crate::inspect) fn usual(&self, deviation: f64) -> f64 {
         let rows = self.differences_seen.total().max(1) as f64;
         let apart = |aside: usize| {
             let rest = 1.0 - aside as f64 / rows;
@@ -162,7 +165,7 @@ impl Spikes {
         };
         let mut aside = self.found.len();
         loop {
-            let least = SPIKE * apart(aside);
+            let least = (SPIKE * apart(aside)).max(SPIKE_SHARE * deviation);
             let higher = self.found.iter().filter(|s| s.height.abs() > least);
             let higher = higher.count();
             if higher >= aside {
