@@ -12,7 +12,7 @@ use super::search::{Chosen, Field, Looked};
 use super::tables::verified;
 use super::watch::{UNWATCHED, Watch};
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{BlockSums, BlocksLeftOut, Terms, compare};
+use crate::judge::{BlockSums, BlocksLeftOut, LEAST_PARTS, Terms, compare};
 use crate::motion::MotionError;
 
 /// Sums of products about a model.
@@ -102,7 +102,7 @@ impl PreparedCase<'_> {
         let error = error.map(|(e, w)| e * w).sum();
         let (mut chosen, mut looked) = (Vec::new(), Vec::new());
         let mut directions = Vec::new();
-        if self.blocks.parts >= numbers.parts {
+        if self.blocks.parts >= LEAST_PARTS {
             let field = self.field(&candidates, &summed, watch);
             (chosen, looked) = field
                 .search(&summed.declared, Vec::new())

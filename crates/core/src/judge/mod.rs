@@ -29,7 +29,7 @@ mod tests;
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
 pub use left_out::{BlocksLeftOut, ErrorGain, compare};
-pub use parts::{Agreement, agreement, agreement_on_share};
+pub use parts::{Agreement, LEAST_PARTS, agreement, agreement_on_share};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 
 /// The numbers that decide.
@@ -38,12 +38,10 @@ pub struct Numbers {
     /// A gain on blocks left out counts above so many standard errors. Half: noise fills the six places and all rests
     /// on the parts; twice: effects of a third of the residual are passed over.
     pub screen: f64,
-    /// Least number of parts that must ask for one amplitude. Half: one log cut in parts agrees with itself and a
-    /// fifth of the joints gets worse; twice: logs of a minute confirm nothing.
+    /// Number of parts that must ask for one amplitude; fewer, where logs are short or a joint rests, must agree so much
+    /// the better that chance is as small. Half: one log cut in parts agrees with itself and a fifth of the joints gets
+    /// worse; twice: logs of a minute confirm nothing.
     pub parts: usize,
-    /// Least number of them in which the effect shows, for a joint rests now and then; fewer than `parts` must agree the
-    /// better. Half: strokes of one direction pass for proof; all: one rest in a log, and nothing is confirmed.
-    pub speaking: usize,
     /// s = max(0, 1 - doubt / z). Half: noise along a motion is written; twice: a sixth of the gain is lost.
     pub doubt: f64,
     /// Blocks that each part is cut into for the screen. One: its standard error rests on 12 values; four: blocks as
@@ -68,7 +66,6 @@ pub struct Numbers {
 pub const NUMBERS: Numbers = Numbers {
     screen: 2.0,
     parts: 12,
-    speaking: 8,
     doubt: 4.0,
     blocks_per_part: 2,
     memory_times: 5.0,

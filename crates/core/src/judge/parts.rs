@@ -1,6 +1,7 @@
 //! Agreement of an amplitude between parts of the data: a statistic that no search has seen.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::sums::{BlockSums, Terms};
 use super::{Blocks, Numbers};
@@ -16,6 +17,10 @@ pub struct Agreement {
     pub parts: Vec<Vec<f64>>,
 }
 
+/// Least number of parts that have a deviation of their own.
+pub const LEAST_PARTS: usize = 3;
+/// No agreement is as good as this.
+const MOST_DOUBT: f64 = 1e6;
 /// Part of the mean information below which a part says nothing.
 const SILENT: f64 = 1e-3;
 
@@ -105,19 +110,38 @@ fn judged(mut found: Vec<(DMatrix<f64>, DVector<f64>)>, numbers: &Numbers) -> Ag
         true => size * (p - 1.0) / (p * scatter),
         false => 0.0,
     };
-    // F at the same chance grows about as P falls: z as its square
-    let fewer = (numbers.parts as f64 / p).max(1.0);
-    let doubt = numbers.doubt * fewer * fewer;
-    let enough = count >= numbers.speaking;
     Agreement {
         z,
-        s: if enough {
-            (1.0 - doubt / z).max(0.0)
-        } else {
-            0.0
-        },
+        s: doubt(count, k, numbers).map_or(0.0, |doubt| (1.0 - doubt / z).max(0.0)),
         parts,
     }
+}
+
+/// The z at which so few parts agree on k numbers by a chance as small as that of [`Numbers::parts`] parts at
+/// [`Numbers::doubt`]: P z is F with k and k (P - 1) degrees of freedom. None where no deviation can be formed.
+fn doubt(parts: usize, k: usize, numbers: &Numbers) -> Option<f64> {
+    if parts >= numbers.parts {
+        return Some(numbers.doubt);
+    }
+    let chance = |parts: usize, z: f64| {
+        let degrees = [k as f64, k as f64 * (parts as f64 - 1.0)];
+        let distribution = FisherSnedecor::new(degrees[0], degrees[1]).ok()?;
+        Some(distribution.sf(parts as f64 * z))
+    };
+    let usual = chance(numbers.parts, numbers.doubt)?;
+    let (mut low, mut high) = (numbers.doubt, MOST_DOUBT);
+    if parts < LEAST_PARTS || chance(parts, high)? > usual {
+        return None;
+    }
+    // halves of the logarithm: to a thousandth after thirty
+    for _ in 0..30 {
+        let middle = (low * high).sqrt();
+        match chance(parts, middle)? > usual {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    Some(high)
 }
 
 /// Adds a joint's information on an effect in one part, its own other terms projected out.
@@ -175,5 +199,26 @@ fn reduced(
         for (y, (l, _)) in c.iter().enumerate() {
             s[(*i, *l)] += w * own_part[(x, y)];
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::NUMBERS;
+
+    #[test]
+    fn fewer_parts_must_agree_so_much_the_better_and_two_never_do() {
+        let of = |parts, k| doubt(parts, k, &NUMBERS);
+        for k in [1, 5] {
+            assert_eq!([of(12, k), of(40, k)], [Some(4.0); 2]);
+            assert_eq!(of(2, k), None);
+            let fewer: Vec<f64> = (3..12).map(|parts| of(parts, k).unwrap()).collect();
+            assert!(fewer.windows(2).all(|pair| pair[0] > pair[1]), "{fewer:?}");
+        }
+        // F(1, 7) and F(1, 4) at the chance of 2.5e-5 that F(1, 11) has beyond 48
+        let [eight, five] = [8, 5].map(|parts| of(parts, 1).unwrap());
+        assert!((10.0..14.0).contains(&eight), "{eight}");
+        assert!((70.0..130.0).contains(&five), "{five}");
     }
 }

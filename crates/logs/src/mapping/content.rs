@@ -96,12 +96,18 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
         ChannelRole::Torque,
     );
     if let Some((first, n, stride)) = with_velocities(columns, joints) {
+        let by = if stride == 1 { n } else { 1 };
+        let place = |joint: usize, what: usize| first + joint * stride + what * by;
+        // the rate of the velocities is no torque
+        let rises = |j: &usize| {
+            let last = place(*j, 3);
+            last < m && likeness(columns[place(*j, 1)], columns[place(*j, 2)]) > LIKE
+        };
+        let accelerations = stride == 1 && (0..n).filter(rises).count() as f64 >= MOST * n as f64;
         for joint in 0..n {
-            let q = first + joint * stride;
-            let by = if stride == 1 { n } else { 1 };
-            set(q, p, joint);
-            set(q + by, v, joint);
-            set(q + 2 * by, t, joint);
+            set(place(joint, 0), p, joint);
+            set(place(joint, 1), v, joint);
+            set(place(joint, if accelerations { 3 } else { 2 }), t, joint);
         }
         return out;
     }
@@ -176,6 +182,7 @@ mod tests {
         let at = |k: usize| match kind {
             'q' => wave(k, joint, 0.0),
             'v' => wave(k, joint, std::f64::consts::FRAC_PI_2),
+            'a' => -wave(k, joint, 0.0),
             _ => 3.0 * wave(k, joint, 1.0) + noise(k, joint),
         };
         (0..4000).map(at).collect()
@@ -218,6 +225,17 @@ mod tests {
         let (q, v, t) = ('q', 'v', 't');
         let blocks = [(q, 0), (q, 1), (v, 0), (v, 1), (t, 0), (t, 1)];
         assert_eq!(roles_of(&blocks, None), "q1 q2 v1 v2 t1 t2");
+        let rates = [
+            (q, 0),
+            (q, 1),
+            (v, 0),
+            (v, 1),
+            ('a', 0),
+            ('a', 1),
+            (t, 0),
+            (t, 1),
+        ];
+        assert_eq!(roles_of(&rates, None), "q1 q2 v1 v2 - - t1 t2");
         let in_turn = [(q, 0), (v, 0), (t, 0), (q, 1), (v, 1), (t, 1)];
         assert_eq!(roles_of(&in_turn, None), "q1 v1 t1 q2 v2 t2");
         assert_eq!(roles_of(&[(q, 0), (v, 0), (t, 0)], None), "q1 v1 t1");

@@ -5,7 +5,7 @@ use super::setup_file::Declared;
 use crate::setup::{
     Alternative, Cause, Change, ChannelKind, Correction, Drive, Finding, FindingKind,
     FindingSeverity, Found, FrictionPower, LIMITS, Problem, Searched, Setting, SetupErrors,
-    SetupEstimate, SetupReport, Undecided, Weight,
+    SetupEstimate, SetupReport, Undecided, Weight, WeightGain,
 };
 use ChannelKind::{Position, Torque};
 use cft_ident_core::number::{percent, significant};
@@ -344,10 +344,14 @@ impl Words<'_> {
 
     /// What the file's own masses say of the torques, and whether they hold a weight at all.
     fn weight(&self, all: &[Weight], without: Option<&[Vec<f64>; 2]>) -> Vec<Finding> {
-        let off = |way: f64| !all.is_empty() && all.iter().all(|w| w.weight.is_off(way));
-        let moves = |way: f64| all.iter().all(|w| w.motion.is_off(way));
+        // a joint whose gain could be any says nothing
+        let shows = |of: fn(&Weight) -> WeightGain, way: f64| {
+            all.iter().any(|w| of(w).is_off(way)) && !all.iter().any(|w| of(w).is_not_off(way))
+        };
+        let off = |way: f64| shows(|w| w.weight, way);
+        let moves = |way: f64| shows(|w| w.motion, way);
         let way = if off(-1.0) { -1.0 } else { 1.0 };
-        let list = |of: fn(&Weight) -> crate::setup::WeightGain| -> String {
+        let list = |of: fn(&Weight) -> WeightGain| -> String {
             let each = all.iter().map(|w| {
                 let gain = of(w);
                 let [low, high] = gain.interval_95.map(|x| significant(x, 3));

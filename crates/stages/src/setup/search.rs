@@ -273,12 +273,13 @@ impl Look<'_> {
             let better = &compared.better;
             let absurd = better.iter().any(|j| before[*j] > LIMITS.unexplained);
             confirmed = compared.agreed >= NUMBERS.confirmed;
-            // what is not absurd is a factor, or next to all that is missed
+            // what is not absurd is a factor, or most of what is missed, and sound machines leave as little
             let left = best.trial.square(better) / d.trial.square(better);
             let likely = match absurd {
                 true => compared.agreed > 0.0,
                 false => {
-                    let plain = change.times(1.0).is_some() || left < LIMITS.same * LIMITS.same;
+                    let sound = after.iter().all(|e| *e <= LIMITS.sound);
+                    let plain = change.times(1.0).is_some() || sound && left < LIMITS.same;
                     confirmed && plain
                 }
             };
@@ -302,6 +303,17 @@ impl Look<'_> {
         let others = others.filter(|(t, j)| j.change != best.trial.change && *t <= turned(best));
         let others: Vec<&Trial> = others.map(|(_, j)| j).filter(|j| near(j)).collect();
         let tied: Vec<Change> = others.iter().filter_map(|j| j.change.clone()).collect();
+        // a ratio that its neighbours are as good as is an estimate
+        let ratio = |c: &Change| match c {
+            Change::Scale(_, _, f) | Change::Gear(_, f) => {
+                *f != -1.0 && oddity(*f, &self.problem.known.ratios) > 0
+            }
+            _ => false,
+        };
+        let neighbour = |c: &Change| ratio(c) && c.joints() == change.joints();
+        if ratio(&change) && tied.iter().any(neighbour) {
+            return None;
+        }
         let made = change.clone();
         let elsewhere = |j: &&&Trial| {
             let other = j.change.as_ref();

@@ -38,6 +38,15 @@ impl WeightGain {
             false => low > LIMITS.yardstick,
         }
     }
+
+    /// Whether it is surely not so small (-1) or so large (1).
+    pub fn is_not_off(&self, way: f64) -> bool {
+        let [low, high] = self.interval_95;
+        match way < 0.0 {
+            true => low * LIMITS.yardstick > 1.0,
+            false => high < LIMITS.yardstick,
+        }
+    }
 }
 
 /// The weight that each joint shows beside friction; joints that hold next to none of it by the masses are left out.

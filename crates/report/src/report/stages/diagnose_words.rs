@@ -21,7 +21,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             return (text.to_owned(), false);
         }
         _ if !d.long_enough() => format!(
-            "These logs are too short to confirm an effect: they give {} independent parts of {} s, and {} are needed.",
+            "These logs are too short to confirm an effect: they give {} independent parts of {} s, where {} are usual, and so few must agree the better.",
             d.parts,
             number::significant(d.block_s, 2),
             d.parts_needed
@@ -33,6 +33,13 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
         _ => "No effect is confirmed: a residual above the noise is left that none explains in all parts of the data."
             .to_owned(),
     };
+    if !matches!(lacking, DiagnosisVerdict::EffectsFound) && not_written(d).next().is_some() {
+        text += &format!(
+            " {} (`--accept` writes it)",
+            added(machine, d).trim_end_matches('.')
+        );
+        text += ".";
+    }
     let (bought, worse) = bought(d);
     text += &format!(" {bought}");
     text += &taken_out(machine, d);
@@ -53,6 +60,12 @@ fn robot_is_exact(d: &Diagnosis) -> bool {
         .into_iter()
         .fold(f64::INFINITY, f64::min);
     errors(&d.after).1.overall.mean_relative_error < 0.5 * least
+}
+
+/// Effects that the parts speak for, too little for what can be measured.
+fn not_written(d: &Diagnosis) -> impl Iterator<Item = &FoundEffect> {
+    let indicated = d.steps.iter().filter(|s| s.status == StepStatus::Indicated);
+    indicated.filter(|s| s.written.is_none() && !s.vetoed())
 }
 
 /// The effects of the written model, by how firm they are.
@@ -76,6 +89,7 @@ fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
         steps.collect::<Vec<_>>()
     };
     let wanted = d.written().filter(|s| s.accepted_by_user).collect();
+    let left = not_written(d).collect();
     let firm = match d.after.holdout {
         Some(_) => "confirmed, on held-out data too",
         None => "confirmed",
@@ -84,6 +98,7 @@ fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
         graded(firm, by(StepStatus::Confirmed)),
         graded("indicated, and written in part", by(StepStatus::Indicated)),
         graded("written because you asked for it", wanted),
+        graded("indicated, and not written", left),
     ];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }

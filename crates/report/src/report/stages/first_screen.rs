@@ -48,7 +48,7 @@ fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
 /// The motion that [`next`] asks for, as a command; nothing where no motion of one joint will do.
 pub fn next_command(machine: &LoggedRobot, found: &Diagnosed) -> Option<String> {
     let d = &found.diagnosis;
-    let step = unclear(found).filter(|_| d.determined && d.long_enough())?;
+    let step = unclear(found).filter(|_| d.determined)?;
     separating_command(&step.estimate, &machine.robot)
 }
 
@@ -59,7 +59,7 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
         return "Next: move the joints faster and farther, or log a torque with less noise."
             .to_owned();
     }
-    if !d.long_enough() {
+    if !d.long_enough() && d.written().next().is_none() {
         return format!(
             "Next: log for longer: {} s at least, {} parts of {} s each.",
             number::significant(d.block_s * d.parts_needed as f64, 2),
