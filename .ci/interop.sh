@@ -42,4 +42,16 @@ tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/simulated.m
   "$work/converted.mcap" "$work/simulated.mcap" || exit 1
 tool excite -q --check configs/table3.toml --rate 50 --samples "$work/motion.csv" \
   --trajectory-message "$work/motion.mcap" > /dev/null || exit 1
-"$work/venv/bin/python" fixtures/logs/read_trajectory.py "$work/motion.csv" "$work/motion.mcap"
+"$work/venv/bin/python" fixtures/logs/read_trajectory.py "$work/motion.csv" "$work/motion.mcap" ||
+  exit 1
+
+# What Rerun and PlotJuggler show of it: joints by their names, residuals beside the torques.
+timeout 600 "$work/venv/bin/pip" install --quiet --disable-pip-version-check rerun-sdk > "$work/pip.log" 2>&1 ||
+  skip "viewers: rerun-sdk cannot be installed: $(tail -n 1 "$work/pip.log")"
+tool example -q ur10 -o "$work/ur10" > /dev/null || exit 1
+tool lsq -q "$work/ur10/ur10.csv" -r configs/ur10.toml -o "$work/model.toml" > /dev/null || exit 1
+tool validate -q "$work/ur10/ur10.mcap" -m "$work/model.toml" -o "$work/residual.mcap" > /dev/null || exit 1
+"$work/venv/bin/python" fixtures/logs/read_viewers.py q1,q2,q4,q5 /joint_states \
+  "$work/converted.mcap" "$work/simulated.mcap" || exit 1
+"$work/venv/bin/python" fixtures/logs/read_viewers.py q1,q2,q3,q4,q5,q6 \
+  /joint_states,/tau_hat,/residual,/band_lower,/band_upper "$work/residual.mcap"

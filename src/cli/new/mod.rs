@@ -336,7 +336,10 @@ pub(super) fn describe(
             cft_ident_logs::log::list(seen.other_topics.iter().map(String::as_str))
         ));
     }
+    let torques = |joint: &JointColumns| !matches!(joint.torque_unit, Some("A" | "V" | "%"));
     if let (Some(spec), Some(_)) = (&args.log, &args.urdf)
+        && mapping.torque_is == "joint"
+        && mapping.joints.iter().all(torques)
         && let Some(text) = weights::told(&file, spec, context)?
     {
         warnings.push(text);

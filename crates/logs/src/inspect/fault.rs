@@ -65,7 +65,7 @@ pub enum FaultKind {
     Quantisation,
     /// Single rows far off their neighbours.
     Spike,
-    /// Rows in which every channel reads 0.
+    /// Rows in which every channel reads one number, 0 mostly.
     FailedRead,
     /// A channel that is another one's copy.
     CopiedChannel,

@@ -13,6 +13,8 @@ use crate::log::{
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven
 /// clock closes none.
 const WIDER: f64 = 1.1;
+/// Readings at most that look for what was hidden by what an earlier one found.
+const ROUNDS: usize = 4;
 
 /// What the first look at a log found.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -82,12 +84,42 @@ impl Gate {
                 None => return Ok(None),
             };
         }
-        let bridge = |(t, channel, value): (f64, usize, f64)| Bridge { t, channel, value };
-        mending.bridges = std::mem::take(&mut found.bridges)
-            .into_iter()
-            .map(bridge)
-            .collect();
-        mending.failed = std::mem::take(&mut found.failed).into();
+        // what is mended may have hidden more of its kind, and what goes along takes no number of it
+        let (mut bridges, mut failed, mut mended) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            if found.bridges.is_empty() && found.failed.is_empty() {
+                break;
+            }
+            let of_mended =
+                |kind: FaultKind| matches!(kind, FaultKind::Spike | FaultKind::FailedRead);
+            let faults = found.faults.into_iter().filter(|fault| fault.cut);
+            marked.extend(faults.filter(|fault| of_mended(fault.kind)));
+            mended.extend(found.costs.into_iter().filter(|cost| of_mended(cost.kind)));
+            bridges.append(&mut found.bridges);
+            failed.append(&mut found.failed);
+            bridges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            failed.sort_by(f64::total_cmp);
+            let bridge = |(t, channel, value): &(f64, usize, f64)| Bridge {
+                t: *t,
+                channel: *channel,
+                value: *value,
+            };
+            mending.bridges = bridges.iter().map(bridge).collect();
+            mending.failed = failed.as_slice().into();
+            reader = open()?;
+            reader.mend(&mending);
+            found = match findings(&mut reader, keep, stop, also)? {
+                Some(found) => found,
+                None => return Ok(None),
+            };
+        }
+        for cost in mended {
+            let same = |own: &&mut RowCost| (own.kind, own.fate) == (cost.kind, cost.fate);
+            match found.costs.iter_mut().find(same) {
+                Some(own) => own.rows += cost.rows,
+                None => found.costs.push(cost),
+            }
+        }
         let off_told = found.of(Severity::Info);
         let off_told = off_told.filter(|fault| fault.kind == FaultKind::MotorOff);
         let off_told = off_told.cloned().collect();

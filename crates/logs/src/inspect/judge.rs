@@ -129,6 +129,9 @@ impl Track {
         self.spikes.settle();
         self.leaps.settle();
         for (k, ((&t, step), &value)) in times.iter().zip(steps).zip(values).enumerate() {
+            if *step == RowStep::Unread {
+                continue;
+            }
             if !value.is_finite() {
                 self.missing.add(t, t, 1, join);
                 self.part();
@@ -138,7 +141,7 @@ impl Track {
             if self.channel.role == ChannelRole::Temperature {
                 self.heat(t, value, join);
             }
-            if *step == RowStep::Unusable || !self.shaped {
+            if !step.is_usable() || !self.shaped {
                 continue;
             }
             if *step == RowStep::Apart {
@@ -213,6 +216,8 @@ pub struct LogJudge {
     pub(super) keep: Vec<RowFault>,
     /// Band in which noise is counted \[Hz\].
     pub(super) band_hz: f64,
+    /// Rows are messages, of which those without a number are left out.
+    pub(super) messages: bool,
     steps: Vec<RowStep>,
     /// Which rows repeat the positions of the row before.
     fresh: Vec<Freshness>,
@@ -279,6 +284,7 @@ impl LogJudge {
             fresh_rows: FreshRows::new(positions.len()),
             keep: Vec::new(),
             band_hz: BAND_HZ,
+            messages: false,
             failed: FailedReads::new(positions.len()),
             repeats: Repeats::new(positions.len(), others.len()),
             copies: Copies::new(compared.len()),
@@ -301,6 +307,12 @@ impl LogJudge {
     /// The same, with the band that a fit keeps \[Hz\], where it is known.
     pub fn within(mut self, band_hz: Option<f64>) -> Self {
         self.band_hz = band_hz.unwrap_or(BAND_HZ);
+        self
+    }
+
+    /// The same for a recording of messages.
+    pub fn of_messages(mut self, messages: bool) -> Self {
+        self.messages = messages;
         self
     }
 
@@ -328,7 +340,7 @@ impl LogJudge {
         }
         let compared: Vec<&[f64]> = self.compared.iter().map(|index| columns[*index]).collect();
         for (k, step) in steps.iter().enumerate() {
-            if *step != RowStep::Unusable {
+            if step.is_usable() {
                 self.copies.take(&compared, k);
             }
         }
@@ -363,13 +375,16 @@ impl LogJudge {
         let kept = FaultKind::FailedRead.kept(&self.keep);
         for (k, (&t, step)) in times.iter().zip(steps).enumerate() {
             let [positions, others] = &mut self.row;
-            let logged = |index: &usize| columns[*index][k] - self.tracks[*index].channel.zero;
+            let logged = |index: &usize| {
+                let channel = &self.tracks[*index].channel;
+                (columns[*index][k] - channel.zero) / channel.factor
+            };
             for (row, indices) in [(positions, &self.positions), (others, &self.others)] {
                 row.clear();
                 row.extend(indices.iter().map(logged));
             }
             if self.failed.take(t, &self.row[0], &self.row[1]) && !kept {
-                *step = RowStep::Unusable;
+                *step = RowStep::Unread;
             }
         }
     }
@@ -379,7 +394,7 @@ impl LogJudge {
             return;
         }
         for (k, (&t, step)) in times.iter().zip(steps).enumerate() {
-            if *step == RowStep::Unusable {
+            if !step.is_usable() {
                 continue;
             }
             let [positions, others] = &mut self.row;

@@ -95,7 +95,8 @@ pub fn look(
     let channels = plan.channels.iter().map(|planned| planned.channel.clone());
     let mut judge = LogJudge::new(channels.collect(), Depth::Whole)
         .keeping(&plan.keep)
-        .within(plan.band_hz);
+        .within(plan.band_hz)
+        .of_messages(log.is_recording());
     let mut turning: Vec<Option<Unwrap>> = (plan.channels.iter())
         .map(|planned| planned.wrap.map(Unwrap::new))
         .collect();

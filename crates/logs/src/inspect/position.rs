@@ -15,6 +15,8 @@ const GRAINS: f64 = 4.0;
 /// and within a row it may reach twice what it has on average over the time in which accelerations
 /// are formed.
 const DRIVE: f64 = 4.0;
+/// What is off by so many times what nearly all rows are is no acceleration of the motion.
+const EVENT: f64 = 3.0;
 /// Leaps of several joints at one time are one event: within so many steps.
 const TOGETHER: f64 = 1.5;
 
@@ -26,7 +28,10 @@ pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
 
 /// The largest acceleration in which no leap and no spike took part.
 fn acceleration(track: &Track) -> f64 {
-    let spikes = track.spikes.found().iter().map(|spike| spike.t);
+    let usual = track.spikes.usual(track.deviation());
+    let spikes = track.spikes.found().iter();
+    let spikes = spikes.filter(|spike| spike.height.abs() > EVENT * usual);
+    let spikes = spikes.map(|spike| spike.t);
     let leaps = track.leaps.found().iter().map(|leap| leap.at);
     let events: Vec<f64> = spikes.chain(leaps).collect();
     let motion = track.excitation.as_ref();

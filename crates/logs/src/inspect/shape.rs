@@ -4,6 +4,7 @@
 use super::detectors::clock::ClockFacts;
 use super::detectors::flat::{FlatRun, Levels};
 use super::detectors::grain;
+use super::detectors::spike::{SPIKE, SPIKE_SHARE};
 use super::draft::{FaultList, rows_text};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
@@ -19,10 +20,6 @@ const ABRUPT: f64 = 6.0;
 const GRAINS: f64 = 4.0;
 /// Smallest usual steps that a joint goes from row to row where it moves.
 const SLOW: f64 = 3.0;
-/// A spike is so many times what 99.5 % of the rows differ from their neighbours...
-const SPIKE: f64 = 8.0;
-/// ... and at least this share of the channel's deviation.
-const SPIKE_SHARE: f64 = 0.1;
 /// Levels over its range from which a channel's grain is not worth a word.
 const FINE: f64 = 4096.0;
 /// Acceleration noise by the grain of a position, over the acceleration, that spoils a fit.
@@ -361,7 +358,7 @@ fn spikes(
     draft: &mut FaultList,
 ) {
     let track = &judge.tracks[place];
-    let usual = track.spikes.differences_seen.quantile(0.995);
+    let usual = track.spikes.usual(track.deviation());
     let grain = track.flat.steps.quantile_not_zero(0.05);
     let least = (SPIKE * usual)
         .max(GRAINS * grain)

@@ -37,7 +37,7 @@ fn conclude(judge: &LogJudge) -> Findings {
     failed_reads(judge, &clock, &mut draft);
     together::stalls(judge, &clock, &mut draft);
     for (place, track) in judge.tracks.iter().enumerate() {
-        number_faults(track, &mut draft);
+        number_faults(track, judge.messages, &mut draft);
         speed_faults(judge, place, &mut draft);
         shape::faults(judge, place, &clock, &mut draft);
     }
@@ -142,16 +142,16 @@ fn costs(draft: &FaultList, clock: &ClockFacts) -> Vec<RowCost> {
     costs
 }
 
-/// Rows in which every channel reads 0.
+/// Rows in which every channel reads one number.
 fn failed_reads(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
-    let times = judge.failed.times();
+    let (times, value) = (judge.failed.times(), judge.failed.value());
     let mut episodes = Episodes::default();
     for t in times {
         episodes.add(*t, *t, 1, 1.5 * clock.dt);
     }
     let effect = |rows: u64, times: usize| {
         format!(
-            "{} in which every channel reads 0 while the robot is elsewhere: nothing was read, and a fit leaves them out",
+            "{} in which every channel reads {value} while the robot is elsewhere: nothing was read, and a fit leaves them out",
             rows_text(rows, times)
         )
     };
@@ -337,7 +337,7 @@ fn speed_faults(judge: &LogJudge, place: usize, draft: &mut FaultList) {
     );
 }
 
-fn number_faults(track: &Track, draft: &mut FaultList) {
+fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
     let name = Some(track.channel.name.as_str());
     let used = matches!(
         track.channel.role,
@@ -348,6 +348,7 @@ fn number_faults(track: &Track, draft: &mut FaultList) {
         return;
     }
     let (severity, then) = match track.channel.role {
+        _ if used && messages && track.rows > 0 => (Warning, "a fit leaves these messages out"),
         _ if used => (Error, "a fit refuses the log"),
         ChannelRole::Temperature => (
             Warning,
@@ -358,8 +359,14 @@ fn number_faults(track: &Track, draft: &mut FaultList) {
     let effect = |rows: u64, times: usize| {
         format!("{} without a finite number: {then}", rows_text(rows, times))
     };
-    let remedy =
-        "delete the rows without a measurement: a gap in time is handled, a made-up number is not";
+    let remedy = match messages {
+        true => {
+            "nothing where each message holds some of the joints; else look at what publishes them"
+        }
+        false => {
+            "delete the rows without a measurement: a gap in time is handled, a made-up number is not"
+        }
+    };
     draft.stretches(
         FaultKind::Nan,
         severity,

@@ -212,7 +212,8 @@ const POSITIONS: [&str; 27] = [
     "lage",
     "fbpos",
 ];
-const TORQUES: [&str; 20] = [
+const TORQUES: [&str; 21] = [
+    "jtrq",
     "torque",
     "torques",
     "effort",
@@ -314,9 +315,14 @@ pub fn is_command(words: &[Word]) -> bool {
     has(words, &COMMANDS) || words.windows(2).any(|pair| desired(pair) || out(pair))
 }
 
+/// Whether words are of what is about a channel and no channel itself.
+pub fn is_aside(words: &[Word]) -> bool {
+    has(words, &ASIDE)
+}
+
 /// What words say a channel holds, whether or not it was commanded; `None` where nothing.
 pub fn role(words: &[Word]) -> Option<ChannelRole> {
-    if has(words, &ASIDE) {
+    if is_aside(words) {
         return Some(ChannelRole::Other);
     }
     if has(words, &ACCELERATIONS) || has(words, &["ddot"]) {

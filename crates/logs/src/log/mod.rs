@@ -12,6 +12,7 @@ mod columns;
 mod content;
 mod error;
 mod held_files;
+mod json_text;
 mod layout;
 mod mend;
 mod names;

@@ -6,7 +6,9 @@ use super::LogError;
 use super::columns::choose;
 use super::content::{Content, RawBytes};
 use super::layout::Layout;
-use super::recording::{JoinedTopics, JointStates, MessageRows, format_of, has_none, of_topics};
+use super::recording::{
+    JoinedTopics, JointStates, MessageRows, format_of, has_none, of_joints, of_topics,
+};
 use super::rows::{LogRows, Strictness};
 use super::table;
 use super::text::TextRows;
@@ -56,10 +58,16 @@ pub(super) fn open(
         return Ok(recorded(Box::new(rows), layout.clone(), None));
     }
     if !layout.joints.is_empty() {
-        match (MessageRows::open(files, layout), strictness) {
-            (Ok((rows, layout)), _) => return Ok(recorded(Box::new(rows), layout, None)),
-            (Err(error), Strictness::Refuse) => return Err(error),
-            (Err(error), Strictness::Record) => refused = Some(error),
+        let error = match MessageRows::open(files, layout) {
+            Ok((rows, layout)) => return Ok(recorded(Box::new(rows), layout, None)),
+            Err(error) => error,
+        };
+        if let Ok(Some((rows, layout))) = of_joints(files, layout) {
+            return Ok(recorded(Box::new(rows), layout, None));
+        }
+        match strictness {
+            Strictness::Refuse => return Err(error),
+            Strictness::Record => refused = Some(error),
         }
     }
     match JointStates::open(files, layout.section.topic.as_deref()) {

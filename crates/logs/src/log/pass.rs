@@ -19,6 +19,8 @@ use super::{LogError, LogSpec, Span};
 
 /// Rows by whose times a unit is recognised.
 const LOOKED_AT: usize = 1024;
+/// Usual steps from a time of 0 to the next one where the clock began at 0.
+const FROM_ZERO: f64 = 10.0;
 
 /// A log that is being gone through.
 #[derive(Debug)]
@@ -43,6 +45,9 @@ pub(super) struct LogPass {
     used: Option<(f64, f64)>,
     /// Rows handed out.
     pub(super) samples: u64,
+    /// Whether a row was read, and those at the beginning that have no time yet and are left out.
+    begun: bool,
+    unstamped: u64,
     /// What is known of a stream.
     watch: Option<Watch>,
     /// What is kept of its rows, where it is read strictly.
@@ -134,6 +139,12 @@ impl LogPass {
     /// What was chosen on the way, one sentence each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut told = self.rows.warnings();
+        if self.unstamped > 0 {
+            told.push(format!(
+                "{} rows at the beginning are stamped 0, before the clock was set, and are left out",
+                self.unstamped
+            ));
+        }
         if let Some((unit, column)) = &self.recognised {
             let unit = unit.in_seconds().0;
             told.push(format!(
@@ -158,6 +169,8 @@ impl LogPass {
             span: None,
             used: None,
             samples: 0,
+            begun: false,
+            unstamped: 0,
             watch: None,
             tape: None,
         }
@@ -217,8 +230,53 @@ impl LogPass {
     /// Goes on to the next row; its time [s], NaN where it has none, or `None` at the end.
     #[inline]
     pub(super) fn next(&mut self) -> Result<Option<f64>, LogError> {
-        let stamp = self.rows.next()?;
+        let mut stamp = self.rows.next()?;
+        if !std::mem::replace(&mut self.begun, true) && stamp.is_some_and(|stamp| stamp.is_zero()) {
+            self.unstamped = self.unstamped()?;
+            for _ in 0..self.unstamped {
+                stamp = self.rows.next()?;
+            }
+        }
         Ok(stamp.map(|stamp| stamp.seconds(&mut self.origin)))
+    }
+
+    /// Rows at the beginning of a file that are all stamped 0, far from where its clock goes on.
+    #[cold]
+    fn unstamped(&self) -> Result<u64, LogError> {
+        if self.files.is_empty() || self.rows.is_recording() {
+            return Ok(0);
+        }
+        let (mut rows, mut origin) = (self.again()?, None);
+        let (mut zeros, mut after) = (0, None);
+        for _ in 0..LOOKED_AT {
+            let Some(stamp) = rows.next()? else { break };
+            match (stamp.is_zero(), after) {
+                (true, None) => zeros += 1,
+                (true, Some(_)) => break,
+                (false, None) => after = Some(stamp.seconds(&mut origin)),
+                (false, Some(first)) => {
+                    let step = stamp.seconds(&mut origin) - first;
+                    if step > 0.0 {
+                        let leap = stamp.instant().seconds() - step;
+                        let far = zeros > 1 && leap > FROM_ZERO * step;
+                        return Ok(if far { zeros } else { 0 });
+                    }
+                }
+            }
+        }
+        Ok(0)
+    }
+
+    /// The rows from the beginning, once more.
+    fn again(&self) -> Result<Box<dyn LogRows>, LogError> {
+        let mut rows: Box<dyn LogRows> = match &self.tape {
+            Some(tape) => Box::new(TapeRows::new(Arc::clone(tape))),
+            None => open(&self.files, &self.layout, self.strictness)?.rows,
+        };
+        if let (None, Some((column, seconds))) = (&self.tape, self.time) {
+            rows.set_time(column, seconds);
+        }
+        Ok(rows)
     }
 
     /// Times of the span [s], half open, once the first row's is known.
@@ -246,13 +304,7 @@ impl LogPass {
 
     /// Time of the log's last row [s]: one more pass, in which only times are looked at.
     fn last_time(&self) -> Result<Option<f64>, LogError> {
-        let mut rows: Box<dyn LogRows> = match &self.tape {
-            Some(tape) => Box::new(TapeRows::new(Arc::clone(tape))),
-            None => open(&self.files, &self.layout, self.strictness)?.rows,
-        };
-        if let (None, Some((column, seconds))) = (&self.tape, self.time) {
-            rows.set_time(column, seconds);
-        }
+        let mut rows = self.again()?;
         let (mut origin, mut last) = (self.origin, None);
         while let Some(stamp) = rows.next()? {
             let t = stamp.seconds(&mut origin);

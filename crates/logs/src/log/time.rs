@@ -134,20 +134,15 @@ impl Instant {
         })
     }
 
-    /// Reads an ISO 8601 date and time, `2024-05-01T12:34:56.789+02:00`; without a zone it is UTC.
+    /// Reads an ISO 8601 date and time, `2024-05-01T12:34:56.789+02:00`, or `1.5.2024 12:34:56`; without a zone it is
+    /// UTC. A time of day without a date, `12:34:56.789`, counts from midnight.
     pub(super) fn parse_iso(field: &[u8]) -> Option<Self> {
         let text = std::str::from_utf8(unquoted(field)).ok()?;
-        let (date, clock) = text.split_once(['T', 't', ' '])?;
-        let mut parts = date.split(['-', '/']);
-        let (year, month, day) = (parts.next()?, parts.next()?, parts.next()?);
-        if year.len() != 4 || parts.next().is_some() {
-            return None;
-        }
-        let days = days(
-            number(year)?,
-            in_range(month, 1, 12)?,
-            in_range(day, 1, 31)?,
-        );
+        let (days, clock) = match text.split_once(['T', 't', ' ']) {
+            Some((date, clock)) => (days_of(date)?, clock),
+            None if text.matches(':').count() == 2 => (0, text),
+            None => return None,
+        };
         let clock = clock.trim_start();
         let end = clock
             .find(|c: char| !(c.is_ascii_digit() || ":.,".contains(c)))
@@ -175,6 +170,21 @@ impl Instant {
     }
 }
 
+/// Days since 1970 of a date, the year first, or last behind points.
+fn days_of(date: &str) -> Option<i64> {
+    let points = date.contains('.');
+    let mut parts: Vec<&str> = date.split(['-', '/', '.']).collect();
+    if points {
+        parts.reverse();
+    }
+    let [year, month, day] = parts[..] else {
+        return None;
+    };
+    let whole = year.len() == 4;
+    let (month, day) = (in_range(month, 1, 12)?, in_range(day, 1, 31)?);
+    whole.then_some(days(number(year)?, month, day))
+}
+
 /// Time of a row, before it is counted from anywhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Stamped {
@@ -187,6 +197,11 @@ pub(super) enum Stamped {
 impl Stamped {
     /// Of a row without a time.
     pub(super) const NONE: Self = Self::Seconds(f64::NAN);
+
+    /// Whether it is the zero of the clock.
+    pub(super) fn is_zero(self) -> bool {
+        self.instant() == Instant::default()
+    }
 
     /// Seconds, counted from the first time where that is far from zero.
     #[inline]
@@ -322,7 +337,10 @@ mod tests {
         ] {
             assert_eq!(iso(text), Some(expected), "{text}");
         }
+        assert_eq!(iso("29.2.2024 12:34:56.789"), Some(expected));
         assert_eq!(iso("1970-01-01T00:00"), Some(Instant::default()));
+        let of_day = iso("12:34:56.789").unwrap();
+        assert_eq!(of_day.seconds(), 45_296.789);
         assert_eq!(iso("1969-12-31T23:59:59Z"), Some(Instant::from_s_ns(-1, 0)));
         assert_eq!(
             iso("2000-03-01T00:00:00Z"),
@@ -333,7 +351,9 @@ mod tests {
     #[test]
     fn what_is_no_stamp_is_refused() {
         for text in [
-            "12:34:56",
+            "12:34",
+            "25:00:00",
+            "1.13.2024 00:00:00",
             "2024-13-01T00:00",
             "2024-01-01",
             "2024-01-01T25:00",

@@ -4,23 +4,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::column::LogColumn;
-use super::family::{Family, How, Key, families, fit};
+use super::family::{How, temperatures};
 use super::fitting::{Taken, best, without_common_head};
+use super::left::{left, offered};
 use super::look::{ClockSource, SeenColumns};
-use super::units::{of_positions, of_torques, other_velocity, stated_position, stated_torque};
+use super::shown::{Known, shown};
+use super::units::{of_positions, of_torques, other_velocity, stated_position};
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, joint, slides, without_joint, words};
+use crate::inspect::words::without_joint;
 use crate::log::escape;
 use cft_ident_core::robot::JointKind;
-
-/// A joint of the robot, where a URDF told it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Known {
-    pub name: String,
-    pub kind: JointKind,
-    /// Its largest torque [N or Nm].
-    pub torque: Option<f64>,
-}
 
 /// One joint and its columns.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -105,26 +98,31 @@ impl Mapping {
         let Some(seen) = seen else {
             return out;
         };
-        let position = best(columns, ChannelRole::Position, false, &names, None);
+        let mut position = out.measured(columns, 0, &names, None);
         let beside = position.as_ref().map(|taken| taken.pattern.clone());
         let beside = beside.as_deref();
         let velocity = best(columns, ChannelRole::Velocity, false, &names, beside)
             .filter(|taken| taken.how != How::InPart);
-        let mut torque = best(columns, ChannelRole::Torque, false, &names, beside);
-        if torque.is_none() {
-            torque = best(columns, ChannelRole::Torque, true, &names, beside);
-            if let Some(taken) = &torque {
+        let mut torque = out.measured(columns, 2, &names, beside);
+        let one = position.is_some() != torque.is_some();
+        if let Some(taken) = left(columns, &names).filter(|_| one) {
+            let (place, what) = match torque.is_none() {
+                true => (&mut torque, "torques"),
+                false => (&mut position, "positions"),
+            };
+            if what == "torques" && taken.columns.iter().flatten().all(|c| c.commanded) {
                 out.torque_is = "commanded";
-                out.checks.push(format!(
-                    "torques: no measured ones are found, {} are commanded ones",
-                    escape(&taken.pattern)
-                ));
             }
+            out.checks.push(format!(
+                "{what}: {} in the order of the joints, for they are what is left and no name says more",
+                escape(&taken.pattern)
+            ));
+            *place = Some(taken);
         }
         let all = [position, velocity, torque];
         for (taken, (_, what)) in all.iter().zip(ROLES) {
             match taken {
-                Some(taken) => out.tell(taken, what, names.len(), seen.headerless),
+                Some(taken) => out.tell(taken, what, names.len(), seen.by_content),
                 None if what == "velocities" => {}
                 None => {
                     out.lacking.push(what);
@@ -138,8 +136,8 @@ impl Mapping {
         if !out.lacking.is_empty() {
             out.offered = offered(columns, names.len());
         }
-        if seen.headerless {
-            out.how = "by what they hold, for they have no names: CHECK IT";
+        if seen.by_content {
+            out.how = "by what they hold, for no name says it: CHECK IT";
         }
         let [position, velocity, torque] = all;
         // words of a joint's name are no units
@@ -194,11 +192,33 @@ impl Mapping {
         out
     }
 
+    /// The family of measured columns of a role, else that of commanded ones, which is told.
+    fn measured<'a>(
+        &mut self,
+        columns: &'a [LogColumn],
+        role: usize,
+        names: &[&str],
+        beside: Option<&str>,
+    ) -> Option<Taken<'a>> {
+        let (role, what) = ROLES[role];
+        best(columns, role, false, names, beside).or_else(|| {
+            let taken = best(columns, role, true, names, beside)?;
+            if role == ChannelRole::Torque {
+                self.torque_is = "commanded";
+            }
+            self.checks.push(format!(
+                "{what}: no measured ones are found, {} are commanded ones",
+                escape(&taken.pattern)
+            ));
+            Some(taken)
+        })
+    }
+
     /// Says how a family was taken.
-    fn tell(&mut self, taken: &Taken, what: &str, joints: usize, headerless: bool) {
+    fn tell(&mut self, taken: &Taken, what: &str, joints: usize, by_content: bool) {
         let pattern = escape(&taken.pattern);
         match taken.how {
-            _ if headerless => self
+            _ if by_content => self
                 .checks
                 .push(format!("{what}: found by what the columns hold")),
             How::Fits => {}
@@ -346,169 +366,6 @@ fn plain(known: &Known) -> JointColumns {
         torque_scale: None,
         in_messages: None,
         by_path: false,
-    }
-}
-
-/// Families that are offered where no name says what they are.
-const OFFERED: usize = 6;
-
-/// Families of as many columns as joints whose names say nothing.
-fn offered(columns: &[LogColumn], joints: usize) -> Vec<String> {
-    let unsaid = |c: &&LogColumn| matches!(c.role, ChannelRole::Other | ChannelRole::Command);
-    let unsaid: Vec<&LogColumn> = columns.iter().filter(unsaid).collect();
-    let found = families(&unsaid, &[]);
-    let fitting = found.iter().filter(|family| family.members.len() == joints);
-    fitting
-        .take(OFFERED)
-        .map(|family| family.pattern.clone())
-        .collect()
-}
-
-/// A column of temperatures for every joint, where a family of them fits.
-fn temperatures(columns: &[LogColumn], joints: &[&str]) -> Option<Vec<String>> {
-    let said = |c: &&LogColumn| {
-        let spoken = words(&c.name);
-        let warm =
-            |word: &Word| ["temp", "temps", "temperature", "temperatures"].contains(&&*word.text);
-        !c.commanded && spoken.iter().any(warm)
-    };
-    let of: Vec<&LogColumn> = columns.iter().filter(said).collect();
-    let mut found = families(&of, joints);
-    found.sort_by_key(|family| family.penalty);
-    let fitting = found.iter().filter_map(|family| fit(family, joints));
-    let mut whole = fitting.filter(|(how, _)| *how != How::InPart);
-    let (_, columns) = whole.next()?;
-    let name = |column: Option<&LogColumn>| Some(column?.name.clone());
-    columns.into_iter().map(name).collect()
-}
-
-/// The joints that a log shows: the members of the family of positions that has torques beside it and is
-/// the likeliest to have been measured; else the largest one.
-fn shown(columns: &[LogColumn]) -> Vec<Known> {
-    let one = |name: &str, kind| Known {
-        name: name.to_owned(),
-        kind,
-        torque: None,
-    };
-    let of = |role: ChannelRole| -> Vec<&LogColumn> {
-        let of_role = |c: &&LogColumn| c.role == role && !c.commanded;
-        columns.iter().filter(of_role).collect()
-    };
-    let (positions, torques) = (of(ChannelRole::Position), of(ChannelRole::Torque));
-    let torques = families(&torques, &[]);
-    let keys = |family: &Family| -> Vec<Key> {
-        let mut keys: Vec<Key> = family.members.iter().map(|(key, _)| key.clone()).collect();
-        keys.sort();
-        keys
-    };
-    let rank = |family: &Family| {
-        let own = keys(family);
-        let partner = torques.iter().any(|other| keys(other) == own);
-        let contract = family.pattern == "q_#"
-            && torques
-                .iter()
-                .any(|other| other.pattern == "tau_#" && keys(other) == own);
-        let size = family.members.len() as i32;
-        (!contract, !partner, family.penalty - size)
-    };
-    let found = families(&positions, &[]);
-    let Some(best) = found.iter().min_by_key(|family| rank(family)) else {
-        return vec![one("q1", JointKind::Revolute)];
-    };
-    let heads: Vec<Vec<String>> = best
-        .members
-        .iter()
-        .map(|(key, _)| match key {
-            Key::Name(name) => words(name).into_iter().map(|w| w.text).collect(),
-            Key::Number(_) => Vec::new(),
-        })
-        .collect();
-    // `joint_states.elbow` is the elbow: words that all names begin with are none of the joints'
-    let common = |k: usize| {
-        heads
-            .iter()
-            .all(|head| head.len() > k + 1 && head[k] == heads[0][k])
-    };
-    // `q_<joint>` of the contract has the joint's whole name
-    let named = |(_, column): &(Key, &LogColumn)| own_name(&column.name).is_some();
-    let begins = match heads.len() {
-        _ if best.pattern == "q_#" && best.members.iter().all(named) => 0,
-        0 | 1 => 0,
-        _ => (0..).take_while(|k| common(*k)).count(),
-    };
-    let mut members: Vec<&(Key, &LogColumn)> = best.members.iter().collect();
-    if members.iter().all(|(key, _)| matches!(key, Key::Number(_))) {
-        members.sort_by(|a, b| a.0.cmp(&b.0));
-    }
-    let of_member = |(key, column): &&(Key, &LogColumn)| {
-        let name = match key {
-            // of `q_fer_joint1` the joint is what the contract says, where all of it names a joint
-            Key::Number(_) if own_name(&column.name).is_some() => {
-                joint_name(own_name(&column.name).unwrap_or_default())
-            }
-            Key::Number(number) => format!("q{number}"),
-            Key::Name(name) if begins == 0 => joint_name(name),
-            Key::Name(name) => {
-                let left = words(name).into_iter().skip(begins).map(|w| w.text);
-                joint_name(&left.collect::<Vec<_>>().join("_"))
-            }
-        };
-        let torque = torques.iter().find_map(|family| {
-            let own = family.members.iter().find(|(other, _)| other == key);
-            own.map(|(_, column)| *column)
-        });
-        one(&name, kind_of(column, torque))
-    };
-    let joints: Vec<Known> = members.iter().map(of_member).collect();
-    joints
-}
-
-/// The joint of a column `q_<joint>`, where every word of it is of a name and one is no number.
-fn own_name(column: &str) -> Option<&str> {
-    let rest = column.strip_prefix("q_")?;
-    let spoken = words(rest);
-    let whole = joint(&spoken).split('_').count() == spoken.len();
-    let named = spoken.iter().any(|word| word.number().is_none());
-    (whole && named).then_some(rest)
-}
-
-/// Metres slide, and so does what a force moves; everything else turns.
-fn kind_of(position: &LogColumn, torque: Option<&LogColumn>) -> JointKind {
-    let force = torque.and_then(stated_torque);
-    let pushed = torque.is_some_and(|torque| slides(&words(&torque.name)));
-    // the joint of `q_base_turn` is not in turns
-    let bare = |column: &LogColumn| LogColumn {
-        name: own_name(&column.name).map_or_else(|| column.name.clone(), |_| "q_#".to_owned()),
-        ..column.clone()
-    };
-    let position = &bare(position);
-    let slid = match (stated_position(position), force) {
-        (Some("m" | "mm" | "cm"), _) => true,
-        (Some(_), _) => false,
-        (None, Some("N" | "kN")) => true,
-        (None, Some("Nm" | "mNm" | "kNm" | "Ncm")) => false,
-        _ => pushed || slides(&words(&position.name)),
-    };
-    match slid {
-        true => JointKind::Prismatic,
-        false => JointKind::Revolute,
-    }
-}
-
-/// A joint's name as a robot file may hold it: a number alone is `q1`.
-fn joint_name(joint: &str) -> String {
-    let kept: String = joint
-        .chars()
-        .map(|c| match c.is_alphanumeric() || "_-.".contains(c) {
-            true => c,
-            false => '_',
-        })
-        .take(48)
-        .collect();
-    match kept.chars().next() {
-        None => "q1".to_owned(),
-        Some(c) if c.is_ascii_digit() => format!("q{kept}"),
-        Some(_) => kept,
     }
 }
 

@@ -1,6 +1,6 @@
 //! A column of a log, as its name and its numbers show it.
 
-use crate::inspect::words::{is_command, joint, role, words};
+use crate::inspect::words::{is_aside, is_command, joint, role, words};
 use crate::inspect::{ChannelRole, InspectedChannel};
 
 /// A column of a log.
@@ -24,6 +24,8 @@ pub struct LogColumn {
     pub whole: bool,
     /// Range after which it begins anew.
     pub wrap: Option<f64>,
+    /// What it holds says its role, and no name.
+    pub by_content: bool,
 }
 
 impl LogColumn {
@@ -45,7 +47,14 @@ impl LogColumn {
             range: [0.0; 2],
             whole: false,
             wrap: None,
+            by_content: false,
         }
+    }
+
+    /// Whether its name says neither what it holds nor that it holds no channel.
+    pub fn is_unsaid(&self) -> bool {
+        let unsaid = matches!(self.role, ChannelRole::Other | ChannelRole::Command);
+        unsaid && !is_aside(&words(&self.name))
     }
 
     /// Width of what it went through, in its own unit.

@@ -2,6 +2,10 @@
 
 use crate::inspect::ChannelRole;
 
+/// A clock is known from more rows than this, and too coarse where it moves by more than this share of a step at once;
+/// its longer and its shorter steps have at least this share each.
+const FEW: usize = 100;
+const COARSE: f64 = 0.1;
 /// Likeness of a column to the differences of another that makes it its velocity.
 const LIKE: f64 = 0.9;
 /// Part of the joints that must show such a velocity.
@@ -20,6 +24,24 @@ pub(super) fn is_clock(numbers: &[f64]) -> bool {
         .iter()
         .filter(|s| (0.3..3.0).contains(&(**s / middle)));
     !counts && 10 * even.count() >= 9 * steps.len()
+}
+
+/// The step of rows that lie evenly, where their times are rounded to what is more than a tenth of it: all lie within
+/// one rounding of an even line.
+pub(super) fn rounded_step(times: &[f64]) -> Option<f64> {
+    let (first, last) = (times.first()?, times.last()?);
+    let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
+    let step = (last - first) / (times.len() - 1) as f64;
+    let least = steps().fold(f64::INFINITY, f64::min);
+    let rounding = steps().fold(0.0, f64::max) - least;
+    let even = |(k, t): (usize, &f64)| (t - first - k as f64 * step).abs() <= 1.01 * rounding;
+    let whole = (least / rounding - (least / rounding).round()).abs() < 0.01;
+    // seldom a longer step is a lost row, seldom a shorter one a row too many
+    let longer = (step - least) / rounding;
+    let longer = longer <= 1.0 - COARSE && (longer >= COARSE || least == 0.0);
+    let coarse = times.len() > FEW && least >= 0.0 && rounding > COARSE * step;
+    let coarse = coarse && whole && longer;
+    (coarse && times.iter().enumerate().all(even)).then_some(step)
 }
 
 /// Correlation of the central differences of one column with another.
@@ -177,6 +199,25 @@ mod tests {
         };
         let found: Vec<String> = roles(&columns, joints).into_iter().map(letter).collect();
         found.join(" ")
+    }
+
+    #[test]
+    fn times_that_are_rounded_lie_within_one_rounding_of_an_even_line() {
+        let times = |step: f64, rounding: f64| -> Vec<f64> {
+            let at = |k: i32| (f64::from(k) * step / rounding).floor() * rounding;
+            (0..2000).map(at).collect()
+        };
+        for (step, rounding) in [(2.5e-3, 1e-3), (1e-3, 1e-2), (0.01, 1.0 / 128.0)] {
+            let found = rounded_step(&times(step, rounding)).unwrap();
+            assert!((found / step - 1.0).abs() < 1e-2, "{step}: {found}");
+        }
+        assert_eq!(rounded_step(&times(0.01, 1e-6)), None);
+        let uneven: Vec<f64> = (0..2000)
+            .map(|k| f64::from(k) + 0.3 * f64::from(k % 3))
+            .collect();
+        assert_eq!(rounded_step(&uneven), None);
+        let late: Vec<f64> = (0..2000).map(|k| f64::from(k + k / 500)).collect();
+        assert_eq!(rounded_step(&late), None);
     }
 
     #[test]

@@ -121,7 +121,7 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
     };
     for column in columns {
         let name = &column.name;
-        if name.starts_with('#') {
+        if column.by_content {
             // a column without a name: its content gave it a number
             let key = match column.joint.parse() {
                 Ok(number) => Key::Number(number),
@@ -347,7 +347,8 @@ pub(super) fn fit<'a>(
     }
     let names: Vec<&str> = (family.members.iter())
         .filter_map(|(key, _)| match key {
-            Key::Name(name) => Some(name.as_str()),
+            // one letter is an axis
+            Key::Name(name) => Some(name.as_str()).filter(|name| name.len() > 1),
             Key::Number(_) => None,
         })
         .collect();
@@ -370,4 +371,22 @@ pub(super) fn fit<'a>(
         let all = family.members.iter().map(|(_, column)| Some(*column));
         (How::InOrder, all.collect())
     })
+}
+
+/// A column of temperatures for every joint, where a family of them fits.
+pub(super) fn temperatures(columns: &[LogColumn], joints: &[&str]) -> Option<Vec<String>> {
+    let said = |c: &&LogColumn| {
+        let spoken = words(&c.name);
+        let warm =
+            |word: &Word| ["temp", "temps", "temperature", "temperatures"].contains(&&*word.text);
+        !c.commanded && spoken.iter().any(warm)
+    };
+    let of: Vec<&LogColumn> = columns.iter().filter(said).collect();
+    let mut found = families(&of, joints);
+    found.sort_by_key(|family| family.penalty);
+    let fitting = found.iter().filter_map(|family| fit(family, joints));
+    let mut whole = fitting.filter(|(how, _)| *how != How::InPart);
+    let (_, columns) = whole.next()?;
+    let name = |column: Option<&LogColumn>| Some(column?.name.clone());
+    columns.into_iter().map(name).collect()
 }

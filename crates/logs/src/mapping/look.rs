@@ -7,7 +7,7 @@ use super::content;
 use super::error::MappingError;
 use super::units::wrap_of;
 use crate::inspect::words::{is_command, words};
-use crate::inspect::{self, ChannelColumn, ColumnPlan, InspectedChannel};
+use crate::inspect::{self, ChannelColumn, ChannelRole, ColumnPlan, InspectedChannel};
 use crate::log::{
     self, LogSection, LogSpec, Provenance, RawBlock, RawReader, StateGroup, escape, list,
 };
@@ -49,8 +49,8 @@ pub struct SeenColumns {
     pub topic: Option<String>,
     /// Topics that were not.
     pub other_topics: Vec<String>,
-    /// Columns have numbers and no names.
-    pub headerless: bool,
+    /// What columns are is known by what they hold: they have no names, or none that says it.
+    pub by_content: bool,
     pub rate_hz: Option<f64>,
     pub duration_s: f64,
     pub name: String,
@@ -107,10 +107,12 @@ pub fn look(
             ..LogColumn::named(log.label(*k).unwrap_or(&log.names()[*k]))
         })
         .collect();
-    if headerless {
+    let by_content = headerless || unsaid(&columns, joints);
+    if by_content {
         let held: Vec<&[f64]> = numbers.iter().map(|k| sample[*k].as_slice()).collect();
         for (column, (role, joint)) in columns.iter_mut().zip(content::roles(&held, joints)) {
             (column.role, column.joint) = (role, joint);
+            (column.by_content, column.commanded) = (true, false);
         }
     }
     let channels = numbers.iter().zip(&columns).map(|(k, column)| {
@@ -140,21 +142,31 @@ pub fn look(
             column.range = [low, high];
         }
     }
-    let clock = match (time, asked.rate_hz) {
-        (Some((at, ..)), _) if findings.even_rate_hz.is_some() => ClockSource::Rate {
-            hz: findings.even_rate_hz.unwrap_or_default(),
+    let even_rate_hz = findings.even_rate_hz.or_else(|| {
+        let (at, seconds, _) = time.as_ref().filter(|_| log.split_clock().is_none())?;
+        let times = &sample[*at];
+        let step = content::rounded_step(times)? * seconds;
+        let rate = 1.0 / step;
+        Some(log::round_within(rate, rate / times.len() as f64))
+    });
+    let own_rate = match log.is_recording() {
+        true => rate_of_positions(&columns, &numbers, &sample),
+        false => None,
+    };
+    let clock = match (time, even_rate_hz) {
+        (Some((at, ..)), Some(hz)) => ClockSource::Rate {
+            hz,
             coarse: Some(log.names()[at].clone()),
         },
-        (Some((at, seconds, guessed)), _) => ClockSource::Column {
+        (Some((at, seconds, guessed)), None) => ClockSource::Column {
             name: log.names()[at].clone(),
             seconds,
             guessed,
         },
-        (None, Some(rate)) if !log.is_recording() => ClockSource::Rate {
-            hz: rate,
-            coarse: None,
+        (None, _) => match asked.rate_hz {
+            Some(hz) if !log.is_recording() => ClockSource::Rate { hz, coarse: None },
+            _ => ClockSource::Messages,
         },
-        _ => ClockSource::Messages,
     };
     let others = groups.into_iter().map(|group| group.topic);
     Ok(SeenColumns {
@@ -165,12 +177,29 @@ pub fn look(
             None => Vec::new(),
         },
         topic,
-        headerless,
-        rate_hz: findings.even_rate_hz.or(findings.rate_hz),
+        by_content,
+        rate_hz: even_rate_hz.or(own_rate).or(findings.rate_hz),
         duration_s: findings.duration_s,
         name,
         provenance: log.provenance()?,
     })
+}
+
+/// The rate of the positions, where rows of a recording hold those of some joints alone: its first column is the time.
+fn rate_of_positions(columns: &[LogColumn], numbers: &[usize], sample: &[Vec<f64>]) -> Option<f64> {
+    let t = sample.first()?;
+    let rows = |at: &usize| sample[*at].iter().filter(|x| x.is_finite()).count();
+    let of = columns.iter().zip(numbers);
+    let of = of.filter(|(column, _)| column.role == ChannelRole::Position && !column.commanded);
+    let most = of.map(|(_, at)| rows(at)).max()?;
+    let span = t.last()? - t.first()?;
+    (most < t.len() && most > 1 && span > 0.0).then(|| (most - 1) as f64 / span)
+}
+
+/// Whether no name says what a column holds, and there are positions and torques of every joint, or velocities too.
+fn unsaid(columns: &[LogColumn], joints: Option<usize>) -> bool {
+    let as_many = |n: usize| n > 1 && [2 * n, 3 * n].contains(&columns.len());
+    joints.is_some_and(as_many) && columns.iter().all(LogColumn::is_unsaid)
 }
 
 /// The topic of the machine that was measured, where a recording holds several; leaders and commands are

@@ -6,6 +6,8 @@
 //! | `look` | a log as its columns: names, roles, ranges, times, and the topic of a recording |
 //! | `content` | roles of columns without names, by what they hold |
 //! | `family` | columns whose names differ in a number or a joint's name alone, and how well they fit |
+//! | `left` | columns whose names say nothing |
+//! | `shown` | the joints of a URDF, or those that a log shows |
 //! | `choose` | one family each for positions, velocities and torques |
 //! | `units` | units that names state, or that numbers suggest |
 //!
@@ -17,10 +19,13 @@ mod content;
 mod error;
 mod family;
 mod fitting;
+mod left;
 mod look;
+mod shown;
 mod units;
 
-pub use choose::{JointColumns, Known, Mapping};
+pub use choose::{JointColumns, Mapping};
 pub use column::LogColumn;
 pub use error::MappingError;
 pub use look::{Asked, ClockSource, SeenColumns, look};
+pub use shown::Known;

@@ -17,13 +17,13 @@ use crate::log::Instant;
 /// Topic of the times that are no whole nanoseconds.
 const TIMES: &str = "/t";
 
-/// `sensor_msgs/msg/JointState` with what it is made of, as ROS 2 defines them.
+/// `sensor_msgs/msg/JointState` with what it is made of, as ROS 2 defines them, and the units that its comments give.
 const JOINT_STATE: &str = "\
 std_msgs/Header header
 string[] name
-float64[] position
-float64[] velocity
-float64[] effort
+float64[] position  # rad or m
+float64[] velocity  # rad/s or m/s
+float64[] effort    # Nm or N
 ================================================================================
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp

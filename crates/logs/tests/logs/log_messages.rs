@@ -235,23 +235,42 @@ fn a_clock_that_runs_backwards_names_the_message_and_the_other_clock() {
 }
 
 #[test]
-fn a_number_that_is_none_names_the_message_and_the_field() {
+fn a_message_whose_number_is_none_is_left_out_and_told_and_a_recording_of_none_else_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("log.mcap");
-    let mut recording = Recording::create(&path, WriteOptions::new());
-    for k in 0..5_u64 {
-        let state = JointState {
-            stamp_ns: k * 1_000_000,
-            names: owned(&["q1"]),
-            q: vec![if k == 3 { f64::NAN } else { 1.0 }],
-            tau: vec![1.0],
-            ..JointState::default()
-        };
-        recording.joint_state("/joint_states", k, &state);
+    let recorded = |name: &str, none: &dyn Fn(u64) -> bool| {
+        let path = folder.path().join(name);
+        let mut recording = Recording::create(&path, WriteOptions::new());
+        for k in 0..5_u64 {
+            let state = JointState {
+                stamp_ns: k * 1_000_000,
+                names: owned(&["q1"]),
+                q: vec![if none(k) { f64::NAN } else { 1.0 }],
+                tau: vec![1.0],
+                ..JointState::default()
+            };
+            recording.joint_state("/joint_states", k, &state);
+        }
+        recording.finish();
+        path
+    };
+    let path = recorded("log.mcap", &|k| k == 3);
+    let (block, reader) = read(&shown(&path), &one_joint(""));
+    assert_eq!(block.t, [0.0, 1e-3, 2e-3, 4e-3]);
+    let told = reader.warnings().concat();
+    for words in [
+        "1 of 5 messages",
+        "message 4",
+        "no number as `position[name=q1]`",
+    ] {
+        assert!(told.contains(words), "{words}: {told}");
     }
-    recording.finish();
-    let message = refused(&path, &one_joint(""));
-    for words in ["log.mcap: message 4", "q_q1", "NaN", "as two logs"] {
+    let message = refused(&recorded("none.mcap", &|_| true), &one_joint(""));
+    for words in [
+        "none of 5 messages",
+        "message 1",
+        "position[name=q1]",
+        "another one",
+    ] {
         assert!(message.contains(words), "{words}: {message}");
     }
 }

@@ -7,7 +7,7 @@ use cft_ident_logs::log::{Block, Channel, Layout, LogSpec, RawReader, Reader};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::log_drawn::{Motion, ROWS, drawn, mapped, names, read, same};
+use crate::log_drawn::{Motion, ROWS, drawn, mapped, names, read, same, told};
 
 fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(cft_ident_support::ROOT).join("fixtures/tables");
@@ -256,6 +256,87 @@ fn drawn_archives_of_arrays_are_read_exactly_and_cut_ones_are_refused() {
             .to_string();
         assert!(error.contains("cut off"), "seed {seed}: {error}");
     }
+    told("archives of numpy", 0);
+}
+
+/// Rows as JSON objects, flat, with lists or nested, a line each or in one list.
+fn objects(rng: &mut ChaCha8Rng, motion: &Motion) -> String {
+    let (q, tau, scale) = names(rng.random_range(0..5));
+    let shape = rng.random_range(0..3);
+    let row = |k: usize| {
+        let t = motion.t[k];
+        let pairs = |names: &[String; 3], x: [f64; 3]| -> String {
+            let all = names
+                .iter()
+                .zip(x)
+                .map(|(name, x)| format!("\"{name}\": {x}"));
+            all.collect::<Vec<_>>().join(", ")
+        };
+        let scaled: [f64; 3] = std::array::from_fn(|j| motion.q[k][j] * scale[j]);
+        match shape {
+            0 => format!(
+                "{{\"t\": {t}, {}, {}, \"spare\": NaN}}",
+                pairs(&q, scaled),
+                pairs(&tau, motion.tau[k])
+            ),
+            1 => format!(
+                "{{\"tau\": {:?}, \"t\": {t}, \"q\": {:?}}}",
+                motion.tau[k], motion.q[k]
+            ),
+            _ => format!(
+                "{{\"time\": {t}, \"arm\": {{\"q\": {:?}, \"tau\": {:?}}}}}",
+                motion.q[k], motion.tau[k]
+            ),
+        }
+    };
+    let rows: Vec<String> = (0..ROWS).map(row).collect();
+    match rng.random_bool(0.5) {
+        true => format!("[{}]\n", rows.join(",\n ")),
+        false => rows.join("\n"),
+    }
+}
+
+#[test]
+fn drawn_objects_of_json_are_read_exactly() {
+    for seed in 4000..4000 + drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.jsonl");
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let motion = Motion::drawn(&mut rng);
+        std::fs::write(&path, objects(&mut rng, &motion)).unwrap();
+        same(&read(&path, &mapped(&path)).unwrap(), &motion, seed);
+    }
+    told("objects of JSON", 0);
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn drawn_tables_of_parquet_are_read_exactly() {
+    use cft_ident_logs::log::Instant;
+    use cft_ident_logs::output::LogWriter;
+    for seed in 5000..5000 + drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.parquet");
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let motion = Motion::drawn(&mut rng);
+        let (q, tau, scale) = names(rng.random_range(0..5));
+        let time = ["t", "time", "Time [s]"][rng.random_range(0..3)];
+        let columns: Vec<&str> = std::iter::once(time)
+            .chain(q.iter().chain(&tau).map(String::as_str))
+            .collect();
+        let mut log = LogWriter::with_notes(&path, &columns, &[]).unwrap();
+        log.set_origin(Instant::from_ns(
+            [0_i64, 1_750_000_000_123_456_789][rng.random_range(0..2)],
+        ));
+        for k in 0..ROWS {
+            let q = (0..3).map(|j| motion.q[k][j] * scale[j]);
+            let values = std::iter::once(motion.t[k]).chain(q);
+            log.row(values.chain(motion.tau[k])).unwrap();
+        }
+        log.commit().unwrap();
+        same(&read(&path, &mapped(&path)).unwrap(), &motion, seed);
+    }
+    told("tables of Parquet", 0);
 }
 
 /// Reads all rows of a file that may be damaged: an error is an answer.

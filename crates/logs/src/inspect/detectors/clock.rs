@@ -19,6 +19,14 @@ pub(in crate::inspect) enum RowStep {
     Apart,
     /// No row to go on with: its time is that of the row before, or no number.
     Unusable,
+    /// A row that was not read: its numbers are none.
+    Unread,
+}
+
+impl RowStep {
+    pub(in crate::inspect) fn is_usable(self) -> bool {
+        !matches!(self, Self::Unusable | Self::Unread)
+    }
 }
 
 /// The times of a log, seen one after the other.

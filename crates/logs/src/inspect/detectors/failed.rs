@@ -1,6 +1,7 @@
-//! Rows in which every channel reads 0 although the row before was not near it: reads that failed.
+//! Rows in which every channel reads 0, or another number that is one for all, although the row before was not near it:
+//! reads that failed.
 
-/// A position that goes to 0 was no further from it than so many of its steps before, or of its smallest ones.
+/// A position that goes to such a number was no further from it than so many of its steps before, or of its smallest ones.
 const NEAR: f64 = 10.0;
 /// Rows that are remembered.
 const MOST: usize = 65_536;
@@ -15,6 +16,8 @@ pub(in crate::inspect) struct FailedReads {
     grains: Vec<f64>,
     failing: bool,
     times: Vec<f64>,
+    /// What the first of them reads.
+    value: f64,
 }
 
 impl FailedReads {
@@ -25,15 +28,20 @@ impl FailedReads {
             grains: vec![f64::INFINITY; positions],
             failing: false,
             times: Vec::new(),
+            value: 0.0,
         }
     }
 
-    /// Whether the next row is none that was read; positions and others less what a logged 0 stands for.
+    /// Whether the next row is none that was read; positions and others as they were logged.
     pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) -> bool {
-        let zero = |x: &f64| *x == 0.0;
-        let empty = !others.is_empty() && positions.iter().all(zero) && others.iter().all(zero);
-        if empty && (self.failing || self.far()) {
+        let one = positions.first().copied().unwrap_or(f64::NAN);
+        let empty = !others.is_empty() && positions.iter().chain(others).all(|x| *x == one);
+        if empty && (self.failing || self.far(one)) {
             self.failing = true;
+            if self.times.is_empty() {
+                // no -0
+                self.value = one + 0.0;
+            }
             if self.times.len() < MOST {
                 self.times.push(t);
             }
@@ -51,11 +59,16 @@ impl FailedReads {
         false
     }
 
-    /// Whether a position cannot go to 0 from where it was.
-    fn far(&self) -> bool {
+    /// Whether a position cannot go to a number from where it was.
+    fn far(&self, to: f64) -> bool {
         let pairs = self.before.iter().zip(&self.steps).zip(&self.grains);
-        let mut far = pairs.map(|((q, step), grain)| q.abs() > NEAR * step.max(*grain));
+        let mut far = pairs.map(|((q, step), grain)| (q - to).abs() > NEAR * step.max(*grain));
         far.any(|far| far)
+    }
+
+    /// What the first of them reads, as it was logged.
+    pub(in crate::inspect) fn value(&self) -> f64 {
+        self.value
     }
 
     /// Times of the rows that failed, in order \[s\].
@@ -74,6 +87,17 @@ mod tests {
             reads.take(k as f64, &row[..2], &row[2..]);
         }
         reads.times().to_vec()
+    }
+
+    #[test]
+    fn rows_of_one_number_between_others_are_reads_that_failed_whatever_it_is() {
+        for sentinel in [-1.0, 32767.0] {
+            let row = |k: usize| match k {
+                7 | 20 | 21 | 39 => [sentinel; 3],
+                k => [0.5 + 0.01 * k as f64, (0.1 * k as f64).sin(), 2.0],
+            };
+            assert_eq!(failed((0..40).map(row)), [7.0, 20.0, 21.0, 39.0]);
+        }
     }
 
     #[test]

@@ -39,6 +39,11 @@ impl Histogram {
         self.sums[bin] += magnitude;
     }
 
+    /// How many were counted.
+    pub(in crate::inspect) fn total(&self) -> u64 {
+        self.total
+    }
+
     /// The magnitude that `share` (0..=1) of those counted do not exceed; 0 where there are none.
     pub(in crate::inspect) fn quantile(&self, share: f64) -> f64 {
         self.at(self.zeros, self.total, share)

@@ -22,7 +22,16 @@ const RING: usize = 64;
 /// Rows to each side by which a change of the speed is seen.
 const CHANGE: usize = 9;
 /// Spikes that are kept, the highest.
-const MOST: usize = 4096;
+const MOST: usize = 16_384;
+/// A row may be a spike where it is off by so many times what nine rows of ten are.
+const SUSPECT: f64 = 3.0;
+const MOST_ROWS: f64 = 0.9;
+/// Share of the rows by which a spike is measured.
+const NEARLY_ALL: f64 = 0.995;
+/// A spike is so many times what nearly all other rows differ from their neighbours.
+pub(in crate::inspect) const SPIKE: f64 = 8.0;
+/// One of a torque, and one of many, has at least this share of the channel's deviation.
+pub(in crate::inspect) const SPIKE_SHARE: f64 = 0.1;
 /// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
 /// smooth motion it does in the next rows too.
 const MOVES: f64 = 6.0;
@@ -142,7 +151,30 @@ impl Spikes {
 
     /// Brings the suspicion up to date with what was seen so far.
     pub(in crate::inspect) fn settle(&mut self) {
-        self.suspect = 3.0 * self.differences_seen.quantile(0.99);
+        self.suspect = SUSPECT * self.differences_seen.quantile(MOST_ROWS);
+    }
+
+    /// What nearly all rows differ from their neighbours. Where more of them are spikes than that leaves out, they are
+    /// set aside first: they hide each other where they are counted among the rest (Rosner 1983). `deviation` is that
+    /// of the channel.
+    pub(in crate::inspect) fn usual(&self, deviation: f64) -> f64 {
+        let rows = self.differences_seen.total().max(1) as f64;
+        let apart = |aside: usize| {
+            let rest = 1.0 - aside as f64 / rows;
+            self.differences_seen.quantile(NEARLY_ALL * rest)
+        };
+        let mut aside = self.found.len();
+        loop {
+            let least = (SPIKE * apart(aside)).max(SPIKE_SHARE * deviation);
+            let higher = self.found.iter().filter(|s| s.height.abs() > least);
+            let higher = higher.count();
+            if higher >= aside {
+                break;
+            }
+            aside = higher;
+        }
+        let hidden = aside as f64 > (1.0 - NEARLY_ALL) * rows;
+        apart(if hidden { aside } else { 0 })
     }
 
     /// Change of the joint's speed at a row, less half of those six rows before and after.

@@ -85,6 +85,18 @@ impl JoinedTopics {
     /// # Errors
     /// A file that cannot be read; a channel without a topic, or whose topic is not there.
     pub(in crate::log) fn of_robot(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
+        Self::of_channels(paths, layout, false)
+    }
+
+    /// The same where each joint may come in messages of its own, though of one topic.
+    ///
+    /// # Errors
+    /// Those of [`Self::of_robot`].
+    pub(super) fn of_parts(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
+        Self::of_channels(paths, layout, true)
+    }
+
+    fn of_channels(paths: &[PathBuf], layout: &Layout, apart: bool) -> Result<Self, LogError> {
         let named = |channels: &[Channel]| channels.iter().all(|c| parted(&c.column).is_some());
         let mut layout = layout.clone();
         if !named(&layout.velocities) {
@@ -105,14 +117,21 @@ impl JoinedTopics {
             });
         }
         let mut fields: Vec<(String, Vec<(String, String)>)> = Vec::new();
-        for channel in all() {
+        let mut joints: Vec<usize> = Vec::new();
+        let kinds = [&layout.positions, &layout.torques, &layout.velocities];
+        for (joint, channel) in kinds.into_iter().flat_map(|of| of.iter().enumerate()) {
             let Some((topic, path)) = parted(&channel.column) else {
                 continue;
             };
             let entry = (channel.column.clone(), path.to_owned());
-            match fields.iter_mut().find(|(known, _)| known == topic) {
-                Some((_, paths)) => paths.push(entry),
-                None => fields.push((topic.to_owned(), vec![entry])),
+            let same =
+                |(known, of): (&(String, _), &usize)| known.0 == topic && (!apart || *of == joint);
+            match fields.iter().zip(&joints).position(same) {
+                Some(at) => fields[at].1.push(entry),
+                None => {
+                    fields.push((topic.to_owned(), vec![entry]));
+                    joints.push(joint);
+                }
             }
         }
         let wanted = layout.clone();
@@ -135,7 +154,7 @@ impl JoinedTopics {
     pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
         let mut recording = MessageFiles::open(paths, Wanted::default())?;
         let mut found: Vec<(String, Vec<(String, String)>)> = Vec::new();
-        let mut looked = 0;
+        let (mut looked, mut unread) = (0, None);
         while looked < LOOKED_AT
             && let Some(message) = recording.next()?
         {
@@ -145,9 +164,14 @@ impl JoinedTopics {
             if !asked || found.iter().any(|(known, _)| known == name) {
                 continue;
             }
-            if let Ok(reader) = reader_of(&message.topic.schema, &[]) {
-                let leaves = reader.leaves(message.data).into_iter();
-                found.push((name.clone(), leaves.map(|l| (l.path, l.label)).collect()));
+            match reader_of(&message.topic.schema, &[]) {
+                Ok(reader) => {
+                    let leaves = reader.leaves(message.data).into_iter();
+                    found.push((name.clone(), leaves.map(|l| (l.path, l.label)).collect()));
+                }
+                Err(reason) => {
+                    unread.get_or_insert((name.clone(), reason));
+                }
             }
         }
         found.retain(|(_, leaves)| !leaves.is_empty());
@@ -160,8 +184,18 @@ impl JoinedTopics {
             let topics = recording.seen.iter().map(|topic| topic.name.as_str());
             return Err(LogError::Topic {
                 file: source::shown_all(paths),
-                problem: "no message of it holds numbers that can be read".to_owned(),
-                remedy: format!("record the joints' states; the topics are {}", list(topics)),
+                problem: match unread {
+                    Some((topic, reason)) => format!(
+                        "messages of {} cannot be read: {}",
+                        escape(&topic),
+                        escape(&reason)
+                    ),
+                    None => "no message of it holds numbers that can be read".to_owned(),
+                },
+                remedy: format!(
+                    "record the joints' states, as CDR with ros2msg definitions, protobuf or JSON; the topics are {}",
+                    list(topics)
+                ),
             });
         }
         let alone = found.len() == 1;
@@ -195,9 +229,10 @@ impl JoinedTopics {
         while schemas.contains(&None)
             && let Some(message) = recording.next()?
         {
-            let at = topics.iter().position(|topic| *topic == message.topic.name);
-            if let Some(schema) = at.and_then(|at| schemas.get_mut(at)) {
-                schema.get_or_insert_with(|| Arc::clone(&message.topic.schema));
+            for (topic, schema) in topics.iter().zip(&mut schemas) {
+                if *topic == message.topic.name {
+                    schema.get_or_insert_with(|| Arc::clone(&message.topic.schema));
+                }
             }
         }
         let refuse = |topic: &str, problem: String| LogError::Topic {
@@ -253,34 +288,38 @@ impl JoinedTopics {
             return Ok(());
         };
         let (head, topic) = (message.head, message.topic);
-        let is = |s: &Source| s.topic == topic.name && s.schema == topic.schema;
-        let Some(at) = self.sources.iter().position(is) else {
-            return Ok(());
-        };
-        let one = &mut self.sources[at];
-        if one.reader.read(message.data, &mut one.values).is_err() {
-            self.lost += 1;
-            return Ok(());
-        }
-        let t = one.instant(&head);
-        let numbers = one.values[2..].iter();
-        let numbers: Vec<f64> = numbers.map(|v| v.number().unwrap_or(f64::NAN)).collect();
-        if at == 0 {
-            self.waiting.push_back((t, numbers, head.number));
-            if self.waiting.len() > WAITING {
-                self.waiting.pop_front();
-                self.lost += 1;
+        let mut of = self.sources.iter_mut().enumerate();
+        let is = |(_, s): &(usize, &mut Source)| s.topic == topic.name && s.schema == topic.schema;
+        let mut lost = false;
+        while let Some((at, one)) = of.find(is) {
+            if one.reader.read(message.data, &mut one.values).is_err() {
+                lost = true;
+                continue;
             }
-            return Ok(());
-        }
-        if let Some((before, _)) = one.samples.back() {
-            if t <= *before {
-                self.lost += 1;
-                return Ok(());
+            if one.values[2..].iter().all(|value| *value == Value::Absent) {
+                continue;
             }
-            one.steps = (one.steps.0 + t.since(*before), one.steps.1 + 1);
+            let t = one.instant(&head);
+            let numbers = one.values[2..].iter();
+            let numbers: Vec<f64> = numbers.map(|v| v.number().unwrap_or(f64::NAN)).collect();
+            if at == 0 {
+                self.waiting.push_back((t, numbers, head.number));
+                if self.waiting.len() > WAITING {
+                    self.waiting.pop_front();
+                    lost = true;
+                }
+                continue;
+            }
+            if let Some((before, _)) = one.samples.back() {
+                if t <= *before {
+                    lost = true;
+                    continue;
+                }
+                one.steps = (one.steps.0 + t.since(*before), one.steps.1 + 1);
+            }
+            one.samples.push_back((t, numbers));
         }
-        one.samples.push_back((t, numbers));
+        self.lost += u64::from(lost);
         Ok(())
     }
 
@@ -302,7 +341,11 @@ impl JoinedTopics {
             }
         }
         self.number = number;
-        Some(true)
+        // what is no number was not measured
+        let used = self.channels[..2].iter().flatten();
+        let whole = used.into_iter().all(|place| self.row[*place].is_finite());
+        self.lost += u64::from(!whole);
+        Some(whole)
     }
 }
 
@@ -388,7 +431,7 @@ impl LogRows for JoinedTopics {
                         at: self.place(),
                         column: escape(&channel.column),
                         text: format!("{value:?}{}", beyond(value)),
-                        remedy: "use the parts before and after it as two logs, FILE@0..10s and FILE@10.1..s: a made-up number is worse than a gap",
+                        remedy: "leave it out, or write the channel's unit and scale into [log.joint] of the robot file",
                     });
                 }
                 to.push(value);
@@ -419,7 +462,9 @@ impl LogRows for JoinedTopics {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.breaks();
-        let topics = list(self.sources.iter().map(|one| one.topic.as_str()));
+        let mut topics: Vec<&str> = self.sources.iter().map(|one| one.topic.as_str()).collect();
+        topics.dedup();
+        let topics = list(topics.into_iter());
         if self.sources.len() > 1 {
             out.push(format!(
                 "rows are those of {topics}, interpolated linearly at the times of the first"

@@ -159,6 +159,15 @@ impl JointStates {
         found.sort_by_key(|one| (one.topic != main, one.is_columns()));
         let mut columns = vec!["t".to_owned()];
         let mut sources = Vec::new();
+        // topics of other joints each need no name of a topic before those of their joints
+        let joints = found.iter().filter(|one| !one.is_columns());
+        let mut joints: Vec<&str> = joints
+            .flat_map(|one| one.names.iter().map(|n| &**n))
+            .collect();
+        let all = joints.len();
+        joints.sort_unstable();
+        joints.dedup();
+        let apart = joints.len() == all;
         for one in found {
             let first = columns.len();
             let mut fields = vec![
@@ -175,7 +184,7 @@ impl JointStates {
             {
                 for name in &one.names {
                     fields.push(vec![FieldPath::named(array, "name", name)]);
-                    columns.push(column(&one, letter, name, &main));
+                    columns.push(column(&one, letter, name, apart || one.topic == main));
                 }
             }
             let Ok(reader) = reader_of(&one.schema, &fields) else {
@@ -403,8 +412,8 @@ impl StateRow {
 }
 
 /// Name of the column with one array's element.
-fn column(of: &FoundTopic, letter: &str, name: &str, main: &str) -> String {
-    if of.topic == main && !of.is_columns() {
+fn column(of: &FoundTopic, letter: &str, name: &str, by_joint: bool) -> String {
+    if by_joint && !of.is_columns() {
         return format!("{letter}_{name}");
     }
     let topic = of.topic.trim_matches('/');

@@ -17,6 +17,7 @@ mod parts;
 mod path;
 mod rows;
 mod sources;
+mod split_joints;
 mod state_topics;
 mod survey;
 mod value;
@@ -26,6 +27,7 @@ pub(super) use joined::{JoinedTopics, of_topics};
 pub(super) use joint_states::{JointStates, has_none};
 pub(super) use listing::listing;
 pub(super) use rows::MessageRows;
+pub(super) use split_joints::of_joints;
 pub(super) use state_topics::state_groups;
 
 pub use delay::{DelayEstimate, DelayEstimator};

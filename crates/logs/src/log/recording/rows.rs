@@ -66,6 +66,11 @@ impl LeftOut {
         }
         self.count += 1;
     }
+
+    /// So many of them, the last, were not left out after all.
+    fn take_back(&mut self, count: u64) {
+        self.count = self.count.saturating_sub(count);
+    }
 }
 
 impl fmt::Debug for MessageRows {
@@ -142,7 +147,7 @@ impl MessageRows {
                     at: self.place(),
                     column: escape(&channel.column),
                     text: format!("{number:?}{}", beyond(value)),
-                    remedy: "use the parts before and after it as two logs, FILE@0..10s and FILE@10.1..s: a made-up number is worse than a gap",
+                    remedy: "leave it out, or write the channel's unit and scale into [log.joint] of the robot file",
                 });
             }
             to.push(value);
@@ -165,7 +170,18 @@ impl LogRows for MessageRows {
                 return Ok(Some(self.row.stamp));
             }
             let Some(message) = self.recording.next()? else {
-                return Ok(None);
+                let incomplete = &self.reading.incomplete;
+                return match self.reading.begun || incomplete.count == 0 {
+                    true => Ok(None),
+                    false => Err(LogError::Topic {
+                        file: source::shown_all(&self.reading.paths),
+                        problem: format!(
+                            "none of {} messages holds every channel of the robot (the first: {})",
+                            self.messages, incomplete.first
+                        ),
+                        remedy: "record again with that channel, or name another one in [log.joint] of the robot file".to_owned(),
+                    }),
+                };
             };
             self.messages += 1;
             let Some(part) = self.reading.read(&message, &mut self.row)? else {
@@ -221,13 +237,16 @@ impl LogRows for MessageRows {
 
     #[cold]
     fn clock_remedy(&self, t: f64) -> Option<String> {
-        let part = format!("use the part before it: FILE@0..{t}s");
+        let part = match t > 0.0 {
+            true => format!(", or use the part before it: FILE@0..{t}s"),
+            false => String::new(),
+        };
         Some(match self.reading.choice.time {
             TimeSource::Log => format!(
-                "its messages lie in another order than that of their times: sort it first, `mcap sort IN.mcap -o OUT.mcap`, or {part}"
+                "its messages lie in another order than that of their times: sort it first, `mcap sort IN.mcap -o OUT.mcap`{part}"
             ),
             _ => format!(
-                "take the times of recording, `stamp = \"log\"` in [log] of the robot file, or {part}"
+                "take the times of recording, `stamp = \"log\"` in [log] of the robot file{part}"
             ),
         })
     }
@@ -346,7 +365,8 @@ impl SampleReader {
             }
         }
         if self.values[needed].contains(&Value::Absent) {
-            self.parts[of].join(&self.fields, head, &mut self.values);
+            let joined = self.parts[of].join(&self.fields, head, &mut self.values);
+            self.incomplete.take_back(joined);
         }
         let (fields, values) = (&self.fields, &self.values);
         let Some(stamp) = fields.stamp(values, head, self.choice.time) else {
@@ -372,7 +392,10 @@ impl SampleReader {
         for (range, to) in parts {
             to.clear();
             for index in range {
-                let Some(number) = values[index].number() else {
+                // nothing is fitted to velocities; of the others one that is no number was not measured
+                let read = values[index].number();
+                let measured = |x: &f64| x.is_finite() || fields.velocities.contains(&index);
+                let Some(number) = read.filter(measured) else {
                     let reader = self.readers[reader_at].1.as_ref().ok();
                     let uneven = reader.and_then(|reader| reader.uneven());
                     self.incomplete.add(|| {
@@ -380,6 +403,9 @@ impl SampleReader {
                         let path = path.map_or("", |path| path.text());
                         match uneven {
                             Some(uneven) => format!("in {} {uneven}", place()),
+                            None if read.is_some() => {
+                                format!("{} holds no number as `{}`", place(), escape(path))
+                            }
                             None => format!("{} has no `{}`", place(), escape(path)),
                         }
                     });

@@ -39,6 +39,8 @@ pub(super) struct FoundTopic {
     pub schema: Schema,
     probe: Box<dyn MessageReader>,
     pub names: Vec<String>,
+    /// Names in one message, at most.
+    pub most: usize,
     /// Which arrays are filled.
     pub arrays: [bool; 3],
     pub stamped: bool,
@@ -98,6 +100,7 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
                     schema: schema.clone(),
                     probe,
                     names: Vec::new(),
+                    most: 0,
                     arrays: [false; 3],
                     stamped: false,
                     zero_is_time: true,
@@ -233,7 +236,9 @@ impl FoundTopic {
             *filled |= *value != Value::Absent;
         }
         self.stamped |= stamp.is_some();
-        for name in self.probe.names(data) {
+        let names = self.probe.names(data);
+        self.most = self.most.max(names.len());
+        for name in names {
             if self.names.len() < NAMES && !self.names.contains(&name) {
                 self.names.push(name);
             }
@@ -252,6 +257,12 @@ impl FoundTopic {
         let (Some((a0, a1)), Some((b0, b1))) = (ends(self), ends(other)) else {
             return false;
         };
+        // a topic for each joint, each by its own clock
+        if let ([one], [two]) = (&self.names[..], &other.names[..])
+            && one != two
+        {
+            return a0.max(b0) <= a1.min(b1);
+        }
         let both = a0.max(b0)..=a1.min(b1);
         let within = |of: &Self| of.instants.iter().filter(|t| both.contains(*t)).count();
         let shared = self.instants.intersection(&other.instants).count();

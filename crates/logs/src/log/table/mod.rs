@@ -1,6 +1,7 @@
-//! Tables that are no text: arrays of numpy and Parquet files. Their rows are handed on as lines of CSV, so that
+//! Tables that are no lines of fields: arrays of numpy, Parquet files, JSON objects. Their rows are handed on as lines of CSV, so that
 //! whatever holds of text logs holds of them.
 
+mod json;
 mod lines;
 mod literal;
 mod npy;
@@ -23,6 +24,7 @@ pub(super) fn is_table(head: &[u8]) -> bool {
         .iter()
         .any(|magic| head.starts_with(magic))
         || (cfg!(feature = "parquet") && is_parquet(head))
+        || json::is_json(head)
 }
 
 /// Whether a file is a Parquet file, by its first bytes.
@@ -54,10 +56,20 @@ pub(super) fn open(
         return parquet::open(path, more).map_err(|error| refuse(error.to_string()));
     }
     let _ = more;
+    if json::is_json(head) {
+        return json::open(file).map_err(|error| refuse(error.to_string()));
+    }
     let arrays = match head.starts_with(b"PK") {
         false => npy::Array::of_file(file).map(|array| vec![array]),
         true => zip::members(file).and_then(|members| npy::Array::of_members(file, members)),
     };
+    if head.starts_with(b"PK") && arrays.as_ref().is_ok_and(Vec::is_empty) {
+        return Err(LogError::Format {
+            file: shown(path),
+            kind: "an archive without arrays of numpy (Excel's .xlsx, or a .zip)",
+            remedy: "save the sheet as CSV: `python -c \"import pandas; pandas.read_excel('IN').to_csv('OUT.csv', index=False)\"`; or unpack the archive",
+        });
+    }
     let (table, notes) = arrays
         .and_then(numpy::ArrayTable::new)
         .map_err(|error| refuse(error.to_string()))?;

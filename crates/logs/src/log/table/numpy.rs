@@ -61,10 +61,7 @@ impl ArrayTable {
     /// Arrays that hold no numbers in rows.
     pub(super) fn new(arrays: Vec<Array>) -> io::Result<(Self, Vec<String>)> {
         let Some(rows) = rows_of(&arrays) else {
-            return Err(unusable(
-                "it holds no array of numbers, as .npz files do (.xlsx files are archives too)"
-                    .to_owned(),
-            ));
+            return Err(unusable("it holds no array of numbers".to_owned()));
         };
         let mut out = Self {
             names: Vec::new(),

@@ -73,7 +73,11 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
         let listed = listed.filter(|listed| listed.len() == own.len() && own.len() > 1);
         match listed {
             Some(listed) => names.extend(listed.iter().map(|of| format!("{name}.{of}"))),
-            None => names.extend(own.iter().map(|of| format!("{name}{of}"))),
+            None => {
+                // the index of pandas where it has no name of its own
+                let name = if is_index(name) { "time" } else { name };
+                names.extend(own.iter().map(|of| format!("{name}{of}")));
+            }
         }
         if names.len() > COLUMNS {
             return Err(unusable(format!("more than {COLUMNS} columns")));
@@ -118,7 +122,7 @@ fn projected(path: &Path, notes: &mut Vec<String>) -> io::Result<(RowIter<'stati
     let about = reader.metadata().file_metadata();
     let root = about.schema_descr().root_schema();
     let (kept, left): (Vec<_>, Vec<_>) = (root.get_fields().iter().cloned())
-        .partition(|field| is_numeric(field) && !field.name().starts_with("__index_level_"));
+        .partition(|field| is_numeric(field) && (!is_index(field.name()) || is_instant(field)));
     if kept.is_empty() {
         return Err(unusable(
             "no column of the Parquet file holds numbers".to_owned(),
@@ -131,17 +135,33 @@ fn projected(path: &Path, notes: &mut Vec<String>) -> io::Result<(RowIter<'stati
             names.join(", ")
         ));
     }
-    let nanoseconds = kept.iter().map(|field| {
-        let kind = field.get_basic_info().logical_type_ref();
-        matches!(kind, Some(LogicalType::Timestamp(time)) if matches!(time.unit, TimeUnit::NANOS))
-    });
-    let nanoseconds = nanoseconds.collect();
+    let nanoseconds = kept.iter().map(is_nanoseconds).collect();
     let wanted = Type::group_type_builder(root.name())
         .with_fields(kept)
         .build()
         .map_err(broken)?;
     let rows = RowIter::from_file_into(Box::new(reader)).project(Some(wanted));
     Ok((rows.map_err(broken)?, nanoseconds))
+}
+
+/// Whether a column is an index of pandas without a name.
+fn is_index(name: &str) -> bool {
+    name.starts_with("__index_level_")
+}
+
+fn is_nanoseconds(field: &Arc<Type>) -> bool {
+    let kind = field.get_basic_info().logical_type_ref();
+    matches!(kind, Some(LogicalType::Timestamp(time)) if matches!(time.unit, TimeUnit::NANOS))
+}
+
+/// Whether a column holds instants.
+fn is_instant(field: &Arc<Type>) -> bool {
+    let kind = field.get_basic_info().converted_type();
+    let instant = matches!(
+        kind,
+        ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIMESTAMP_MICROS
+    );
+    field.is_primitive() && (instant || is_nanoseconds(field))
 }
 
 /// Whether all that a column holds are numbers.

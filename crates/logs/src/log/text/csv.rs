@@ -25,6 +25,8 @@ struct Guard {
     inner: Bytes,
     /// Bytes handed out since the last row was complete.
     pending: usize,
+    /// The last of them.
+    last: u8,
 }
 
 impl fmt::Debug for Guard {
@@ -42,6 +44,8 @@ impl Read for Guard {
             match self.inner.read(buffer) {
                 Ok(count) => {
                     self.pending += count;
+                    let last = count.checked_sub(1).and_then(|at| buffer.get(at));
+                    self.last = last.copied().unwrap_or(self.last);
                     return Ok(count);
                 }
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -106,7 +110,11 @@ impl TextFile {
             .comment(Some(found.comment))
             .delimiter(found.delimiter)
             .buffer_capacity(BUFFER)
-            .from_reader(Guard { inner, pending: 0 });
+            .from_reader(Guard {
+                inner,
+                pending: 0,
+                last: b'\n',
+            });
         let mut rows = Self {
             path: path.to_owned(),
             reader,
@@ -190,11 +198,14 @@ impl TextFile {
     pub(super) fn next(&mut self) -> Result<bool, LogError> {
         loop {
             if std::mem::take(&mut self.ahead) {
-                return Ok(self.fields() > 0);
-            }
-            std::mem::swap(&mut self.record, &mut self.previous);
-            if !self.advance()? {
-                return Ok(false);
+                if self.fields() == 0 {
+                    return Ok(false);
+                }
+            } else {
+                std::mem::swap(&mut self.record, &mut self.previous);
+                if !self.advance()? {
+                    return Ok(false);
+                }
             }
             if let Some(watch) = &self.watch
                 && watch.is_cut_at(self.before.0 + self.reader.position().byte())
@@ -204,12 +215,36 @@ impl TextFile {
             if (self.fields() == self.header.len() && !self.is_without_values()) || self.is_row() {
                 return Ok(true);
             }
+            if self.is_blank() {
+                self.blank += u64::from(self.fields() > 1);
+                continue;
+            }
+            let (found, end) = (self.fields(), self.end());
+            let narrow = found < self.header.len();
+            let remark = narrow && (0..found).all(|index| self.number(index).is_none());
+            if narrow && !self.goes_on()? && (remark || self.reader.get_ref().last != b'\n') {
+                self.told.push(format!(
+                    "line {}, the last one, is cut off or a remark, and is passed over",
+                    self.line_at(end)
+                ));
+                return Ok(false);
+            }
             match self.strictness {
-                _ if self.is_blank() => self.blank += u64::from(self.fields() > 1),
                 Strictness::Record => self.malformed += 1,
-                Strictness::Refuse => return Err(self.wrong_width()),
+                Strictness::Refuse => return Err(self.wrong_width(found, end)),
             }
         }
+    }
+
+    /// Whether a row follows, which is the current one then and not handed out yet.
+    #[cold]
+    fn goes_on(&mut self) -> Result<bool, LogError> {
+        let mut more = self.watch.is_some() || self.advance()?;
+        while more && self.watch.is_none() && self.is_blank() {
+            more = self.advance()?;
+        }
+        self.ahead = more && self.watch.is_none();
+        Ok(more)
     }
 
     /// Reads one record.
@@ -256,11 +291,11 @@ impl TextFile {
     }
 
     #[cold]
-    fn wrong_width(&self) -> LogError {
-        let (found, expected) = (self.fields(), self.header.len());
+    fn wrong_width(&self, found: usize, end: u64) -> LogError {
+        let expected = self.header.len();
         LogError::Fields {
             file: self.file(),
-            line: self.line(),
+            line: self.line_at(end),
             found,
             expected,
             remedy: if found > expected {
@@ -283,8 +318,10 @@ impl TextFile {
 
     /// Whether a field of the current row is empty; false where there is none.
     pub(super) fn is_blank_field(&self, index: usize) -> bool {
+        // what was not written when the power went is zeros
+        let nothing = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
         self.field(index)
-            .is_some_and(|field| field.trim_ascii().is_empty())
+            .is_some_and(|field| field.iter().all(nothing))
     }
 
     #[inline]
@@ -397,12 +434,22 @@ impl TextFile {
     /// costs nothing before.
     #[cold]
     pub(super) fn line(&self) -> u64 {
+        self.line_at(self.end())
+    }
+
+    /// Byte of the file at which the current row ends.
+    fn end(&self) -> u64 {
+        self.before.0 + self.reader.position().byte()
+    }
+
+    /// Line of the row that ends at a byte.
+    fn line_at(&self, end: u64) -> u64 {
         if self.watch.is_some() {
             // a stream cannot be read again
             return self.line_hint();
         }
-        let end = (self.before.0 + self.reader.position().byte()).saturating_sub(1);
-        count_lines(&self.path, end).unwrap_or_else(|_| self.reader.position().line())
+        count_lines(&self.path, end.saturating_sub(1))
+            .unwrap_or_else(|_| self.reader.position().line())
     }
 
     /// Line of the current row where no comment or blank line stands right before it.

@@ -27,8 +27,10 @@ pub(super) struct Head {
     pub(super) told: Vec<String>,
 }
 
+/// The way out of an HDF5 file or of one of numpy's kinds: every array, by its name.
+const HDF5: &str = "write its arrays for numpy: `python -c \"import h5py, numpy; a = {}; h5py.File('IN').visititems(lambda k, v: a.update({k.replace('/', '_'): v[()]} if hasattr(v, 'shape') else {})); numpy.savez('OUT.npz', **a)\"`";
 /// Formats that are not read: how a file begins, what it is, and the way out.
-const OTHERS: [(&[u8], &str, &str); 9] = [
+const OTHERS: [(&[u8], &str, &str); 17] = [
     (
         b"\xff\xfe",
         "UTF-16 text",
@@ -47,12 +49,12 @@ const OTHERS: [(&[u8], &str, &str); 9] = [
     (
         b"\x89HDF\r\n\x1a\n",
         "an HDF5 file (.h5, or .mat of MATLAB 7.3)",
-        "write its arrays as CSV: `python -c \"import h5py, pandas; f = h5py.File('IN'); pandas.DataFrame({k: f[k][:] for k in f}).to_csv('OUT.csv', index=False)\"`",
+        HDF5,
     ),
     (
         b"MATLAB 5.0 MAT-file",
         "a MAT-file",
-        "write a table from MATLAB: `writetable(T, 'OUT.csv')`; or read it in Python with scipy.io.loadmat and write CSV",
+        "write its arrays for numpy: `python -c \"import numpy, scipy.io; numpy.savez('OUT.npz', **{k: v for k, v in scipy.io.loadmat('IN', squeeze_me=True).items() if k[0] != '_'})\"`; or write a table from MATLAB: `writetable(T, 'OUT.csv')`",
     ),
     (
         b"PAR1",
@@ -62,8 +64,40 @@ const OTHERS: [(&[u8], &str, &str); 9] = [
     (
         b"ARROW1",
         "an Arrow file",
-        "write it as CSV: `python -c \"import pandas; pandas.read_feather('IN').to_csv('OUT.csv', index=False)\"`",
+        "write it as Parquet: `python -c \"import pandas; pandas.read_feather('IN').to_parquet('OUT.parquet')\"`",
     ),
+    (
+        b"\x80\x04\x95",
+        "a pickle of Python",
+        "write its table as CSV: `python -c \"import pandas; pandas.read_pickle('IN').to_csv('OUT.csv', index=False)\"`",
+    ),
+    (
+        b"\x80\x05\x95",
+        "a pickle of Python",
+        "write its table as CSV: `python -c \"import pandas; pandas.read_pickle('IN').to_csv('OUT.csv', index=False)\"`",
+    ),
+    (
+        b"ULog\x01\x12\x35",
+        "a ULog of PX4",
+        "write its topics as CSV: `ulog2csv IN.ulg`",
+    ),
+    (
+        b"MDF  ",
+        "an ASAM MDF file",
+        "write it as CSV: `python -c \"import asammdf; asammdf.MDF('IN').to_dataframe(time_from_zero=True).to_csv('OUT.csv')\"`",
+    ),
+    (
+        b"TDSm",
+        "a TDMS file of LabVIEW",
+        "write it as CSV: `python -c \"import nptdms; nptdms.TdmsFile.read('IN').as_dataframe().to_csv('OUT.csv', index=False)\"`",
+    ),
+    (
+        b"RRF",
+        "a recording of Rerun",
+        "give the MCAP or CSV that it was made from",
+    ),
+    (b"GIF8", "a picture", "give the log itself"),
+    (b"\x89PNG", "a picture", "give the log itself"),
     (b"%PDF", "a PDF document", "give the log itself"),
     (
         b"BZh",

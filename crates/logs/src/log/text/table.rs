@@ -83,12 +83,24 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
                 let fields = split(&lines[rows[row]].text, sign, spaces);
                 row == from && fields.iter().all(|field| is_datum(field))
             };
-            let fits = |row: &usize| headless(*row) || table(*row).is_some();
+            // a row of a preamble has others of its kind below it, and most rows are of another
+            let lasts = |row: usize| {
+                let (sign, spaces) = table(row).map_or(plain(row).parting, |found| found.parting);
+                let width = |k: &usize| width(&split(&lines[*k].text, sign, spaces));
+                let below = &rows[row..];
+                let alike = below.iter().filter(|k| width(k) == width(&rows[row]));
+                2 * alike.count() > below.len()
+            };
+            let begins = |row: &usize| headless(*row) || table(*row).is_some();
+            let fits = |row: &usize| begins(row) && lasts(*row);
             // a name in quotes that goes on in the next line: its lines are no rows
             let goes_on = |row: usize| lines[rows[row]].text.matches('"').count() % 2 == 1;
             let row = match rows.get(from).is_some() && goes_on(from) {
                 true => from,
-                false => (from..rows.len()).find(fits).unwrap_or(from),
+                false => (from..rows.len())
+                    .find(fits)
+                    .or_else(|| (from..rows.len()).find(begins))
+                    .unwrap_or(from),
             };
             let row = row.min(rows.len().saturating_sub(1));
             (row, table(row).unwrap_or_else(|| plain(row)))
@@ -129,6 +141,11 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     }
 }
 
+/// Fields of a row, but for an empty one behind a delimiter at its end.
+fn width(fields: &[&str]) -> usize {
+    fields.len() - usize::from(fields.len() > 1 && fields.last() == Some(&""))
+}
+
 /// What the row after the header holds, where it holds no numbers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Second {
@@ -155,9 +172,6 @@ impl Table {
             parting.unwrap_or_else(|| delimiter_of(line(0).unwrap_or_default(), wanted.delimiter));
         let fields = |row: usize| Some(split(line(row)?, sign, spaces));
         let names = fields(0)?;
-        let width = |fields: &[&str]| {
-            fields.len() - usize::from(fields.len() > 1 && fields.last() == Some(&""))
-        };
         let n = width(&names);
         if names.iter().any(|name| is_datum(name)) {
             return None;

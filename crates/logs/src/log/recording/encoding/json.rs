@@ -1,10 +1,9 @@
 //! Numbers out of JSON messages by field path or JSON pointer.
 
-use std::borrow::Cow;
-
 use serde_json::Value as Json;
 
 use super::leaves::{Tree, of_tree};
+use crate::log::json_text::parsed;
 use crate::log::recording::message::{Leaf, MessageReader, Schema, Uneven};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
@@ -44,41 +43,6 @@ impl MessageReader for JsonReader {
     fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
         parsed(data).map_or_else(|_| Vec::new(), |root| of_tree(&tree(&root)))
     }
-}
-
-/// A message as JSON. Numbers that JSON does not have, `NaN` and `Infinity` as Python writes them, are
-/// taken for none.
-fn parsed(data: &[u8]) -> Result<Json, serde_json::Error> {
-    serde_json::from_slice(data).or_else(|error| match without_words(data) {
-        Cow::Borrowed(_) => Err(error),
-        Cow::Owned(plain) => serde_json::from_slice(&plain),
-    })
-}
-
-/// The text with `null` for `NaN`, `Infinity` and `-Infinity` outside of quotes.
-fn without_words(data: &[u8]) -> Cow<'_, [u8]> {
-    const WORDS: [&[u8]; 6] = [b"-Infinity", b"Infinity", b"-NaN", b"NaN", b"nan", b"-nan"];
-    let mut out: Option<Vec<u8>> = None;
-    let (mut at, mut quoted) = (0, false);
-    while let Some(byte) = data.get(at) {
-        let word = WORDS
-            .iter()
-            .find(|word| !quoted && data[at..].starts_with(word));
-        if let Some(word) = word {
-            let kept = out.get_or_insert_with(|| data[..at].to_vec());
-            kept.extend(b"null");
-            at += word.len();
-            continue;
-        }
-        // what follows a backslash closes no quotes
-        let taken = if quoted && *byte == b'\\' { 2 } else { 1 };
-        quoted ^= *byte == b'"';
-        if let Some(kept) = &mut out {
-            kept.extend(data[at..].iter().take(taken));
-        }
-        at += taken;
-    }
-    out.map_or(Cow::Borrowed(data), Cow::Owned)
 }
 
 /// What a JSON value holds.

@@ -1,0 +1,67 @@
+//! Joint states whose joints come in messages of their own: parts of one topic, each by its own clock, or a topic for
+//! each joint.
+
+use std::path::PathBuf;
+
+use super::joined::JoinedTopics;
+use super::state_topics::{ARRAYS, FoundTopic, survey};
+use crate::log::LogError;
+use crate::log::layout::{Channel, Layout};
+
+/// The rows of a robot each of whose joints is found on one topic alone; `None` where one is not.
+///
+/// # Errors
+/// A file that cannot be read.
+pub(in crate::log) fn of_joints(
+    paths: &[PathBuf],
+    layout: &Layout,
+) -> Result<Option<(JoinedTopics, Layout)>, LogError> {
+    let found = survey(paths)?.found;
+    let needed = [!layout.positions.is_empty(), !layout.torques.is_empty()];
+    let topic_of = |joint: usize| -> Option<&FoundTopic> {
+        let name = layout.name_in_messages(joint)?;
+        let holds = |one: &&FoundTopic| {
+            one.topic.starts_with('/')
+                && one.names.iter().any(|own| own == name)
+                && needed
+                    .iter()
+                    .zip(one.arrays)
+                    .all(|(needed, filled)| filled || !needed)
+        };
+        let mut all = found.iter().filter(holds);
+        all.next().filter(|_| all.next().is_none())
+    };
+    let topics: Option<Vec<&FoundTopic>> = (0..layout.joints.len()).map(topic_of).collect();
+    // one message of one topic that holds them all is refused for another reason
+    let several = |topics: &Vec<&FoundTopic>| {
+        let [first, others @ ..] = &topics[..] else {
+            return false;
+        };
+        first.most < first.names.len() || others.iter().any(|one| one.topic != first.topic)
+    };
+    let Some(topics) = topics.filter(several) else {
+        return Ok(None);
+    };
+    let mut split = layout.clone();
+    let kinds = [
+        &mut split.positions,
+        &mut split.torques,
+        &mut split.velocities,
+    ];
+    for (channels, (array, _)) in kinds.into_iter().zip(ARRAYS) {
+        rename(channels, array, layout, &topics);
+    }
+    if !topics.iter().all(|one| one.arrays[2]) {
+        split.velocities.clear();
+    }
+    let rows = JoinedTopics::of_parts(paths, &split)?;
+    Ok(Some((rows, split)))
+}
+
+/// Names channels by their topics and the places of their joints.
+fn rename(channels: &mut [Channel], array: &str, layout: &Layout, topics: &[&FoundTopic]) {
+    for (joint, (channel, one)) in channels.iter_mut().zip(topics).enumerate() {
+        let name = layout.name_in_messages(joint).unwrap_or_default();
+        channel.column = format!("{}:{array}[name={name}]", one.topic);
+    }
+}
