@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::known_payload::KnownPayload;
-use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup};
+use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup, typed};
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
@@ -148,6 +148,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         machine,
         found: &found,
         file: &model,
+        path: &typed::quoted(&args.output.to_string_lossy()),
         logs: &names,
     };
     let mut report = stages::lsq::lsq(&of);

@@ -15,7 +15,7 @@ use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::candidates::CandidateSection;
-use cft_ident_files::config::model_file::{Estimate, Parameter};
+use cft_ident_files::config::model_file::{Covariance, Estimate, Parameter};
 use cft_ident_logs::log::DataRole;
 
 impl Diagnosed {
@@ -91,7 +91,7 @@ impl Diagnosed {
         // beside a part of an effect the declared numbers take up the rest, and are no estimates
         let whole = self.is_whole();
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
-        let mut undetermined = Vec::new();
+        let (mut undetermined, mut estimated) = (Vec::new(), Vec::new());
         for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
             if self.hold_friction && matches!(unknown, Unknown::Friction { .. }) {
                 continue;
@@ -115,6 +115,9 @@ impl Diagnosed {
                 });
                 (p.value, p.std) = (value, None);
                 undetermined.push(p.key());
+                if found.is_finite() {
+                    estimated.push((p.key(), i));
+                }
                 continue;
             }
             match put(p, value, found) {
@@ -127,6 +130,10 @@ impl Diagnosed {
             }
         }
         model.forget_covariance(&undetermined);
+        model.estimate_covariance = match estimated.is_empty() {
+            true => file.estimate_covariance.clone(),
+            false => Some(self.covariance_between(&estimated)),
+        };
         model.replace_covariance(&keys, &|a, b| {
             widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
         });
@@ -155,6 +162,16 @@ impl Diagnosed {
             }
         }
         model
+    }
+
+    /// Covariance of unknowns, by key and place.
+    fn covariance_between(&self, unknowns: &[(String, usize)]) -> Covariance {
+        let all = &self.diagnosis.covariance;
+        let row = |(_, i): &(String, usize)| unknowns.iter().map(|(_, j)| all[(*i, *j)]).collect();
+        Covariance {
+            names: unknowns.iter().map(|(key, _)| key.clone()).collect(),
+            matrix: unknowns.iter().map(row).collect(),
+        }
     }
 
     /// Whether every effect is written as it was estimated.

@@ -1,5 +1,6 @@
 //! The report of `lsq`.
 
+use super::first_screen;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::{Align, Table, unbroken};
@@ -21,6 +22,8 @@ pub struct Lsq<'a> {
     pub found: &'a IdentifiedDynamics,
     /// The model that was fitted.
     pub file: &'a ModelFile,
+    /// Its path as a shell takes it.
+    pub path: &'a str,
     /// Names of the logs.
     pub logs: &'a [String],
 }
@@ -67,6 +70,7 @@ pub fn lsq(of: &Lsq) -> Report {
     }
     report.terminal().line("");
     report.terminal().note("", NEXT, 2);
+    first_screen::narrowing(&mut report.terminal(), of.file, of.path);
     let mut page = report.page();
     gains(&mut page, &of.found.gains);
     known_friction(&mut page, &of.found.friction);
