@@ -254,6 +254,20 @@ class Model:
         found = _native.joint_friction(self._native, v)
         return found[0] if one else found
 
+    def friction_compensation(self, v: Any, v_desired: Any) -> Array:
+        """Friction for a controller to add, silent at rest: (N, n) or (n,), in N or N m.
+
+        ``v`` and ``v_desired``: measured and desired velocities, of one shape. A joint that is told to move gets the
+        friction of its desired speed; one that is told to rest that of its measured speed, and nothing below a hundredth
+        of its speed limit (0.01 rad/s or 1 mm/s where the robot file gives none). Continuous in both.
+        """
+        (v, wanted), one = _motion(v, v_desired)
+        rest = np.array(_native.rest_speeds(self._native))
+        share = np.minimum(np.abs(wanted) / rest, 1.0)
+        felt = np.clip(np.abs(v) / rest - 1.0, 0.0, 1.0)
+        tau: Array = share * self.friction(wanted) + (1.0 - share) * felt * self.friction(v)
+        return tau[0] if one else tau
+
     def regressor(self, q: Any, v: Any, a: Any) -> Array:
         """The matrix Y of the inertial parameters: (N, n, p), or (n, p) for one row."""
         (q, v, a), one = _motion(q, v, a)

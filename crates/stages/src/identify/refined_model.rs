@@ -7,7 +7,7 @@ use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
 use crate::open_loop::{FreeRun, RunSpan, free_run};
-use cft_ident_core::diagnose::{FoundEffect, LogRole, Unknown};
+use cft_ident_core::diagnose::{Case, FoundEffect, LogRole, SplitErrors, Unknown, errors_of};
 use cft_ident_core::effect::{AugmentedModel, EffectNumber};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -36,6 +36,30 @@ impl Diagnosed {
         let stretches = &self.in_memory.stretches;
         let spans = self.held_out_spans();
         Ok(free_run(&before, after.as_ref(), stretches, &spans))
+    }
+
+    /// Errors before and after by the parameters that torques are computed with, in place of those of the plain fit.
+    pub(super) fn judge_in_use(
+        &mut self,
+        machine: &LoggedRobot,
+        case: &Case,
+        (name, given): (&str, &ModelFile),
+    ) -> Result<(), IdentifyError> {
+        let together = self.diagnosis.together;
+        let of = |file: &ModelFile| -> Result<SplitErrors, IdentifyError> {
+            errors_of(case, together, &refined(file, name)?).map_err(IdentifyError::Diagnose)
+        };
+        let before = of(given)?;
+        let after = match self.diagnosis.written().next() {
+            None => before.clone(),
+            Some(_) => of(&self.model(machine, given))?,
+        };
+        self.diagnosis.before = before;
+        match &mut self.diagnosis.selected {
+            Some(selected) => *selected = after,
+            None => self.diagnosis.after = after,
+        }
+        Ok(())
     }
 
     /// Held-out spans of the stretches; all of them where nothing is held out.

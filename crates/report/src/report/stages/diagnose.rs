@@ -121,7 +121,7 @@ pub fn told(
         .list(changes(machine, found).into_iter().skip(FEW));
     let mut terminal = report.terminal();
     terminal.line("");
-    terminal.note("", &first_screen::next(machine, found), 2);
+    terminal.note("", &first_screen::next(machine, found, written.1), 2);
     first_screen::next_motion(&mut terminal, (machine, found), written);
 }
 

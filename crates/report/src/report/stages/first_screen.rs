@@ -11,7 +11,7 @@ use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, sepa
 /// Errors per joint as bars, and the next thing to do.
 pub fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     page.figure(&bars(machine, found).svg());
-    page.paragraph(&next(machine, found));
+    page.paragraph(&next(machine, found, "MODEL.toml"));
 }
 
 /// Errors of every joint before and after: held-out ones where there are any.
@@ -76,8 +76,8 @@ pub fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
     }
 }
 
-/// What to do next.
-pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
+/// What to do next; `path` is the model's as a shell takes it.
+pub fn next(machine: &LoggedRobot, found: &Diagnosed, path: &str) -> String {
     let d = &found.diagnosis;
     if !d.determined {
         return "Next: move the joints faster and farther, or log a torque with less noise."
@@ -111,9 +111,10 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
             machine.robot.joint_names()[j]
         ),
         None if d.written().next().is_none() => {
-            "Next: use the model (`cft-ident torque`, `cft-ident export`).".to_owned()
+            format!("Next: use the model: `cft-ident export -m {path} --c model.h`.")
         }
-        None => "Next: try the refined model on a log of another motion (`cft-ident validate`)."
-            .to_owned(),
+        None => format!(
+            "Next: try the refined model on a log of another motion: `cft-ident validate LOG -m {path}`."
+        ),
     }
 }

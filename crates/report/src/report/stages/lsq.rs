@@ -69,7 +69,7 @@ pub fn lsq(of: &Lsq) -> Report {
         consistent(&mut detail, links);
     }
     report.terminal().line("");
-    report.terminal().note("", NEXT, 2);
+    report.terminal().note("", &next(of.path), 2);
     first_screen::narrowing(&mut report.terminal(), of.file, of.path);
     let mut page = report.page();
     gains(&mut page, &of.found.gains);
@@ -92,7 +92,7 @@ pub fn pictures(
     quality: &[Inspected],
     command: &str,
 ) {
-    page.paragraph(NEXT);
+    page.paragraph(&next("MODEL.toml"));
     parameters::section(page, of.file, &|_| None);
     if let Some(replayed) = replayed {
         let (machine, logs) = (of.machine, &replayed.logs);
@@ -109,9 +109,13 @@ pub fn pictures(
     provenance::section(page, file, &inputs, &[], summary, command);
 }
 
-/// What to do next.
-const NEXT: &str = "Next: `cft-ident validate` on a log that was not fitted, for this error is of the data that were; \
-                    `cft-ident diagnose` finds what the model lacks.";
+/// What to do next with the model at a path.
+fn next(path: &str) -> String {
+    format!(
+        "Next: `cft-ident validate LOG -m {path}` on a log that was not fitted, for this error is of the data that \
+         were; `cft-ident diagnose LOG -m {path} -o refined.toml` finds what the model lacks."
+    )
+}
 
 /// The error of the fit, how good that is and whether the model can be used; and whether nothing calls for attention.
 fn words(of: &Lsq) -> (String, bool) {
