@@ -82,3 +82,16 @@ def test_the_loop_of_the_manual_runs(model, tmp_path, monkeypatch):
     rest = np.zeros(6)
     tau = words["control"](np.ones(6), np.ones(6), q, rest, q, rest, rest)
     assert np.allclose(tau, model.gravity(q))
+
+
+def test_every_command_takes_the_model(model, measured, tmp_path):
+    log = measured("ur10/ur10_exciting.csv") + "@70..100%"
+    assert "parameters" in ci.show(model).to_dict()
+    assert ci.compare(model, model, log).to_dict()["schema"] == "cft-ident/compare/1"
+    ci.torque(model, log, tmp_path / "tau.csv")
+    ci.watch(model, log, tmp_path / "external.csv", false_alarms=2.0)
+    ci.convert(log, tmp_path / "log.mcap", robot="configs/ur10.toml")
+    found = ci.payload(model, log, tmp_path / "loaded.toml")
+    assert found.to_dict()["readings"] and found.model.joints == model.joints
+    model.to_ros2_control(tmp_path / "gains.yaml")
+    assert "joint_trajectory_controller" in (tmp_path / "gains.yaml").read_text()

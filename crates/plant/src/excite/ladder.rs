@@ -39,6 +39,8 @@ const TURNS: [f64; 2] = [0.1, 5.0];
 const OTHERS: f64 = 0.1;
 /// A speed that is nearer to its limit than this share stands at it.
 const AT_LIMIT: f64 = 1e-6;
+/// Ratio by which a top speed is lowered whose strokes leave the range.
+const SLOWER_TOP: f64 = 0.85;
 /// Parts of the travel that are tried, one after the other, until the drives keep their limits.
 const PARTS: [f64; 6] = [1.0, 0.8, 0.6, 0.4, 0.2, 0.1];
 /// Directions of the nuisance below this share of the largest carry nothing.
@@ -181,7 +183,12 @@ fn widest(
     for part in PARTS.map(|part| part * task.part) {
         let mut usual = usual_ladder(machine, task, (joint, part))?;
         keep_speed_limit(machine, task.reserve, joint, &mut usual.speeds);
-        match expectation(machine, task, joint, &usual) {
+        let mut expected = expectation(machine, task, joint, &usual);
+        // strokes that leave the range with their turns
+        while matches!(expected, Err(ExciteError::Reference(_))) && usual.slow_down() {
+            expected = expectation(machine, task, joint, &usual);
+        }
+        match expected {
             Ok(before) => return Ok((usual, before)),
             Err(error @ ExciteError::BeyondDrive { .. }) => refused = Some(error),
             Err(error) => return Err(error),
@@ -201,6 +208,18 @@ struct Rungs {
     speeds: Vec<f64>,
     /// Time from zero speed to a slow plateau \[s\].
     turn: f64,
+}
+
+impl Rungs {
+    /// Lowers the top speed; not below the others.
+    fn slow_down(&mut self) -> bool {
+        let Some(top) = self.speeds.last().map(|top| SLOWER_TOP * top) else {
+            return false;
+        };
+        self.speeds.iter_mut().for_each(|v| *v = v.min(top));
+        self.speeds.dedup();
+        self.speeds.len() > 2
+    }
 }
 
 /// The acceleration that a ladder may take where the motors are the joints and something bounds it: less the reserve,

@@ -26,6 +26,8 @@ pub struct Lsq<'a> {
     pub path: &'a str,
     /// Names of the logs.
     pub logs: &'a [String],
+    /// The logs as a shell takes them.
+    pub typed: &'a str,
 }
 
 /// Parameters that a screen has room for.
@@ -69,7 +71,7 @@ pub fn lsq(of: &Lsq) -> Report {
         consistent(&mut detail, links);
     }
     report.terminal().line("");
-    report.terminal().note("", &next(of.path), 2);
+    report.terminal().note("", &next(of.typed, of.path), 2);
     first_screen::narrowing(&mut report.terminal(), of.file, of.path);
     let mut page = report.page();
     gains(&mut page, &of.found.gains);
@@ -92,7 +94,7 @@ pub fn pictures(
     quality: &[Inspected],
     command: &str,
 ) {
-    page.paragraph(&next("MODEL.toml"));
+    page.paragraph(&next("LOG", "MODEL.toml"));
     parameters::section(page, of.file, &|_| None);
     if let Some(replayed) = replayed {
         let (machine, logs) = (of.machine, &replayed.logs);
@@ -109,11 +111,11 @@ pub fn pictures(
     provenance::section(page, file, &inputs, &[], summary, command);
 }
 
-/// What to do next with the model at a path.
-fn next(path: &str) -> String {
+/// What to do next with the model at a path that was fitted to these logs.
+fn next(fitted: &str, path: &str) -> String {
     format!(
         "Next: `cft-ident validate LOG -m {path}` on a log that was not fitted, for this error is of the data that \
-         were; `cft-ident diagnose LOG -m {path} -o refined.toml` finds what the model lacks."
+         were; `cft-ident diagnose {fitted} -m {path} -o refined.toml` finds what the model lacks."
     )
 }
 
