@@ -225,9 +225,12 @@ fn known(yaml: &str) {
         }
     }
     for joint in &joints {
-        for gain in ["p", "d"] {
-            let value = found[&format!("gains.{joint}.{gain}")].parse::<f64>();
-            assert!(value.unwrap() > 0.0, "{joint} {gain}");
-        }
+        let gain = |key: &str| {
+            found[&format!("gains.{joint}.{key}")]
+                .parse::<f64>()
+                .unwrap()
+        };
+        // viscous friction may damp more than the loop is to
+        assert!(gain("p") > 0.0 && gain("d") >= 0.0, "{joint}");
     }
 }
