@@ -5,6 +5,7 @@ use cft_ident_core::effect::{Added, Place};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::model_file::Parameter;
 
 /// A motion of one joint alone, both ways at several speeds, where such a motion separates the effect; none where it
 /// takes a payload, a standstill, a motor alone or other sensors. `model` is the path as a shell takes it.
@@ -21,11 +22,20 @@ pub fn separating_command(effect: &Added, robot: &Robot, model: &str) -> Option<
 }
 
 /// A motion that narrows the parameters that are not identified, and how many of how many they are; none where every
-/// one is, and where positions and speeds of the logs are not known.
+/// one is, and where positions and speeds of the logs are not known. What the data say nothing of counts as little as
+/// what no motion shows (a constant torque beside the weight of a slide): they look alike.
 pub fn narrowing_command(file: &ModelFile, model: &str) -> Option<([usize; 2], String)> {
-    let rated = || file.parameters.iter().filter_map(|p| p.verdict);
-    let open = rated().filter(|v| matches!(v, Verdict::Weak | Verdict::NotIdentifiable));
-    let open = open.count();
+    let estimated = |p: &Parameter| {
+        let mut own = file.estimates.iter();
+        let own = own.find(|e| e.name == p.name && e.joint == p.joint);
+        own.is_some_and(|e| e.std.is_some())
+    };
+    let rated = || file.parameters.iter().filter(|p| p.verdict.is_some());
+    let open = |p: &&Parameter| {
+        let weak = matches!(p.verdict, Some(Verdict::Weak | Verdict::NotIdentifiable));
+        weak && (p.std.is_some() || estimated(p))
+    };
+    let open = rated().filter(open).count();
     let known = file.held_out.len() == file.robot.robot().joints();
     (open > 0 && known).then(|| ([open, rated().count()], command(model, "weak")))
 }
