@@ -424,7 +424,7 @@ impl LogLayout {
             let channels = part.positions.iter().chain(&part.torques);
             header.extend(channels.map(|c| c.column.clone()));
         }
-        let speeds = joint.into_iter().flat_map(|part| speeds(part));
+        let speeds = joint.into_iter().flat_map(speeds);
         header.extend(speeds.map(|(_, c)| c.column.clone()));
         if actuator.is_some() {
             let motors = 1..=run.coordinates.len();
@@ -460,7 +460,7 @@ impl LogLayout {
                 extend(&mut values, &part.positions, &run.x[k]);
                 extend(&mut values, &part.torques, &run.volts[k]);
             }
-            for (j, channel) in joint.into_iter().flat_map(|part| speeds(part)) {
+            for (j, channel) in joint.into_iter().flat_map(speeds) {
                 values.push(logged(channel, run.actual.v[k][j]));
             }
             if actuator.is_some() {
