@@ -32,6 +32,13 @@ installed=$work/venv/bin/cft-ident
 [ "$("$installed" --version)" = "$("$tool" --version)" ]
 (cd "$work" && "$installed" example ur10 && "$installed" inspect ur10/ur10.csv -r ur10/ur10.toml -q)
 
+# types: the package, its stubs against the built module, and what a user writes against them
+if pip install -q mypy pandas-stubs > "$work/pip.log" 2>&1; then
+  (cd "$work" && mypy --config-file "$OLDPWD/python/pyproject.toml" --cache-dir "$work/mypy" -p cft_ident && stubtest cft_ident._native)
+else
+  echo "SKIPPED: mypy cannot be installed: $(tail -n 1 "$work/pip.log")"
+fi
+
 CFT_IDENT=$tool timeout 600 pytest -q -rs -p no:cacheprovider python/tests
 
 if pip install -q nbclient ipykernel > "$work/pip.log" 2>&1; then

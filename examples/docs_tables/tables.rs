@@ -53,6 +53,7 @@ fn replay(result: &Value) -> String {
     let degrees = |value: &Value| format!("{}°", significant(number(value), 3));
     let each = rows(&result["errors"]).iter().map(|line| {
         vec![
+            text(&line["machine"]).to_owned(),
             text(&line["joint"]).to_owned(),
             format!("{} s", number(&line["seconds"])),
             number(&line["windows"]).to_string(),
@@ -62,6 +63,7 @@ fn replay(result: &Value) -> String {
         ]
     });
     let columns = [
+        "<machine",
         "<joint",
         "window",
         "windows",

@@ -38,13 +38,13 @@ from ._native import (
     UsageError,
     __version__,
 )
-from .results import Diagnosis, Excitation, Fit, Identification, NewRobot, Result, Simulation, Track
+from .results import Diagnosis, Excitation, Fit, Identification, NewRobot, Payload, Result, Simulation, Track
 
 __all__ = [
     "CftIdentError", "Diagnosis", "Excitation", "Fit", "Identification", "InputError", "Log", "Model", "NewRobot", "Part",
-    "Result", "Robot", "Simulation", "Track", "UndeterminedError", "UsageError", "__version__", "diagnose",
-    "example", "excite", "export", "friction", "identify", "inspect", "lsq", "merge", "new", "reduce", "simulate",
-    "track", "validate",
+    "Payload", "Result", "Robot", "Simulation", "Track", "UndeterminedError", "UsageError", "__version__", "compare",
+    "convert", "diagnose", "example", "excite", "export", "friction", "identify", "inspect", "lsq", "merge", "new",
+    "payload", "reduce", "show", "simulate", "torque", "track", "validate", "watch",
 ]
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -254,6 +254,20 @@ class Model:
         found = _native.joint_friction(self._native, v)
         return found[0] if one else found
 
+    def friction_compensation(self, v: Any, v_desired: Any) -> Array:
+        """Friction for a controller to add, silent at rest: (N, n) or (n,), in N or N m.
+
+        ``v`` and ``v_desired``: measured and desired velocities, of one shape. A joint that is told to move gets the
+        friction of its desired speed; one that is told to rest that of its measured speed, and nothing below a hundredth
+        of its speed limit (0.01 rad/s or 1 mm/s where the robot file gives none). Continuous in both.
+        """
+        (v, wanted), one = _motion(v, v_desired)
+        rest = np.array(_native.rest_speeds(self._native))
+        share = np.minimum(np.abs(wanted) / rest, 1.0)
+        felt = np.clip(np.abs(v) / rest - 1.0, 0.0, 1.0)
+        tau: Array = share * self.friction(wanted) + (1.0 - share) * felt * self.friction(v)
+        return tau[0] if one else tau
+
     def regressor(self, q: Any, v: Any, a: Any) -> Array:
         """The matrix Y of the inertial parameters: (N, n, p), or (n, p) for one row."""
         (q, v, a), one = _motion(q, v, a)
@@ -282,6 +296,10 @@ class Model:
     def to_rust(self, path: PathLike) -> Result:
         """Write the model as a Rust module."""
         return export(self, rust=path)
+
+    def to_ros2_control(self, path: PathLike) -> Result:
+        """Write gains of ros2_control's joint_trajectory_controller for joints that take efforts."""
+        return export(self, ros2_control=path)
 
     def to_mjcf(self, path: PathLike) -> Result:
         """Write the model for MuJoCo."""
@@ -354,8 +372,7 @@ class Part:
 
 def inspect(logs: PathLike | Iterable[PathLike], robot: Robot | PathLike | None = None) -> Result:
     """What log files hold and what is wrong with them."""
-    files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
-    line = ["inspect", *[os.fspath(file) for file in files]]
+    line = ["inspect", *_files(logs)]
     if robot is not None:
         line += ["-r", robot.path if isinstance(robot, Robot) else os.fspath(robot)]
     return Result(*_command(line))
@@ -446,7 +463,8 @@ def excite(robot: Robot | PathLike, output: PathLike, *, model: Model | PathLike
     """Design a motion for a robot file and write it as a trajectory.
 
     Without ``model`` torques are foreseen with the mass properties of the robot file, or not at all, as the result says.
-    ``settings`` are the options of the command: ``joint="q4"``, ``criterion="d-optimal"``, ``periods=8``, ``seed=1``,
+    ``for_="weak"`` with a model narrows what is weak in it, ``for_="stribeck:q2"`` separates an effect. Other
+    ``settings`` are options of the command: ``joint="q4"``, ``criterion="d-optimal"``, ``periods=8``, ``seed=1``,
     ``with_=["monday.csv"]``, ``samples="motion.csv"``.
     """
     path = robot.path if isinstance(robot, Robot) else os.fspath(robot)
@@ -477,9 +495,8 @@ def identify(urdf: PathLike, logs: PathLike | Iterable[PathLike], output: PathLi
 
     Models, pages and the robot file stand in the folder ``output``; ``.model`` is the one to use.
     """
-    files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
     folder = os.fspath(output)
-    document, _, text = _command(["identify", os.fspath(urdf), *[os.fspath(file) for file in files], "-o", folder])
+    document, _, text = _command(["identify", os.fspath(urdf), *_files(logs), "-o", folder])
     kept = [name for name in ("refined.toml", "model.toml") if os.path.exists(os.path.join(folder, name))]
     page = os.path.join(folder, "report.html")
     html = None
@@ -503,6 +520,61 @@ def _as_file(model: Model | PathLike | None) -> Iterator[str | None]:
         yield path
 
 
+def payload(model: Model | PathLike, logs: PathLike | Iterable[PathLike], output: PathLike | None = None) -> Payload:
+    """Mass [kg], centre [m] and inertia [kg m^2] of what the arm carries in these log files, with 95 % intervals.
+
+    ``model`` is that of the unloaded arm; ``.model`` is that of the loaded one, which ``output`` keeps as a file.
+    """
+    with _as_file(model) as path, tempfile.TemporaryDirectory() as folder:
+        loaded = os.fspath(output) if output is not None else os.path.join(folder, "loaded.toml")
+        told = _command(["payload", *_files(logs), "-m", str(path), "-o", loaded])
+        return Payload(*told, Model.load(loaded))
+
+
+def torque(model: Model | PathLike, motion: PathLike, output: PathLike) -> Result:
+    """Write feed-forward torques with their 95 % band [N or N m] for a log or trajectory file, as CSV or MCAP.
+
+    For arrays there is :meth:`Model.torque`.
+    """
+    with _as_file(model) as path:
+        return Result(*_command(["torque", os.fspath(motion), "-m", str(path), "-o", os.fspath(output)]))
+
+
+def compare(one: Model | PathLike, other: Model | PathLike, logs: PathLike | Iterable[PathLike] = ()) -> Result:
+    """Where two models differ, parameter by parameter with 95 % intervals; with log files also by their errors."""
+    with _as_file(one) as first, _as_file(other) as second:
+        return Result(*_command(["compare", str(first), str(second), *_files(logs)]))
+
+
+def watch(model: Model | PathLike, log: PathLike, output: PathLike, **settings: Any) -> Result:
+    """Write the torques [N or N m] that push a robot from outside along a log file, as CSV or MCAP; alarms are told.
+
+    ``settings`` are the options of the command: ``false_alarms=0.1`` (an hour), ``unloaded="empty.csv"``.
+    """
+    with _as_file(model) as path:
+        words = _options(settings)
+        return Result(*_command(["watch", os.fspath(log), "-m", str(path), *words, "-o", os.fspath(output)]))
+
+
+def show(model: Model | PathLike) -> Result:
+    """A model as a person wants to know it: what its error means in use, parameters, friction, effects, range."""
+    with _as_file(model) as path:
+        return Result(*_command(["show", str(path)]))
+
+
+def convert(logs: PathLike | Iterable[PathLike], output: PathLike, *, robot: Robot | PathLike | None = None,
+            **settings: Any) -> Result:
+    """Write log files as one of another format (CSV, MCAP, Parquet); with ``robot`` in joints, m or rad, N or N m."""
+    words = _options(settings)
+    if robot is not None:
+        words += ["-r", robot.path if isinstance(robot, Robot) else os.fspath(robot)]
+    return Result(*_command(["convert", *words, *_files(logs), os.fspath(output)]))
+
+
+def _files(logs: PathLike | Iterable[PathLike]) -> list[str]:
+    return [os.fspath(file) for file in ([logs] if isinstance(logs, (str, os.PathLike)) else logs)]
+
+
 def example(name: str, folder: PathLike) -> Result:
     """Write a measured log with its robot file into a folder: ``ur10``, ``tx40``, ``bldc``, or the simulated ``cft``."""
     return Result(*_command(["example", name, "-o", os.fspath(folder)]))
@@ -521,15 +593,16 @@ def new(name: PathLike, *, urdf: PathLike | None = None, log: PathLike | None = 
 
 def export(model: Model | PathLike, *, urdf: PathLike | None = None, c: PathLike | None = None,
            rust: PathLike | None = None, mjcf: PathLike | None = None, sdf: PathLike | None = None,
-           usd: PathLike | None = None, logs: PathLike | Iterable[PathLike] = ()) -> Result:
-    """Write a model as URDF, C header, Rust module, or file of MuJoCo, Gazebo or Isaac Sim.
+           usd: PathLike | None = None, ros2_control: PathLike | None = None,
+           logs: PathLike | Iterable[PathLike] = ()) -> Result:
+    """Write a model as URDF, C header, Rust module, file of MuJoCo, Gazebo or Isaac Sim, or gains for ros2_control.
 
     ``logs`` are log files along which the size of what such a file cannot say is taken.
     """
-    outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust), ("--mjcf", mjcf), ("--sdf", sdf), ("--usd", usd)]
-    files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
+    outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust), ("--mjcf", mjcf), ("--sdf", sdf), ("--usd", usd),
+               ("--ros2-control", ros2_control)]
     with _as_file(model) as path:
-        line = ["export", "-m", str(path), *[os.fspath(file) for file in files]]
+        line = ["export", "-m", str(path), *_files(logs)]
         for option, output in outputs:
             line += [option, os.fspath(output)] if output is not None else []
         return Result(*_command(line))

@@ -84,6 +84,14 @@ class Diagnosis(Result):
         self.model = model
 
 
+class Payload(Result):
+    """What an arm carries; ``model`` is that of the loaded arm."""
+
+    def __init__(self, document: str, page: None, text: str, model: Model):
+        super().__init__(document, page, text)
+        self.model = model
+
+
 class Track(Result):
     """Parameters over logs."""
 

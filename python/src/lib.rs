@@ -38,6 +38,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(numbers::torque, module)?)?;
     module.add_function(wrap_pyfunction!(numbers::regressor, module)?)?;
     module.add_function(wrap_pyfunction!(numbers::joint_friction, module)?)?;
+    module.add_function(wrap_pyfunction!(numbers::rest_speeds, module)?)?;
     module.add_function(wrap_pyfunction!(numbers::mass_matrix, module)?)?;
     module.add_function(wrap_pyfunction!(numbers::covariance, module)?)?;
     Ok(())

@@ -2,6 +2,7 @@
 
 use cft_ident::effect::AugmentedModel;
 use cft_ident::effect::as_code::EffectsCode;
+use cft_ident::export::Program;
 use cft_ident::identify::refined;
 use cft_ident::motion::Stretch;
 use numpy::{
@@ -129,6 +130,14 @@ pub fn joint_friction<'py>(
     let each = v.iter().enumerate();
     let out: Vec<f64> = each.map(|(k, v)| of.friction[k % n].torque(*v)).collect();
     PyArray1::from_vec(py, out).reshape([v.len() / n.max(1), n])
+}
+
+/// Speed of each joint below which it may be at rest \[m/s or rad/s\].
+#[pyfunction]
+pub fn rest_speeds(model: PyRef<'_, Model>) -> PyResult<Vec<f64>> {
+    let mut program = Program::of(&model_of(&model)?.model);
+    program.rest_by(&model.file.robot);
+    Ok(program.rest)
 }
 
 /// The mass matrix (N x n x n).

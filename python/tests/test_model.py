@@ -1,5 +1,7 @@
 """Models compute with arrays: torques, their parts and their derivatives belong together."""
 
+import pathlib
+
 import cft_ident as ci
 import numpy as np
 import pytest
@@ -57,3 +59,39 @@ def test_a_model_is_written_for_other_programs(model, tmp_path):
     model.to_mjcf(tmp_path / "arm.xml")
     assert "_tau(" in (tmp_path / "arm.h").read_text()
     assert (tmp_path / "arm.toml").exists() and (tmp_path / "arm.xml").exists()
+
+
+def test_friction_compensation_is_silent_at_rest_continuous_and_friction_at_speed(model):
+    still = np.zeros((1, 6))
+    assert not model.friction_compensation(still + 0.0099, still).any()
+    fast = still + 0.3
+    assert np.allclose(model.friction_compensation(fast, fast), model.friction(fast))
+    wanted = np.linspace(-0.05, 0.05, 2001)[:, None] + still
+    steps = np.diff(model.friction_compensation(np.zeros_like(wanted), wanted), axis=0)
+    # no more than the friction over one speed of rest, of which a step is 1/200
+    assert np.abs(steps).max() <= np.abs(model.friction(still + 0.01)).max() / 150
+
+
+def test_the_loop_of_the_manual_runs(model, tmp_path, monkeypatch):
+    page = (pathlib.Path(__file__).parents[2] / "docs/controllers.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    model.save("model.toml")
+    words = {}
+    exec(page.split("```python\n")[1].split("```")[0], words)
+    q = np.array([0.1, -1.0, 0.5, 0.2, 0.4, 0.0])
+    rest = np.zeros(6)
+    tau = words["control"](np.ones(6), np.ones(6), q, rest, q, rest, rest)
+    assert np.allclose(tau, model.gravity(q))
+
+
+def test_every_command_takes_the_model(model, measured, tmp_path):
+    log = measured("ur10/ur10_exciting.csv") + "@70..100%"
+    assert "parameters" in ci.show(model).to_dict()
+    assert ci.compare(model, model, log).to_dict()["schema"] == "cft-ident/compare/1"
+    ci.torque(model, log, tmp_path / "tau.csv")
+    ci.watch(model, log, tmp_path / "external.csv", false_alarms=2.0)
+    ci.convert(log, tmp_path / "log.mcap", robot="configs/ur10.toml")
+    found = ci.payload(model, log, tmp_path / "loaded.toml")
+    assert found.to_dict()["readings"] and found.model.joints == model.joints
+    model.to_ros2_control(tmp_path / "gains.yaml")
+    assert "joint_trajectory_controller" in (tmp_path / "gains.yaml").read_text()

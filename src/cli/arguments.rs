@@ -151,6 +151,11 @@ pub(super) fn urdf_file(text: &str) -> Result<PathBuf, String> {
     with_ending(text, "urdf")
 }
 
+/// A parameter file of ROS 2 to be written.
+pub(super) fn yaml_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "yaml")
+}
+
 /// A C header to be written.
 pub(super) fn header_file(text: &str) -> Result<PathBuf, String> {
     with_ending(text, "h")

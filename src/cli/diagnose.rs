@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup};
+use super::{
+    CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup, typed,
+};
 use cft_ident_core::diagnose::Wishes;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
@@ -161,15 +163,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         ..plain
     };
     let document = Document::new("diagnose", inputs, warnings, &result)?;
+    let refined = found.model(&machine, &file);
+    let written = args.output.as_ref().unwrap_or(&args.model);
     let of = stages::diagnose::Diagnose {
         machine: &machine,
         file: &file,
         given: &given.provenance,
         found: &found,
+        refined: &refined,
+        path: &typed::quoted(&written.to_string_lossy()),
     };
     let mut report = stages::diagnose::diagnose(&of);
     context.check()?;
-    let refined = found.model(&machine, &file);
     if !args.plot.is_empty() || args.report.is_some() {
         let replayed =
             ReplayedDiagnosis::new(&machine, &found, &refined).map_err(CliError::input)?;
@@ -182,8 +187,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if let Some(path) = &args.report {
             let quality = pictures::inspected(specs, &machine, context)?;
             let mut page = report.page();
-            let shown = (&refined, &replayed);
-            stages::diagnose::pictures(&mut page, &of, shown, &quality, context.command());
+            stages::diagnose::pictures(&mut page, &of, &replayed, &quality, context.command());
             context.write_text(path, &report.html())?;
         }
     }

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::files::ReadFile;
-use super::{CliError, Context, Outcome, arguments, files};
+use super::{CliError, Context, Outcome, arguments, controller, files};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::no_torque;
 use cft_ident_core::motion::Stretch;
@@ -20,7 +20,7 @@ use cft_ident_files::config::{self, ModelFile, RobotFile, UrdfReplacement, repla
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, Log, LoggedRobot};
+use cft_ident_stages::identify::{self, BANDWIDTH_HZ, Log, LoggedRobot};
 
 const EXAMPLE: &str = "\
 Example:
@@ -42,7 +42,8 @@ Example:
 #[command(
     override_usage = "cft-ident export [OPTIONS] --model <MODEL.toml>\n       \
     <--c <FILE.h> | --rust <FILE.rs> | --urdf <FILE.urdf> |\n        \
-    --mjcf <FILE.xml> | --sdf <FILE.sdf> | --usd <FILE.usda>>... [LOG]..."
+    --mjcf <FILE.xml> | --sdf <FILE.sdf> | --usd <FILE.usda> |\n        \
+    --ros2-control <FILE.yaml>>... [LOG]..."
 )]
 #[command(group = clap::ArgGroup::new("into").required(true).multiple(true))]
 pub struct Args {
@@ -79,6 +80,12 @@ pub struct Args {
     /// Rust module to write
     #[arg(long, value_name = "FILE.rs", group = "into", value_parser = arguments::rust_file)]
     pub rust: Option<PathBuf>,
+    /// Parameter file of ros2_control's joint_trajectory_controller to write, for joints that take efforts
+    #[arg(hide_short_help = true, long, value_name = "FILE.yaml", group = "into", value_parser = arguments::yaml_file)]
+    pub ros2_control: Option<PathBuf>,
+    /// Bandwidth of its gains [Hz]
+    #[arg(hide_short_help = true, long, value_name = "HZ", default_value_t = BANDWIDTH_HZ, requires = "ros2_control", value_parser = arguments::positive)]
+    pub bandwidth: f64,
     /// Rate at which rows arrive [Hz]: header and module get the observer of `watch` for it
     #[arg(hide_short_help = true, long, value_name = "HZ", value_parser = arguments::positive)]
     pub observer: Option<f64>,
@@ -325,15 +332,6 @@ fn beside_urdf(file: &ModelFile, left_out: &[String]) -> Vec<String> {
     }
 }
 
-/// Speeds below which joints may rest: a hundredth of what the robot file allows, where it says.
-fn rest_speeds(file: &ModelFile, usual: &[f64]) -> Vec<f64> {
-    let names = file.robot.joint_names();
-    let limit = |name: &String| file.robot.limits.get(name).and_then(|limits| limits.speed);
-    let each = names.iter().zip(usual);
-    each.map(|(name, usual)| limit(name).map_or(*usual, |top| top / 100.0))
-        .collect()
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -346,7 +344,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             "logs belong to --urdf, --mjcf, --sdf and --usd, whose files cannot say all of a model",
         ));
     }
-    let outputs = [&args.urdf, &side, &args.c, &args.rust];
+    let outputs = [&args.urdf, &side, &args.c, &args.rust, &args.ros2_control];
     let outputs = outputs.into_iter().filter_map(|path| path.as_deref());
     let beside = formats.iter().flat_map(|f| [f.path, f.side.as_path()]);
     let outputs: Vec<&Path> = outputs.chain(beside).collect();
@@ -375,7 +373,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let model = &refined.model;
     let failed = |error: ExportError| CliError::input(format!("{}: {error}", given.name));
     let mut program = Program::with_effects(&refined).map_err(failed)?;
-    program.rest = rest_speeds(&given.value, &program.rest);
+    program.rest_by(&given.value.robot);
     if let Some(rate_hz) = args.observer {
         if args.c.is_none() && args.rust.is_none() {
             return Err(CliError::usage("--observer belongs to --c and --rust"));
@@ -499,6 +497,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     if let Some(path) = &args.rust {
         texts.push((path, "Rust module", export::module::module(&program, &note)));
+    }
+    if let Some(path) = &args.ros2_control {
+        let of = (given.name.as_str(), &given.value, model);
+        let text = controller::ros2_control(of, args.bandwidth, &base_lines)?;
+        texts.push((path, "parameters of ros2_control", text));
     }
     for (path, _, text) in &texts {
         context.write_text(path, text)?;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
+    typed,
 };
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
@@ -88,6 +89,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         machine,
         found: &found,
         file: &model,
+        path: &typed::quoted(&args.output.to_string_lossy()),
         logs: &names_of(&args.logs),
     };
     let mut report = stages::friction::friction(&of);

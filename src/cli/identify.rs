@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::beside_truth::{BesideTruth, load_truth, true_value};
 use super::{
-    CliError, Context, Outcome, campaign, held_out, logs_of, names_of, new, pictures, setup,
+    CliError, Context, Outcome, campaign, held_out, logs_of, names_of, new, pictures, setup, typed,
     validate,
 };
 use cft_ident_files::config::campaign::CampaignSettings;
@@ -344,6 +344,15 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         Some(path) => Some(load_truth(&base.join(path))?),
     };
     let unseen_names = names_of(&unseen);
+    let written = match found.refined {
+        Some(_) => "refined.toml",
+        None => "model.toml",
+    };
+    // no file of a result says where on this machine it was made
+    let written = match folder.is_absolute() {
+        true => PathBuf::from(written),
+        false => folder.join(written),
+    };
     let of = stages::identify::Identify {
         machine: &machine,
         campaign: name,
@@ -352,6 +361,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         truth: &|p| true_value(truth.as_ref(), p),
         limit: campaign.settings.max_relative_error,
         guesses: &guesses,
+        path: &typed::quoted(&written.to_string_lossy()),
     };
     let mut report = stages::identify::identify(&of);
     let numbers = (&found.model, &found.numbers);

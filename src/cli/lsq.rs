@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::known_payload::KnownPayload;
-use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup};
+use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup, typed};
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
@@ -148,7 +148,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         machine,
         found: &found,
         file: &model,
+        path: &typed::quoted(&args.output.to_string_lossy()),
         logs: &names,
+        typed: &typed_logs(&args.logs),
     };
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
@@ -190,3 +192,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         missed: Vec::new(),
     })
 }
+
+/// Logs as a shell takes them; of many, and of reduced ones, which hold no rows to diagnose, a word.
+fn typed_logs(logs: &[LogSpec]) -> String {
+    if logs.len() > FEW || logs.iter().any(|log| identify::is_reduced(&log.path)) {
+        return "LOG".to_owned();
+    }
+    let typed = logs.iter().map(|log| typed::quoted(&log.to_string()));
+    typed.collect::<Vec<_>>().join(" ")
+}
+
+/// Logs that a line has room for.
+const FEW: usize = 3;

@@ -31,6 +31,7 @@ mod browser;
 mod colour;
 mod columns;
 mod context;
+mod controller;
 mod error;
 mod exit;
 mod files;

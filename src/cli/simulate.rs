@@ -143,6 +143,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         },
         _ => Experiment::Usual,
     };
+    let mut robot = robot;
+    if let (Experiment::Usual | Experiment::OneJoint { .. }, Some(model)) = (&experiment, &model) {
+        model.value.travel_of_seen(&mut robot.limits);
+    }
     let order = Order {
         robot: &robot,
         model: model

@@ -61,7 +61,7 @@ fn local(word: &str) -> String {
 }
 
 /// As a shell takes it.
-fn quoted(word: &str) -> String {
+pub(super) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./@%,:=+~".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();

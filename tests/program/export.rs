@@ -335,6 +335,7 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
     }
     ModelFile {
         estimates: Vec::new(),
+        estimate_covariance: None,
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,

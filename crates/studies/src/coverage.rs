@@ -21,7 +21,7 @@ use crate::study::{Rows, StudyError};
 use crate::tool::Tool;
 
 /// Factor of a normal deviation for 95 %.
-const TWO_SIDED_95: f64 = 1.96;
+pub(crate) const TWO_SIDED_95: f64 = 1.96;
 /// Periodic error of harmonic gears [rad].
 const GEAR_ERROR: f64 = 1.5e-5;
 /// Speeds at which the curve of a joint is asked for.
@@ -166,7 +166,7 @@ fn judged(machine: &Machine, parameters: &[Value]) -> Vec<Value> {
     parameters.iter().filter_map(one).collect()
 }
 
-fn truth_of(machine: &Machine, parameter: &Value) -> Option<(&'static str, f64)> {
+pub(crate) fn truth_of(machine: &Machine, parameter: &Value) -> Option<(&'static str, f64)> {
     let (name, joint) = (parameter["name"].as_str()?, parameter["joint"].as_str());
     let class = match name {
         "viscous" | "coulomb" if !machine.law_declared() => return None,

@@ -42,6 +42,42 @@ pub fn log_text(machine: &Machine, run: &Run) -> String {
 }
 
 /// The robot file that `new` would leave, with its questions answered.
+/// A motion as `excite --samples` writes it: t, then positions, speeds and accelerations of the joints.
+pub fn read_path(path: &Path, joints: usize) -> Result<crate::path::Path, StudyError> {
+    let text = std::fs::read_to_string(path).map_err(|source| StudyError::File {
+        path: path.to_owned(),
+        source,
+    })?;
+    let mut of = vec![Vec::new(); joints];
+    let mut times = Vec::new();
+    for (line, row) in text.lines().enumerate().skip(1) {
+        let numbers: Result<Vec<f64>, _> = row.split(',').map(str::parse).collect();
+        let numbers = numbers.ok().filter(|n| n.len() == 1 + 3 * joints);
+        let Some(x) = numbers else {
+            return Err(StudyError::Line {
+                path: path.to_owned(),
+                line: line + 1,
+                message: format!("has no time and three numbers for each of {joints} joints"),
+            });
+        };
+        times.push(x[0]);
+        for (j, points) in of.iter_mut().enumerate() {
+            points.push((x[1 + j], x[1 + joints + j], x[1 + 2 * joints + j]));
+        }
+    }
+    let step = match times[..] {
+        [first, second, ..] => second - first,
+        _ => {
+            return Err(StudyError::Line {
+                path: path.to_owned(),
+                line: 1,
+                message: "has fewer than two rows".to_owned(),
+            });
+        }
+    };
+    Ok(crate::path::Path::of_points(of, step))
+}
+
 pub fn robot_text(machine: &Machine, rate_hz: f64, urdf: &str, more: &str) -> String {
     let mut text = String::from("[robot]\n");
     match &machine.chain {

@@ -10,6 +10,7 @@
 //! | [`coverage`] | do 95 % intervals hold the truth, where the verdict is "identified"? |
 //! | [`clean`] | is an effect written where nothing is missing? |
 //! | [`planted`] | is what was planted named, and does the model predict as well as the truth? |
+//! | [`next_motion`] | what is the motion worth that `lsq` proposes to record next? |
 //! | [`setup`] | is a right robot file left in peace, and a mistake named? |
 
 #![forbid(unsafe_code)]
@@ -29,6 +30,7 @@ pub mod judge;
 pub mod lab;
 pub mod machine;
 pub mod model;
+pub mod next_motion;
 pub mod page;
 pub mod path;
 pub mod plant;

@@ -1,4 +1,4 @@
-//! `studies coverage|clean|planted|setup [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]`
+//! `studies coverage|clean|planted|setup|next [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]`
 //! makes the runs of a study that are not yet in FOLDER/independent_STUDY.jsonl: a study goes on where it was stopped.
 //! `--keep FOLDER` records nothing and leaves the files of the last run there. `studies tables` writes the tables of
 //! docs/independent.md anew from all runs; `studies speed` says how long the plants take.
@@ -8,7 +8,9 @@ use std::process::ExitCode;
 
 use cft_ident_studies::study::{Rows, StudyError};
 use cft_ident_studies::tool::Tool;
-use cft_ident_studies::{clean, coverage, drive, files, machine, page, path, planted, setup};
+use cft_ident_studies::{
+    clean, coverage, drive, files, machine, next_motion, page, path, planted, setup,
+};
 use serde_json::Value;
 
 struct Asked {
@@ -120,6 +122,15 @@ fn run(asked: &Asked) -> Result<(), StudyError> {
                 cell.run(&tool, folder, k)
             })
         }
+        ["next"] => {
+            let cells = next_motion::cells();
+            let named = cells
+                .iter()
+                .map(|cell| (cell.name(), cell, next_motion::USUAL_RUNS));
+            all(asked, &tool, "next", named, |cell, folder, k| {
+                cell.run(&tool, folder, k)
+            })
+        }
         ["tables"] => tables(&asked.results),
         ["speed"] => {
             speed();
@@ -127,7 +138,7 @@ fn run(asked: &Asked) -> Result<(), StudyError> {
         }
         _ => {
             eprintln!(
-                "usage: studies coverage|clean|planted|setup|tables|speed [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]"
+                "usage: studies coverage|clean|planted|setup|next|tables|speed [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]"
             );
             Ok(())
         }

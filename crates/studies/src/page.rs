@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::study::{Rows, StudyError};
-use crate::{clean, coverage, planted, setup};
+use crate::{clean, coverage, next_motion, planted, setup};
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
@@ -17,6 +17,7 @@ pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
         ("clean", clean::table),
         ("planted", planted::table),
         ("setup", setup::table),
+        ("next", next_motion::table),
     ] {
         let rows = Rows::open(results, &format!("independent_{name}"))?;
         if !rows.rows.is_empty() {

@@ -46,6 +46,8 @@ enum OfJoint {
         parts: Vec<(f64, f64)>,
     },
     Pieces(Vec<Piece>),
+    /// Points of a file, so far apart [s].
+    Points(Vec<Point>, f64),
 }
 
 /// A polynomial of the fifth degree from `begin` for `length` seconds.
@@ -75,6 +77,19 @@ impl Path {
         Self {
             joints: ranges.iter().map(one).collect(),
             seconds,
+            tied: None,
+        }
+    }
+
+    /// The motion of a file: by joint its points, so far apart [s].
+    pub fn of_points(joints: Vec<Vec<Point>>, step: f64) -> Self {
+        let rows = joints.first().map_or(0, Vec::len);
+        Self {
+            joints: joints
+                .into_iter()
+                .map(|p| OfJoint::Points(p, step))
+                .collect(),
+            seconds: step * rows.saturating_sub(1) as f64,
             tied: None,
         }
     }
@@ -114,6 +129,13 @@ impl OfJoint {
             Self::Pieces(pieces) => {
                 let after = pieces.partition_point(|piece| piece.begin <= t);
                 pieces[after.saturating_sub(1)].at(t)
+            }
+            Self::Points(points, step) => {
+                let at = (t / step).clamp(0.0, points.len().saturating_sub(1) as f64);
+                let (k, part) = (at.floor() as usize, at.fract());
+                let (a, b) = (points[k], points[(k + 1).min(points.len() - 1)]);
+                let between = |a: f64, b: f64| a + part * (b - a);
+                (between(a.0, b.0), between(a.1, b.1), between(a.2, b.2))
             }
         }
     }

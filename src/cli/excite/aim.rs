@@ -1,11 +1,12 @@
 //! What the next motion is for: weak parameters of a model, or an effect that the logs do not tell from its like.
 
-use super::Bench;
+use super::{Bench, FUNDAMENTAL_HZ};
 use crate::cli::error::CliError;
 use cft_ident_core::effect::entry;
 use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::information::Information;
+use cft_ident_plant::excite::limits::Quantity;
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::{Criterion, ExciteError, InformationBefore, usual_motion};
 use cft_ident_stages::identify::LoggedRobot;
@@ -19,7 +20,12 @@ pub(super) enum Aim {
     /// The parameters that are not identified.
     Weak,
     /// An effect of a joint, which a ladder of speeds of that joint alone separates.
-    Ladder { joint: String, seconds: f64 },
+    Ladder {
+        joint: String,
+        seconds: f64,
+        /// Middle part of the travel.
+        part: f64,
+    },
 }
 
 impl Aim {
@@ -49,6 +55,7 @@ impl Aim {
             Some(ladder) => Ok(Self::Ladder {
                 joint: joint.to_owned(),
                 seconds: f64::from(ladder.seconds),
+                part: ladder.travel.unwrap_or(1.0),
             }),
             None => Err(CliError::input(format!(
                 "no motion of {} alone separates {name} from its like",
@@ -59,19 +66,23 @@ impl Aim {
     }
 }
 
-/// Limits where the robot file gives none: what the logs of the model have seen, and no faster turns than theirs.
-pub(super) fn within_seen(file: &mut RobotFile, model: &ModelFile) {
-    for held in &model.held_out {
-        let limits = file.limits.entry(held.joint.clone()).or_default();
-        limits.position = limits.position.or(Some(held.positions_seen));
-        limits.speed = limits.speed.or(Some(held.speed_seen));
-        limits.torque = limits.torque.or(Some(held.torque_seen));
-        // that of an oscillation over these positions with this speed
-        let [low, high] = held.positions_seen;
-        let swing = held.speed_seen * held.speed_seen / (0.5 * (high - low));
-        let swing = Some(swing).filter(|a| a.is_finite() && *a > 0.0);
-        limits.acceleration = limits.acceleration.or(swing);
-    }
+/// Fundamental of a motion that uses positions and speeds alike \[Hz\]: of the middle coordinate, the frequency of a
+/// swing over all of its positions at its speed; that of other designs at most.
+pub(super) fn fundamental(machine: &ForeseenRobot) -> f64 {
+    let of = |quantity, i| {
+        let mut channels = machine.channels.iter();
+        channels.find(move |c| c.quantity == quantity && c.index == i)
+    };
+    let swing = |i: usize| {
+        let (position, speed) = (of(Quantity::Position, i)?, of(Quantity::Speed, i)?);
+        let reach = 0.5 * (position.upper - position.lower);
+        let hz = speed.upper / reach / std::f64::consts::TAU;
+        (hz.is_finite() && hz > 0.0).then_some(hz)
+    };
+    let mut swings: Vec<f64> = (0..machine.coordinates()).filter_map(swing).collect();
+    swings.sort_by(f64::total_cmp);
+    let middle = swings.get(swings.len() / 2).copied();
+    middle.map_or(FUNDAMENTAL_HZ, |hz| hz.min(FUNDAMENTAL_HZ))
 }
 
 /// The noise of every joint as the fit of a model left it: its rows are independent at twice the cut-off.
@@ -99,7 +110,7 @@ pub(super) fn weak(
         )
         .hint("`--for EFFECT:JOINT` separates an effect; without --for a motion is designed for all parameters"));
     }
-    let fundamental = std::f64::consts::TAU * args.frequency;
+    let fundamental = std::f64::consts::TAU * bench.frequency_hz;
     let series = usual_motion(machine, fundamental, usize::from(args.harmonics));
     let usual = Information::of_period(machine, &series, SAMPLES).map_err(ExciteError::Robot)?;
     let rows = bench.rate_hz * series.period() * f64::from(args.periods);

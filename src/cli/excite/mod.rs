@@ -79,9 +79,9 @@ pub struct Args {
     /// With a-optimal: only this parameter, by its relative error; may be given more than once
     #[arg(hide_short_help = true, long = "parameter", value_name = "NAME")]
     pub parameters: Vec<String>,
-    /// Fundamental frequency [Hz]
-    #[arg(hide_short_help = true, long, value_name = "HZ", default_value_t = 0.4, value_parser = frequency)]
-    pub frequency: f64,
+    /// Fundamental frequency [Hz] [default: 0.4; with --for slower, where the logs swing slower over their positions]
+    #[arg(hide_short_help = true, long, value_name = "HZ", value_parser = frequency)]
+    pub frequency: Option<f64>,
     /// Harmonics of each coordinate
     #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=32))]
     pub harmonics: u16,
@@ -161,6 +161,9 @@ pub enum CriterionName {
 /// Duration of a one-joint experiment where nothing says \[s\].
 pub(super) const LADDER_S: f64 = 20.0;
 
+/// Fundamental frequency where nothing says \[Hz\].
+pub(super) const FUNDAMENTAL_HZ: f64 = 0.4;
+
 /// A duration of a motion: some hours at most.
 fn seconds(text: &str) -> Result<f64, String> {
     match arguments::positive(text)? {
@@ -214,6 +217,7 @@ struct Bench<'a> {
     model: Option<ModelFile>,
     aim: Option<Aim>,
     rate_hz: f64,
+    frequency_hz: f64,
     inputs: Vec<Provenance>,
 }
 
@@ -257,7 +261,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .map(|text| Aim::of(text, &file))
         .transpose()?;
     if let (Some(_), Some((_, model))) = (&aim, named) {
-        aim::within_seen(&mut file, model);
+        model.limit_to_seen(&mut file.limits);
     }
     let mut machine = machine(&file, named)?;
     let names = machine.coordinate_names();
@@ -267,9 +271,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 .hint(format!("give one for each of {}", names.join(", "))),
         );
     }
+    let frequency_hz = args.frequency.unwrap_or_else(|| match aim {
+        Some(_) => aim::fundamental(&machine),
+        None => FUNDAMENTAL_HZ,
+    });
     let usual = usual_torque(
         &machine,
-        std::f64::consts::TAU * args.frequency,
+        std::f64::consts::TAU * frequency_hz,
         usize::from(args.harmonics),
     );
     given::noise(&file, &usual, &mut machine);
@@ -281,6 +289,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         args,
         context,
         rate_hz,
+        frequency_hz,
         file,
         machine,
         robot,
@@ -340,12 +349,14 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
 }
 
 fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
+    let (seconds, part) = match &bench.aim {
+        Some(Aim::Ladder { seconds, part, .. }) => (*seconds, *part),
+        _ => (bench.args.seconds, 1.0),
+    };
     LadderTask {
         joint: joint.to_owned(),
-        seconds: match &bench.aim {
-            Some(Aim::Ladder { seconds, .. }) => *seconds,
-            _ => bench.args.seconds,
-        },
+        seconds,
+        part,
         seed: bench.args.seed,
         rate_hz: bench.rate_hz,
         reserve: bench.args.margin,
@@ -406,7 +417,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         any = true;
     }
     let weights = weights(&bench.machine, &task.criterion);
-    let period = 1.0 / args.frequency;
+    let period = 1.0 / bench.frequency_hz;
     let rows = bench.rate_hz * period * f64::from(args.periods);
     let mut text = String::new();
     let mut all: Vec<Judgement> = Vec::new();
@@ -454,7 +465,7 @@ fn task(bench: &mut Bench) -> Result<Task, CliError> {
     let args = bench.args;
     Ok(Task {
         criterion: criterion(bench)?,
-        fundamental_hz: args.frequency,
+        fundamental_hz: bench.frequency_hz,
         harmonics: usize::from(args.harmonics),
         offsets: offsets(bench)?,
         reserve: args.margin,

@@ -115,6 +115,7 @@ pub fn write_model(path: &Path) {
     });
     let model = ModelFile {
         estimates: Vec::new(),
+        estimate_covariance: None,
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,

@@ -1,7 +1,10 @@
 //! What data that nothing was fitted to say of every effect.
 
+use super::error::DiagnoseError;
+use super::outcome::SplitErrors;
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
+use super::problem::unknowns::Unknowns;
 use super::unexplained::errors::{self, Counted, Errors, JointChange, Pieces};
 use crate::effect::AugmentedModel;
 use crate::motion::MotionError;
@@ -14,6 +17,27 @@ pub struct HeldOutRows<'a> {
     pub role: LogRole,
     /// Neighbouring pieces that a bootstrap draws together.
     pub together: usize,
+}
+
+/// Errors of a model on fitted and held-out rows, neighbouring pieces drawn together so many at a time.
+pub fn split_errors(
+    (case, split, together): (&Case, &DataSplit, usize),
+    model: &AugmentedModel,
+) -> Result<SplitErrors, DiagnoseError> {
+    let of = |role| HeldOutRows {
+        case,
+        split,
+        role,
+        together,
+    };
+    let train = of(LogRole::Train).errors(model)?;
+    Ok(SplitErrors {
+        train: train.ok_or_else(|| DiagnoseError::TooFewRows {
+            rows: 0,
+            unknowns: Unknowns::of(&case.given, &case.open, case.keep).len(),
+        })?,
+        holdout: of(LogRole::Holdout).errors(model)?,
+    })
 }
 
 /// What an effect does to data that it was not fitted to.

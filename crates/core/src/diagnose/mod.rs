@@ -47,7 +47,7 @@ pub use problem::case::{Case, Wishes};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown};
-pub use run::diagnose;
+pub use run::{diagnose, errors_of};
 pub use unexplained::dependence::Dependence;
 pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};
 pub use unexplained::evidence::{JointEvidence, evidence, one_after_the_other};

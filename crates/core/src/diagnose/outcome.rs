@@ -126,6 +126,8 @@ pub struct Diagnosis {
     pub residual_std: Vec<f64>,
     /// Logs that were fitted: the first ones.
     pub fitted_logs: usize,
+    /// Neighbouring pieces of the rows that intervals of errors draw together.
+    pub together: usize,
     /// Parts of the data that are asked, and the least length of a block \[s\].
     pub parts: usize,
     pub block_s: f64,

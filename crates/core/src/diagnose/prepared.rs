@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::candidates::candidates;
 use super::error::DiagnoseError;
-use super::held_out::HeldOutRows;
+use super::held_out::{HeldOutRows, split_errors};
 use super::memory::memory_s;
 use super::orders;
 use super::outcome::SplitErrors;
@@ -174,15 +174,7 @@ impl<'a> PreparedCase<'a> {
     }
 
     pub fn split_errors(&self, model: &AugmentedModel) -> Result<SplitErrors, DiagnoseError> {
-        let train = self.held_out(LogRole::Train).errors(model)?;
-        let holdout = self.held_out(LogRole::Holdout).errors(model)?;
-        Ok(SplitErrors {
-            train: train.ok_or(DiagnoseError::TooFewRows {
-                rows: 0,
-                unknowns: self.unknowns.len(),
-            })?,
-            holdout,
-        })
+        split_errors((self.case, self.split, self.together), model)
     }
 
     pub fn moving(

@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use super::change::friction_changes;
 use super::error::DiagnoseError;
-use super::outcome::{Diagnosis, FoundEffect, LeftCandidate};
+use super::held_out::split_errors;
+use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors};
 use super::prepared::{PreparedCase, filtered, residuals};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
@@ -15,7 +16,7 @@ use super::steps::{Judged, judge};
 use super::unexplained::dependence::{Left, dependences};
 use super::unexplained::{noise, part_unexplained, unexplained};
 use super::watch::Watch;
-use crate::effect::{Search, Torques};
+use crate::effect::{AugmentedModel, Search, Torques};
 use crate::judge::Numbers;
 use crate::motion::{MotionError, Stretch};
 
@@ -40,6 +41,25 @@ pub fn diagnose(case: &Case, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
     let judged = judge(&prepared, &searched)?;
     unless_stopped(watch)?;
     prepared.evaluate(searched, judged)
+}
+
+/// Errors of another model on the rows of a diagnosis, pieces drawn together as it had them.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub fn errors_of(
+    case: &Case,
+    together: usize,
+    model: &AugmentedModel,
+) -> Result<SplitErrors, DiagnoseError> {
+    let split = DataSplit::of(
+        &case.given.model.robot,
+        &case.stretches,
+        &case.roles,
+        &case.filters,
+        case.cutoff_hz,
+    );
+    split_errors((case, &split, together), model)
 }
 
 fn unless_stopped(watch: Watch) -> Result<(), DiagnoseError> {
@@ -129,6 +149,7 @@ impl PreparedCase<'_> {
             set_aside: self.split.set_aside.clone(),
             residual_std: rms_of(&residual, self.split),
             fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
+            together: self.together,
             parts: self.blocks.parts,
             block_s: self.blocks.least_s,
             parts_needed: numbers.parts,

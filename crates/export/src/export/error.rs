@@ -25,6 +25,12 @@ pub enum ExportError {
         mass: f64,
         moment: f64,
     },
+    /// Gains come from an inertia above zero.
+    #[error(
+        "{joint} has the inertia {inertia:.3e} in the middle of its travel, which no machine has; identify with \
+         `lsq` without --unconstrained"
+    )]
+    NoInertia { joint: String, inertia: f64 },
     /// A link that no body can be, which simulators refuse or integrate into nonsense.
     #[error(
         "link `{link}` can be no body: its pseudo-inertia has the eigenvalue {eigenvalue:.3e}; identify with \

@@ -16,6 +16,7 @@
 //! | [`arm`] | the same as simulators take it: armature, damping, friction |
 //! | [`left_out`] | what a format cannot say, and how much of the torque that is |
 //! | [`mjcf`] [`sdf`] [`usd`] | MuJoCo, Gazebo, Isaac Sim |
+//! | [`ros2_control`] | gains of ros2_control by the inertia of each joint |
 //! | [`urdf`] | the URDF, and what it cannot hold beside it |
 //! | [`urdf_source`] | the user's own URDF with what was identified |
 
@@ -33,6 +34,7 @@ mod observer;
 mod prepared;
 pub mod program;
 pub mod recipe;
+pub mod ros2_control;
 pub mod sdf;
 mod single;
 pub mod standard;

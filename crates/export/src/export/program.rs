@@ -9,6 +9,7 @@ use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_core::robot::tree::{Coupling, Tree};
+use cft_ident_files::config::RobotFile;
 
 /// Tree, link parameters, drives, friction and offsets of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,6 +61,15 @@ impl Program {
             effects,
             ..Self::of(&refined.model)
         })
+    }
+
+    /// Speeds of rest by the robot file: a hundredth of what it allows a joint, where it says.
+    pub fn rest_by(&mut self, file: &RobotFile) {
+        for (joint, rest) in file.joint_names().iter().zip(&mut self.rest) {
+            if let Some(top) = file.limits.get(joint).and_then(|limits| limits.speed) {
+                *rest = top / 100.0;
+            }
+        }
     }
 
     /// The program of a model.

@@ -253,6 +253,7 @@ fn side_file(
     side.links.clear();
     side.drive_inertia.clear();
     side.covariance = None;
+    side.estimate_covariance = None;
     // base parameters come out of the URDF; what the drives add to them stands here
     let base: Vec<&str> = robot
         .parameters()

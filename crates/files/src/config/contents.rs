@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
 use super::document::Document;
-use super::model_file::{EffectSection, ModelFile, Parameter};
+use super::model_file::{Covariance, EffectSection, ModelFile, Parameter};
 use super::robot_file::FrictionLawKind;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_logs::log::escape;
@@ -20,6 +20,9 @@ pub struct Contents {
     effects: Vec<String>,
     /// Rows of the covariance; 0 where there is none.
     covariance: usize,
+    /// Rows of the covariance of the estimates; 0 where there is none.
+    #[serde(default, skip_serializing_if = "is_none")]
+    estimate_covariance: usize,
     /// Joints whose residual is known.
     residual_std: Vec<String>,
     /// Joints of which it keeps what one-joint logs told.
@@ -36,6 +39,10 @@ pub struct Contents {
     inputs: usize,
 }
 
+fn is_none(rows: &usize) -> bool {
+    *rows == 0
+}
+
 /// An effect with its place and the keys of its parameters.
 fn effect_key(effect: &EffectSection) -> String {
     let keys: Vec<&str> = effect.parameters.keys().map(String::as_str).collect();
@@ -50,10 +57,12 @@ fn effect_key(effect: &EffectSection) -> String {
 impl Contents {
     /// What a model holds.
     pub(super) fn of(model: &ModelFile) -> Self {
+        let rows = |of: &Option<Covariance>| of.as_ref().map_or(0, |c| c.names.len());
         Self {
             parameters: model.parameters.iter().map(Parameter::key).collect(),
             effects: model.effects.iter().map(effect_key).collect(),
-            covariance: model.covariance.as_ref().map_or(0, |c| c.names.len()),
+            covariance: rows(&model.covariance),
+            estimate_covariance: rows(&model.estimate_covariance),
             residual_std: model.residual_std.keys().cloned().collect(),
             friction_prior: model
                 .friction_prior
@@ -105,6 +114,12 @@ impl Contents {
         }
         let counts = [
             ("covariance", self.covariance, found.covariance, "rows"),
+            (
+                "estimate_covariance",
+                self.estimate_covariance,
+                found.estimate_covariance,
+                "rows",
+            ),
             ("links", self.links, found.links, "[[link]] tables"),
             (
                 "inputs",

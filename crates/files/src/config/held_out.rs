@@ -26,6 +26,9 @@ pub struct HeldOut {
     pub positions_seen: [f64; 2],
     /// Greatest speed [m/s or rad/s].
     pub speed_seen: f64,
+    /// Greatest acceleration [m/s^2 or rad/s^2]; absent in files of before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acceleration_seen: Option<f64>,
     /// Greatest modulus of the model's torque [N or Nm].
     pub torque_seen: f64,
     /// Standard deviation of the external torque where nothing touched the robot, by ranges of speed, the parameters'

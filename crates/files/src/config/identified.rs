@@ -103,8 +103,11 @@ impl ModelFile {
         })
     }
 
-    /// Friction of one joint by the law whose parameters the file holds.
-    fn joint_friction(&self, file: &str, joint: &str) -> Result<JointFriction, ConfigError> {
+    /// Friction of one joint by the law whose parameters the file holds; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`] where it holds a part of a law.
+    pub fn joint_friction(&self, file: &str, joint: &str) -> Result<JointFriction, ConfigError> {
         Ok(if self.find("slope_1", Some(joint)).is_some() {
             JointFriction::DoubleTanh(self.double_tanh(file, joint)?)
         } else if self.find("coulomb", Some(joint)).is_some() {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::ConfigError;
 use super::candidates::CandidateSection;
 use super::held_out::{Excesses, HeldOut};
+use super::limits::Limits;
 use super::robot_file::{ModelKind, RobotFile};
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::verdict::IDENTIFIED;
@@ -215,6 +216,22 @@ pub struct ModelProvenance {
     pub inputs: Vec<Provenance>,
 }
 
+/// Puts what a covariance has between these keys into a block, row by row.
+fn put_block(covariance: Option<&Covariance>, keys: &[String], block: &mut [f64]) {
+    let Some(covariance) = covariance else {
+        return;
+    };
+    let place = |key: &String| covariance.names.iter().position(|name| name == key);
+    let places: Vec<Option<usize>> = keys.iter().map(place).collect();
+    for (i, row) in places.iter().enumerate() {
+        for (j, column) in places.iter().enumerate() {
+            if let (Some(row), Some(column)) = (*row, *column) {
+                block[i * keys.len() + j] = covariance.matrix[row][column];
+            }
+        }
+    }
+}
+
 /// A model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
@@ -238,6 +255,8 @@ pub struct ModelFile {
     pub effects: Vec<EffectSection>,
     /// The physical numbers, where the parameters and effects above predict with less of an effect than was estimated.
     pub estimates: Vec<Estimate>,
+    /// Their covariance, of those that are parameters.
+    pub estimate_covariance: Option<Covariance>,
     /// Physically consistent links that give the consistent parameters.
     pub links: Vec<LinkBody>,
     /// Inertia of the drives beside them, by joint [kg m^2 or kg].
@@ -345,19 +364,40 @@ impl ModelFile {
     /// Covariance of the parameters with these keys ([`Parameter::key`]), row-major; 0 where unknown.
     pub fn covariance_of(&self, keys: &[String]) -> Vec<f64> {
         let mut block = vec![0.0; keys.len() * keys.len()];
-        let Some(covariance) = &self.covariance else {
-            return block;
-        };
-        let place = |key: &String| covariance.names.iter().position(|name| name == key);
-        let places: Vec<Option<usize>> = keys.iter().map(place).collect();
-        for (i, row) in places.iter().enumerate() {
-            for (j, column) in places.iter().enumerate() {
-                if let (Some(row), Some(column)) = (*row, *column) {
-                    block[i * keys.len() + j] = covariance.matrix[row][column];
-                }
-            }
-        }
+        put_block(self.covariance.as_ref(), keys, &mut block);
         block
+    }
+
+    /// The same with the estimates' where the parameters are none.
+    pub fn estimated_covariance_of(&self, keys: &[String]) -> Vec<f64> {
+        let mut block = vec![0.0; keys.len() * keys.len()];
+        put_block(self.estimate_covariance.as_ref(), keys, &mut block);
+        put_block(self.covariance.as_ref(), keys, &mut block);
+        block
+    }
+
+    /// Limits where a robot file gives none: what the logs of the model have seen.
+    pub fn limit_to_seen(&self, limits: &mut Limits) {
+        for held in &self.held_out {
+            let limits = limits.of.entry(held.joint.clone()).or_default();
+            limits.position = limits.position.or(Some(held.positions_seen));
+            limits.speed = limits.speed.or(Some(held.speed_seen));
+            limits.torque = limits.torque.or(Some(held.torque_seen));
+            // of a file of before, that of an oscillation over these positions with this speed
+            let [low, high] = held.positions_seen;
+            let swing = held.speed_seen * held.speed_seen / (0.5 * (high - low));
+            let seen = held.acceleration_seen.unwrap_or(swing);
+            let seen = Some(seen).filter(|a| a.is_finite() && *a > 0.0);
+            limits.acceleration = limits.acceleration.or(seen);
+        }
+    }
+
+    /// Travel of joints where a robot file gives none, for a simulation: the positions of the model's logs.
+    pub fn travel_of_seen(&self, limits: &mut Limits) {
+        for held in &self.held_out {
+            let limits = limits.of.entry(held.joint.clone()).or_default();
+            limits.position = limits.position.or(Some(held.positions_seen));
+        }
     }
 
     /// Refuses a model of another robot than `wanted`; `file` names the model.

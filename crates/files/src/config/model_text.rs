@@ -64,11 +64,28 @@ pub(super) struct ModelToml {
     effect: Vec<EffectSection>,
     #[serde(default)]
     estimate: Vec<Estimate>,
+    estimate_covariance: Option<Covariance>,
     #[serde(default)]
     link: Vec<LinkBody>,
     #[serde(default)]
     drive_inertia: BTreeMap<String, f64>,
     provenance: Option<ModelProvenance>,
+}
+
+impl Covariance {
+    /// Names and rows, as keys of a table whose head is written.
+    fn write(&self, text: &mut String) {
+        text.push_str("names = [\n");
+        for name in &self.names {
+            let _ = writeln!(text, "  {},", toml::Value::from(name.as_str()));
+        }
+        text.push_str("]\nmatrix = [\n");
+        for row in &self.matrix {
+            let row: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
+            let _ = writeln!(text, "  [{}],", row.join(", "));
+        }
+        text.push_str("]\n");
+    }
 }
 
 impl ModelFile {
@@ -125,6 +142,7 @@ impl ModelFile {
             candidates: raw.candidate,
             effects: raw.effect,
             estimates: raw.estimate,
+            estimate_covariance: raw.estimate_covariance,
             links: raw.link,
             drive_inertia: raw.drive_inertia,
             provenance: raw.provenance.unwrap_or_default(),
@@ -137,7 +155,9 @@ impl ModelFile {
                 model.robot.notes.0.push(contents::without_list(file));
             }
         }
-        model.check_covariance(&document)?;
+        model.check_covariance("covariance", model.covariance.as_ref(), &document)?;
+        let estimated = model.estimate_covariance.as_ref();
+        model.check_covariance("estimate_covariance", estimated, &document)?;
         candidates::check(&model.candidates, &document)?;
         model.check_rest(&document)?;
         Ok(model)
@@ -179,16 +199,10 @@ impl ModelFile {
             text.push_str(&toml::to_string(parameter).map_err(unwritable)?);
         }
         if let Some(covariance) = &self.covariance {
-            text.push_str("\n# Covariance of the parameters: row and column i belong to names[i].\n[covariance]\nnames = [\n");
-            for name in &covariance.names {
-                let _ = writeln!(text, "  {},", toml::Value::from(name.as_str()));
-            }
-            text.push_str("]\nmatrix = [\n");
-            for row in &covariance.matrix {
-                let row: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
-                let _ = writeln!(text, "  [{}],", row.join(", "));
-            }
-            text.push_str("]\n");
+            text.push_str(
+                "\n# Covariance of the parameters: row and column i belong to names[i].\n[covariance]\n",
+            );
+            covariance.write(&mut text);
         }
         if !self.residual_std.is_empty() {
             text.push_str(
@@ -225,6 +239,12 @@ impl ModelFile {
             text.push_str("\n# Estimates: the physical numbers. The parameters and effects above predict with a part of some effects, and are none.\n");
             let estimates = BTreeMap::from([("estimate", &self.estimates)]);
             text.push_str(&toml::to_string(&estimates).map_err(unwritable)?);
+        }
+        if let Some(covariance) = &self.estimate_covariance {
+            text.push_str(
+                "\n# Covariance of the estimates that are parameters.\n[estimate_covariance]\n",
+            );
+            covariance.write(&mut text);
         }
         if !self.links.is_empty() {
             text.push_str("\n# Links that can exist and give the consistent parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");
@@ -267,13 +287,18 @@ impl ModelFile {
         Ok(())
     }
 
-    fn check_covariance(&self, document: &Document) -> Result<(), ConfigError> {
-        let Some(covariance) = &self.covariance else {
+    fn check_covariance(
+        &self,
+        table: &str,
+        covariance: Option<&Covariance>,
+        document: &Document,
+    ) -> Result<(), ConfigError> {
+        let Some(covariance) = covariance else {
             return Ok(());
         };
         let size = covariance.names.len();
         let known: Vec<String> = self.parameters.iter().map(Parameter::key).collect();
-        let at_names = ["covariance", "names"];
+        let at_names = [table, "names"];
         for (index, name) in covariance.names.iter().enumerate() {
             if !known.contains(name) || covariance.names[..index].contains(name) {
                 let problem = format!(
@@ -290,9 +315,9 @@ impl ModelFile {
         let square = covariance.matrix.len() == size
             && covariance.matrix.iter().all(|row| row.len() == size);
         if !square {
-            let remedy = format!("give {size} rows of {size} numbers, or delete [covariance]");
+            let remedy = format!("give {size} rows of {size} numbers, or delete [{table}]");
             return Err(document.value(
-                &["covariance", "matrix"],
+                &[table, "matrix"],
                 "does not have the size of `names`",
                 &remedy,
             ));

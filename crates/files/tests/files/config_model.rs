@@ -64,6 +64,7 @@ fn model(values: &[f64]) -> ModelFile {
     ModelFile {
         robot: robot.clone(),
         estimates: Vec::new(),
+        estimate_covariance: None,
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         candidates: Vec::new(),
@@ -94,6 +95,7 @@ fn model(values: &[f64]) -> ModelFile {
                 half_width_95: vec![vec![at(9).abs()], vec![0.5]],
                 positions_seen: [-1.0, at(10).abs()],
                 speed_seen: 1.0,
+                acceleration_seen: Some(at(11).abs()),
                 torque_seen: 2.0,
                 external_std: vec![0.25, 0.125],
                 external_99: 2.75,

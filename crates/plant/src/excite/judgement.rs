@@ -346,7 +346,7 @@ impl LimitUse {
 
     /// One sentence of a limit that is broken, on the way to the motion or along it.
     fn sentence(&self, on_way: bool) -> String {
-        let what = format!("{} of {}", self.quantity.name(), self.name);
+        let what = format!("{} of {}", self.quantity.called(&self.unit), self.name);
         let unit = match self.unit.as_str() {
             "" => String::new(),
             unit => format!(" {unit}"),

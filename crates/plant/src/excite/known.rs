@@ -28,7 +28,7 @@ impl InformationBefore {
     pub fn of(machine: &ForeseenRobot, file: &ModelFile) -> Self {
         let names = machine.unknown_names();
         let p = names.len();
-        let covariance = file.covariance_of(&names);
+        let covariance = file.estimated_covariance_of(&names);
         let found = |name: &String| file.parameters.iter().find(|q| q.key() == *name);
         let open =
             |q: &Parameter| matches!(q.verdict, Some(Verdict::Weak | Verdict::NotIdentifiable));

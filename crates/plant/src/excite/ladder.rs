@@ -39,6 +39,10 @@ const TURNS: [f64; 2] = [0.1, 5.0];
 const OTHERS: f64 = 0.1;
 /// A speed that is nearer to its limit than this share stands at it.
 const AT_LIMIT: f64 = 1e-6;
+/// Ratio by which a top speed is lowered whose strokes leave the range.
+const SLOWER_TOP: f64 = 0.85;
+/// Parts of the travel that are tried, one after the other, until the drives keep their limits.
+const PARTS: [f64; 6] = [1.0, 0.8, 0.6, 0.4, 0.2, 0.1];
 /// Directions of the nuisance below this share of the largest carry nothing.
 const NOTHING: f64 = 1e-10;
 
@@ -54,6 +58,8 @@ pub struct LadderTask {
     pub rate_hz: f64,
     /// Share of the drive's limit that is left free.
     pub reserve: f64,
+    /// Middle part of the travel that it keeps to, 1 for all of it; narrower where the drive's limit asks for it.
+    pub part: f64,
 }
 
 /// A ladder, and what it is expected to tell.
@@ -82,12 +88,7 @@ pub fn design_ladder(
             joint: task.joint.clone(),
         });
     }
-    let mut usual = Rungs {
-        speeds: usual_speeds(machine, task, joint)?,
-        turn: TURN,
-    };
-    keep_speed_limit(machine, task.reserve, joint, &mut usual.speeds);
-    let before = expectation(machine, task, joint, &usual)?;
+    let (usual, before) = widest(machine, task, joint)?;
     let (slowest, fastest) = ends(&usual.speeds);
     let value = |rungs: &Rungs| match expectation(machine, task, joint, rungs) {
         Ok(expected) => score(&machine.model.friction[joint], &expected),
@@ -106,7 +107,12 @@ pub fn design_ladder(
                 let mut speeds: Vec<f64> = x[..count].iter().map(within).collect();
                 speeds.sort_by(f64::total_cmp);
                 let turn = x[count].exp().clamp(TURNS[0], TURNS[1]);
-                Rungs { speeds, turn }
+                let range = usual.range;
+                Rungs {
+                    range,
+                    speeds,
+                    turn,
+                }
             };
             let mut f = |x: &[f64]| value(&rungs(x));
             // outwards steps would leave the motors' range at the top
@@ -167,13 +173,53 @@ fn joint_of(machine: &ForeseenRobot, name: &str) -> Result<usize, ExciteError> {
         })
 }
 
+/// The usual ladder over the widest part of the travel at which the drives keep their limits, and what it tells.
+fn widest(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+    joint: usize,
+) -> Result<(Rungs, Vec<Expected>), ExciteError> {
+    let mut refused = None;
+    for part in PARTS.map(|part| part * task.part) {
+        let mut usual = usual_ladder(machine, task, (joint, part))?;
+        keep_speed_limit(machine, task.reserve, joint, &mut usual.speeds);
+        let mut expected = expectation(machine, task, joint, &usual);
+        // strokes that leave the range with their turns
+        while matches!(expected, Err(ExciteError::Reference(_))) && usual.slow_down() {
+            expected = expectation(machine, task, joint, &usual);
+        }
+        match expected {
+            Ok(before) => return Ok((usual, before)),
+            Err(error @ ExciteError::BeyondDrive { .. }) => refused = Some(error),
+            Err(error) => return Err(error),
+        }
+    }
+    Err(refused.unwrap_or(ExciteError::NoLaw {
+        joint: task.joint.clone(),
+    }))
+}
+
 /// What a design turns.
 #[derive(Debug, Clone)]
 struct Rungs {
+    /// m or rad; what the limits leave where absent.
+    range: Option<[f64; 2]>,
     /// m/s or rad/s.
     speeds: Vec<f64>,
     /// Time from zero speed to a slow plateau \[s\].
     turn: f64,
+}
+
+impl Rungs {
+    /// Lowers the top speed; not below the others.
+    fn slow_down(&mut self) -> bool {
+        let Some(top) = self.speeds.last().map(|top| SLOWER_TOP * top) else {
+            return false;
+        };
+        self.speeds.iter_mut().for_each(|v| *v = v.min(top));
+        self.speeds.dedup();
+        self.speeds.len() > 2
+    }
 }
 
 /// The acceleration that a ladder may take where the motors are the joints and something bounds it: less the reserve,
@@ -191,7 +237,7 @@ fn move_of(machine: &ForeseenRobot, task: &LadderTask, rungs: &Rungs) -> SingleJ
     SingleJointMove {
         joint: task.joint.clone(),
         speeds: rungs.speeds.clone(),
-        range: None,
+        range: rungs.range,
         acceleration: acceleration(machine, task),
         turn_s: Some(rungs.turn),
     }
@@ -210,21 +256,34 @@ fn ends(speeds: &[f64]) -> (f64, f64) {
     (slowest, fastest)
 }
 
-/// Speeds of the ladder that the simulator runs where no file says otherwise.
-fn usual_speeds(
+/// The ladder that the simulator runs where no file says otherwise, over a part of the travel.
+fn usual_ladder(
     machine: &ForeseenRobot,
     task: &LadderTask,
-    joint: usize,
-) -> Result<Vec<f64>, ExciteError> {
-    let mut ladder = OneJointMove::new(joint, task.seconds, Some(task.seed));
-    ladder.acceleration = acceleration(machine, task);
-    let Path::Ladder { ladder, .. } = ladder.reference(&machine.mechanism)?.path else {
-        return Ok(Vec::new());
-    };
-    let mut speeds: Vec<f64> = ladder.plateaus().map(|(v, _)| v.abs()).collect();
+    (joint, part): (usize, f64),
+) -> Result<Rungs, ExciteError> {
+    let mut mover = OneJointMove::new(joint, task.seconds, Some(task.seed));
+    mover.acceleration = acceleration(machine, task);
+    mover.part = part;
+    if part < 1.0 {
+        let (low, high) = mover.travel(&machine.mechanism)?;
+        mover.range = Some((six_decimals(low), six_decimals(high)));
+    }
+    let mut speeds = Vec::new();
+    if let Path::Ladder { ladder, .. } = mover.reference(&machine.mechanism)?.path {
+        speeds.extend(ladder.plateaus().map(|(v, _)| v.abs()));
+    }
     speeds.sort_by(f64::total_cmp);
     speeds.dedup();
-    Ok(speeds)
+    Ok(Rungs {
+        range: mover.range.map(|(low, high)| [low, high]),
+        speeds,
+        turn: TURN,
+    })
+}
+
+fn six_decimals(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
 }
 
 /// Brings speeds that would stand at the joint's limit, or beyond it, below it by the reserve.
@@ -263,11 +322,13 @@ fn expectation(
     rungs: &Rungs,
 ) -> Result<Vec<Expected>, ExciteError> {
     let along = reference(machine, task, &move_of(machine, task, rungs))?;
-    let (expected, used) = expected(machine, task, joint, &along)?;
+    let (expected, (used, drive)) = expected(machine, task, joint, &along)?;
     if used > 1.0 - task.reserve {
-        return Err(ExciteError::NothingExcited {
-            unknowns: expected.len(),
-            starts: 1,
+        return Err(ExciteError::BeyondDrive {
+            joint: task.joint.clone(),
+            drive: machine.mechanism.robot.coordinate_names()[drive].clone(),
+            used,
+            free: task.reserve,
         });
     }
     Ok(expected)
@@ -290,13 +351,13 @@ fn score(law: &JointFriction, expected: &[Expected]) -> f64 {
         .sum()
 }
 
-/// Expected deviations along a reference, and the largest share of a drive's limit.
+/// Expected deviations along a reference, the largest share of a drive's limit, and which drive it is.
 fn expected(
     machine: &ForeseenRobot,
     task: &LadderTask,
     joint: usize,
     along: &Reference<MOST>,
-) -> Result<(Vec<Expected>, f64), ExciteError> {
+) -> Result<(Vec<Expected>, (f64, usize)), ExciteError> {
     let model = &machine.model;
     let law = &model.friction[joint];
     let (mut g, used) = information(machine, task.seconds, joint, along)?;
@@ -319,20 +380,20 @@ fn expected(
 }
 
 /// Sums of squares and products of a joint's rows along a reference, for inertial parameters, a constant torque
-/// and the friction law; and the largest share of a drive's limit.
+/// and the friction law; the largest share of a drive's limit, and which drive it is.
 fn information(
     machine: &ForeseenRobot,
     seconds: f64,
     joint: usize,
     along: &Reference<MOST>,
-) -> Result<(DMatrix<f64>, f64), ExciteError> {
+) -> Result<(DMatrix<f64>, (f64, usize)), ExciteError> {
     let model = &machine.model;
     let (n, p) = (machine.coordinates(), model.theta.len());
     let law = &model.friction[joint];
     let width = p + 1 + law.parameters();
     let (mut y, mut tau, mut row) = (vec![0.0; n * p], vec![0.0; n], vec![0.0; width]);
     let mut g = DMatrix::<f64>::zeros(width, width);
-    let mut used = 0.0_f64;
+    let mut used = (0.0_f64, 0);
     let drives = machine.channels.iter();
     let drives: Vec<_> = drives.filter(|c| c.quantity == Quantity::Drive).collect();
     for m in 0..(seconds * RATE).ceil() as usize {
@@ -354,7 +415,10 @@ fn information(
         }
         let drive = machine.drives(q, &tau)?;
         for channel in &drives {
-            used = used.max(channel.used(drive[channel.index]));
+            let share = channel.used(drive[channel.index]);
+            if share > used.0 {
+                used = (share, channel.index);
+            }
         }
     }
     for j in 0..width {

@@ -65,6 +65,14 @@ impl Quantity {
             Self::Distance => "distance",
         }
     }
+
+    /// The word where the unit is known: what a drive takes is called by it.
+    pub fn called(self, unit: &str) -> &'static str {
+        match self {
+            Self::Drive if unit != "V" => "torque",
+            quantity => quantity.name(),
+        }
+    }
 }
 
 /// One bounded quantity.

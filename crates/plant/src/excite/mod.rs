@@ -121,6 +121,17 @@ pub enum ExciteError {
         "the motion lasts {seconds:?} s, and at most {most:.0} s are judged; give a shorter one"
     )]
     LongMotion { seconds: f64, most: f64 },
+    #[error(
+        "a ladder of {joint} alone, the other joints in the middle of their positions, takes {:.0} % of the limit of {drive} however short its strokes, and {:.0} % are left free; write `[limits.{drive}] torque = ...` as the drive has it, or positions in whose middle the arm hangs with less weight, into a robot file for -r",
+        100.0 * used,
+        100.0 * free
+    )]
+    BeyondDrive {
+        joint: String,
+        drive: String,
+        used: f64,
+        free: f64,
+    },
     #[error("joint {joint} has no friction in the model; give one with -m that has")]
     NoLaw { joint: String },
     #[error(transparent)]

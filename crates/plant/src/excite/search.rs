@@ -302,7 +302,7 @@ fn nothing_fits(
     match uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share)) {
         Some(u) if u.share > 1.0 => ExciteError::CannotRest {
             channel: u.channel.name.clone(),
-            quantity: u.channel.quantity.name(),
+            quantity: u.channel.quantity.called(&u.channel.unit),
             value: if u.range[1].abs() > u.range[0].abs() {
                 u.range[1]
             } else {

@@ -134,7 +134,7 @@ impl OneJointMove {
             });
         }
         let (frame, mut pose, room) = self.room(m)?;
-        let range = self.range.unwrap_or(middle_part(room.range, self.part));
+        let range = self.within(&room);
         let low = room.range.0 - 1e-9;
         // what stands at the joint itself is looked at while it runs
         if !m.motors_at_joints() && (range.0 < low || range.1 > room.range.1 + 1e-9) {
@@ -159,6 +159,21 @@ impl OneJointMove {
                 ladder,
             },
         })
+    }
+
+    /// The range that the mover runs over.
+    ///
+    /// # Errors
+    /// [`SimulateError`] where its travel is not known.
+    pub fn travel<const J: usize>(
+        &self,
+        mechanism: &Mechanism<J>,
+    ) -> Result<(f64, f64), SimulateError> {
+        Ok(self.within(&self.room(mechanism)?.2))
+    }
+
+    fn within(&self, room: &Travel) -> (f64, f64) {
+        self.range.unwrap_or(middle_part(room.range, self.part))
     }
 
     /// Frame and pose of the others, and the room that the limits leave the mover.

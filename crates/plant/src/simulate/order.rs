@@ -424,6 +424,8 @@ impl LogLayout {
             let channels = part.positions.iter().chain(&part.torques);
             header.extend(channels.map(|c| c.column.clone()));
         }
+        let speeds = joint.into_iter().flat_map(speeds);
+        header.extend(speeds.map(|(_, c)| c.column.clone()));
         if actuator.is_some() {
             let motors = 1..=run.coordinates.len();
             header.extend(motors.map(|i| format!("status_{i}")));
@@ -457,6 +459,11 @@ impl LogLayout {
             if let Some(part) = actuator {
                 extend(&mut values, &part.positions, &run.x[k]);
                 extend(&mut values, &part.torques, &run.volts[k]);
+            }
+            for (j, channel) in joint.into_iter().flat_map(speeds) {
+                values.push(logged(channel, run.actual.v[k][j]));
+            }
+            if actuator.is_some() {
                 let status = run.status[k].iter().take(run.coordinates.len());
                 values.extend(status.map(|s| f64::from(s.code())));
             }
@@ -465,6 +472,12 @@ impl LogLayout {
         }
         values
     }
+}
+
+/// Velocities that the robot file names, which a log must have then: as drives estimate them, without noise.
+fn speeds(part: &Layout) -> impl Iterator<Item = (usize, &Channel)> {
+    let all = part.velocities.iter().enumerate();
+    all.filter(|(_, channel)| channel.key.is_some())
 }
 
 /// The parts of a layout that read joint channels, and motor channels.

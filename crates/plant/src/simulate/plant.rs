@@ -8,6 +8,7 @@ use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
 use cft_ident_core::robot::dynamics::Dynamics;
 use cft_ident_core::robot::friction::ViscousCoulomb;
+use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::robot_file::{FrictionLawKind, RobotFile};
 use cft_ident_files::config::{ConfigError, ModelFile};
 
@@ -139,7 +140,12 @@ impl<const J: usize> Plant<J> {
         let gain = m.gain[j] > 0.0 && m.gain[j].is_finite();
         let order = m.lower[j] < m.upper[j];
         let findings = [
-            (inertia, "inertia", self.inertia[j], "must be above 0"),
+            (
+                inertia,
+                "inertia",
+                self.inertia[j],
+                "must be above 0: no machine moves so; give a model whose parameters can exist (`lsq` of torques in N or N m writes them beside its fit)",
+            ),
             (
                 self.laws[j].is_finite(),
                 "friction",
@@ -223,21 +229,32 @@ impl<const J: usize> Plant<J> {
 /// The friction of a joint in a model, once its inertia is known.
 type Law = Box<dyn Fn(f64) -> SmoothFriction>;
 
+/// The law whose parameters the model holds of the joint; one of `declared` is asked for where it holds none.
 fn law_of(
-    law: FrictionLawKind,
+    declared: FrictionLawKind,
     (name, model): (&str, &ModelFile),
     joint: &str,
 ) -> Result<Law, ConfigError> {
-    Ok(match law {
-        FrictionLawKind::DoubleTanh => {
-            let law = model.double_tanh(name, joint)?;
-            Box::new(move |_| SmoothFriction::DoubleTanh(law))
+    let law = match (model.joint_friction(name, joint)?, declared) {
+        (JointFriction::None, FrictionLawKind::DoubleTanh) => {
+            JointFriction::DoubleTanh(model.double_tanh(name, joint)?)
         }
-        FrictionLawKind::ViscousCoulomb => {
-            let law: ViscousCoulomb = model.viscous_coulomb(name, joint)?;
-            Box::new(move |inertia| SmoothFriction::viscous_coulomb(law, inertia))
+        (JointFriction::None, FrictionLawKind::ViscousCoulomb) => {
+            JointFriction::ViscousCoulomb(model.viscous_coulomb(name, joint)?)
         }
-    })
+        (law, _) => law,
+    };
+    Ok(Box::new(move |inertia| match &law {
+        JointFriction::DoubleTanh(law) => SmoothFriction::DoubleTanh(*law),
+        JointFriction::ViscousCoulomb(law) => SmoothFriction::viscous_coulomb(*law, inertia),
+        JointFriction::None => {
+            let none = ViscousCoulomb {
+                viscous: 0.0,
+                coulomb: 0.0,
+            };
+            SmoothFriction::viscous_coulomb(none, inertia)
+        }
+    }))
 }
 
 /// A matrix of n x n numbers in a row to one of J x J, with ones on the diagonal beyond.

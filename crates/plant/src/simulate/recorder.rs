@@ -70,7 +70,7 @@ impl<'a, const J: usize> Recorder<'a, J> {
     }
 }
 
-/// Perfect rows that wait, as numbers in the order t, and per joint x, volts, q, torque, status.
+/// Perfect rows that wait, as numbers in the order t, and per joint x, volts, q, torque, speed, status.
 pub(super) struct Waiting {
     file: BufWriter<SpooledTempFile>,
     joints: usize,
@@ -95,7 +95,7 @@ impl Waiting {
         let n = self.joints;
         for k in 0..rows.rows() {
             let status = rows.status[k][..n].iter().map(|s| f64::from(s.code()));
-            let parts = [&rows.x, &rows.volts, &rows.q, &rows.torque];
+            let parts = [&rows.x, &rows.volts, &rows.q, &rows.torque, &rows.actual.v];
             let numbers = parts
                 .into_iter()
                 .flat_map(|part| part[k][..n].iter().copied());
@@ -144,7 +144,13 @@ impl Waited {
         let count = self.left.min(most);
         for _ in 0..count {
             rows.t.push(self.number()?);
-            for part in [&mut rows.x, &mut rows.volts, &mut rows.q, &mut rows.torque] {
+            for part in [
+                &mut rows.x,
+                &mut rows.volts,
+                &mut rows.q,
+                &mut rows.torque,
+                &mut rows.actual.v,
+            ] {
                 let mut row = [0.0; J];
                 for value in &mut row[..self.joints] {
                     *value = number(&mut self.file)?;

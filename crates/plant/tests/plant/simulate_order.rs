@@ -254,6 +254,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     parameters[0].value = 130.0;
     let model = ModelFile {
         estimates: Vec::new(),
+        estimate_covariance: None,
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,
@@ -324,6 +325,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
     };
     let model = ModelFile {
         estimates: Vec::new(),
+        estimate_covariance: None,
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,

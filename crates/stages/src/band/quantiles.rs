@@ -14,6 +14,7 @@ const LEAST: f64 = 20.0;
 pub struct Error {
     pub position: f64,
     pub speed: f64,
+    pub acceleration: f64,
     /// The model's torque.
     pub torque: f64,
     /// Measured less the model's torque.
@@ -89,6 +90,7 @@ pub fn held_out(joint: &str, errors: &[Error], samples: u64, independent: f64) -
             positions.fold(f64::NEG_INFINITY, f64::max),
         ],
         speed_seen: greatest(|e| e.speed),
+        acceleration_seen: Some(greatest(|e| e.acceleration)),
         torque_seen: greatest(|e| e.torque),
         external_std: vec![f64::NAN; speed_edges.len() + 1],
         external_99: f64::NAN,
@@ -110,6 +112,7 @@ mod tests {
             Error {
                 position: 0.1,
                 speed,
+                acceleration: 0.0,
                 torque: 3.0,
                 error: (0.2 + speed) * (2.0 * u - 1.0),
                 variance: 0.0,

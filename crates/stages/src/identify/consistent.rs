@@ -197,6 +197,22 @@ pub(super) fn consistent(
     })
 }
 
+/// What was found; where the search failed or left the finite the plain fit stands alone, and a warning says so.
+pub(super) fn or_plain_fit(
+    found: Result<ConsistentLinks, IdentifyError>,
+    warnings: &mut Vec<String>,
+) -> Option<ConsistentLinks> {
+    let finite = |of: &ConsistentLinks| of.values.iter().chain(&of.growth).all(|x| x.is_finite());
+    let found = found.ok().filter(finite);
+    if found.is_none() {
+        warnings.push(
+            "the search for parameters that can exist came to no end: the plain fit stands alone, and simulators may refuse it"
+                .to_owned(),
+        );
+    }
+    found
+}
+
 impl ConsistentLinks {
     /// What did not come as it should, as warnings.
     pub(super) fn warnings(&self) -> Vec<String> {
@@ -325,6 +341,9 @@ fn project_in(
         effective: 1.0,
     };
     let found = with_friction(&task, &friction)?;
+    if !found.theta.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
     let (links, drives) = told(&robot, &map, &found);
     for (key, value) in keys.iter().zip(&found.theta) {
         let of_key = |p: &&mut Parameter| p.key() == *key;

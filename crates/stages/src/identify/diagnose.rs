@@ -191,7 +191,7 @@ pub fn diagnose(
             _ => DataRole::HeldOut,
         });
     }
-    let case = case(
+    let mut case = case(
         machine,
         (name, file, &before),
         given,
@@ -217,7 +217,7 @@ pub fn diagnose(
         Err(DiagnoseError::Interrupted) => return Err(IdentifyError::Interrupted),
         Err(error) => return Err(IdentifyError::Diagnose(error)),
     };
-    in_memory.stretches = case.stretches;
+    in_memory.stretches = std::mem::take(&mut case.stretches);
     let train = logs.train;
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
@@ -233,13 +233,13 @@ pub fn diagnose(
         diagnosis,
         in_memory,
         logs,
-        given: case.given,
+        given: case.given.clone(),
         held: Held::default(),
         free_run: None,
         friction_prior,
         candidates: settings.candidates.clone(),
         hold_friction: settings.hold_friction,
-        filters: case.filters,
+        filters: case.filters.clone(),
         cutoff_hz: case.cutoff_hz,
     };
     if found.diagnosis.written().next().is_some() {
@@ -251,6 +251,12 @@ pub fn diagnose(
             control,
         );
         found.held = or_warning(tried, &mut found.in_memory.warnings)?;
+    }
+    if as_given.is_consistent() {
+        case.stretches = std::mem::take(&mut found.in_memory.stretches);
+        let errors = found.judge_in_use(machine, &case, (name, as_given));
+        found.in_memory.stretches = case.stretches;
+        errors?;
     }
     let _work = control.begin("free run", None);
     found.free_run = found.run_freely(machine, (name, as_given))?;

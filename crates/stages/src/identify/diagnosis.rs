@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::diagnose::{DataFault, Diagnosed};
 use super::logged_robot::LoggedRobot;
-use super::separate::separating_command;
+use super::next_motion::separating_command;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
@@ -353,7 +353,9 @@ impl Diagnosed {
                 })
                 .collect(),
             accepted_by_user: step.accepted_by_user,
-            separate_command: alike.then(|| separating_command(effect, robot)).flatten(),
+            separate_command: alike
+                .then(|| separating_command(effect, robot, "MODEL.toml"))
+                .flatten(),
             separate_by: alike.then_some(effect.law.entry.separate_by),
             unique_share: None,
             delta_bic: None,

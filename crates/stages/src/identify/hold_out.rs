@@ -255,6 +255,7 @@ impl<'a> Trial<'a> {
                         errors.push(Error {
                             position: q[j],
                             speed: v[j],
+                            acceleration: a[j],
                             torque,
                             error: stretch.tau[j][k] - torque,
                             variance: variances[j],

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::consistent::{ConsistentLinks, consistent};
+use super::consistent::{ConsistentLinks, consistent, or_plain_fit};
 use super::contact::hangs_on_bridged;
 use super::control::Control;
 use super::error::IdentifyError;
@@ -200,7 +200,8 @@ pub fn lsq(
     let consistent = match settings.consistent && is_in_si(machine) {
         true => {
             let fastest = machine.fastest(logs, control)?;
-            Some(consistent(machine, &estimated, &fastest)?)
+            let found = consistent(machine, &estimated, &fastest);
+            or_plain_fit(found, &mut passes.warnings)
         }
         false => None,
     };

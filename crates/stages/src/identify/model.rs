@@ -124,6 +124,7 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
         candidates: Vec::new(),
         effects: Vec::new(),
         estimates: Vec::new(),
+        estimate_covariance: None,
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         provenance: ModelProvenance {

@@ -7,7 +7,7 @@ use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
 use crate::open_loop::{FreeRun, RunSpan, free_run};
-use cft_ident_core::diagnose::{FoundEffect, LogRole, Unknown};
+use cft_ident_core::diagnose::{Case, FoundEffect, LogRole, SplitErrors, Unknown, errors_of};
 use cft_ident_core::effect::{AugmentedModel, EffectNumber};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -15,7 +15,7 @@ use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::candidates::CandidateSection;
-use cft_ident_files::config::model_file::{Estimate, Parameter};
+use cft_ident_files::config::model_file::{Covariance, Estimate, Parameter};
 use cft_ident_logs::log::DataRole;
 
 impl Diagnosed {
@@ -36,6 +36,30 @@ impl Diagnosed {
         let stretches = &self.in_memory.stretches;
         let spans = self.held_out_spans();
         Ok(free_run(&before, after.as_ref(), stretches, &spans))
+    }
+
+    /// Errors before and after by the parameters that torques are computed with, in place of those of the plain fit.
+    pub(super) fn judge_in_use(
+        &mut self,
+        machine: &LoggedRobot,
+        case: &Case,
+        (name, given): (&str, &ModelFile),
+    ) -> Result<(), IdentifyError> {
+        let together = self.diagnosis.together;
+        let of = |file: &ModelFile| -> Result<SplitErrors, IdentifyError> {
+            errors_of(case, together, &refined(file, name)?).map_err(IdentifyError::Diagnose)
+        };
+        let before = of(given)?;
+        let after = match self.diagnosis.written().next() {
+            None => before.clone(),
+            Some(_) => of(&self.model(machine, given))?,
+        };
+        self.diagnosis.before = before;
+        match &mut self.diagnosis.selected {
+            Some(selected) => *selected = after,
+            None => self.diagnosis.after = after,
+        }
+        Ok(())
     }
 
     /// Held-out spans of the stretches; all of them where nothing is held out.
@@ -91,7 +115,7 @@ impl Diagnosed {
         // beside a part of an effect the declared numbers take up the rest, and are no estimates
         let whole = self.is_whole();
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
-        let mut undetermined = Vec::new();
+        let (mut undetermined, mut estimated) = (Vec::new(), Vec::new());
         for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
             if self.hold_friction && matches!(unknown, Unknown::Friction { .. }) {
                 continue;
@@ -115,6 +139,9 @@ impl Diagnosed {
                 });
                 (p.value, p.std) = (value, None);
                 undetermined.push(p.key());
+                if found.is_finite() {
+                    estimated.push((p.key(), i));
+                }
                 continue;
             }
             match put(p, value, found) {
@@ -127,6 +154,10 @@ impl Diagnosed {
             }
         }
         model.forget_covariance(&undetermined);
+        model.estimate_covariance = match estimated.is_empty() {
+            true => file.estimate_covariance.clone(),
+            false => Some(self.covariance_between(&estimated)),
+        };
         model.replace_covariance(&keys, &|a, b| {
             widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
         });
@@ -155,6 +186,16 @@ impl Diagnosed {
             }
         }
         model
+    }
+
+    /// Covariance of unknowns, by key and place.
+    fn covariance_between(&self, unknowns: &[(String, usize)]) -> Covariance {
+        let all = &self.diagnosis.covariance;
+        let row = |(_, i): &(String, usize)| unknowns.iter().map(|(_, j)| all[(*i, *j)]).collect();
+        Covariance {
+            names: unknowns.iter().map(|(key, _)| key.clone()).collect(),
+            matrix: unknowns.iter().map(row).collect(),
+        }
     }
 
     /// Whether every effect is written as it was estimated.

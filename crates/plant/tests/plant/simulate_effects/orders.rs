@@ -224,6 +224,7 @@ fn units_follow_the_joint() {
 fn model(robot: &RobotFile, effects: Vec<EffectSection>) -> ModelFile {
     ModelFile {
         estimates: Vec::new(),
+        estimate_covariance: None,
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,

@@ -15,7 +15,7 @@ use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, LeftCandidate, Sp
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::identify::{DataFault, Diagnosed, LoggedRobot, separating_command};
+use cft_ident_stages::identify::{DataFault, Diagnosed, LoggedRobot};
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
 /// Candidates that a page tells.
@@ -32,6 +32,10 @@ pub struct Diagnose<'a> {
     /// The model file.
     pub given: &'a Provenance,
     pub found: &'a Diagnosed,
+    /// The model that is written.
+    pub refined: &'a ModelFile,
+    /// Its path as a shell takes it.
+    pub path: &'a str,
 }
 
 /// The effects, their numbers, what is left, and the errors before and after.
@@ -39,7 +43,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
     let (text, good) = words(of.machine, of.found);
     report.everywhere().verdict(&text, good);
-    told(&mut report, of.machine, of.found);
+    told(&mut report, (of.machine, of.found), (of.refined, of.path));
     let mut page = report.page();
     first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
@@ -47,21 +51,21 @@ pub fn diagnose(of: &Diagnose) -> Report {
     report
 }
 
-/// What a page has room for besides; `refined` is the file of the model that was found.
+/// What a page has room for besides.
 pub fn pictures(
     page: &mut Writer,
     of: &Diagnose,
-    (refined, replayed): (&ModelFile, &ReplayedDiagnosis),
+    replayed: &ReplayedDiagnosis,
     quality: &[Inspected],
     command: &str,
 ) {
     let (machine, found) = (of.machine, of.found);
     sections(page, machine, found, replayed);
-    parameters::section(page, refined, &|_| None);
+    parameters::section(page, of.refined, &|_| None);
     let logs: Vec<String> = found.logs.iter().map(|name| escape(name)).collect();
     friction::section(page, machine, &replayed.friction, &logs);
     page.heading("Correlated parameters");
-    fit::pairs(page, refined);
+    fit::pairs(page, of.refined);
     quality::section(page, quality, &found.in_memory.warnings);
     let mut inputs = vec![of.given.clone()];
     inputs.extend(found.in_memory.inputs.iter().cloned());
@@ -91,7 +95,11 @@ pub fn at_fault(fault: &DataFault) -> String {
 }
 
 /// The errors and what to do next for a terminal; the effects one by one where it shows everything.
-pub fn told(report: &mut Report, machine: &LoggedRobot, found: &Diagnosed) {
+pub fn told(
+    report: &mut Report,
+    (machine, found): (&LoggedRobot, &Diagnosed),
+    written: (&ModelFile, &str),
+) {
     let d = &found.diagnosis;
     report.terminal().line("");
     in_short(&mut report.usual(), machine, d);
@@ -113,10 +121,8 @@ pub fn told(report: &mut Report, machine: &LoggedRobot, found: &Diagnosed) {
         .list(changes(machine, found).into_iter().skip(FEW));
     let mut terminal = report.terminal();
     terminal.line("");
-    terminal.note("", &first_screen::next(machine, found), 2);
-    if let Some(command) = first_screen::next_command(machine, found) {
-        terminal.code(&command);
-    }
+    terminal.note("", &first_screen::next(machine, found, written.1), 2);
+    first_screen::next_motion(&mut terminal, (machine, found), written);
 }
 
 /// Errors joint by joint, those of a screen.
@@ -204,10 +210,6 @@ fn step_told(
     }
     if let Some(told) = alternatives(machine, step) {
         terminal.note(MARGIN, &told, 7);
-        if let Some(command) = separating_command(effect, &machine.robot) {
-            terminal.line(&format!("{MARGIN}such a motion:"));
-            terminal.code(&command);
-        }
     }
 }
 

@@ -95,7 +95,7 @@ fn words(judged: &Judgement) -> (String, bool) {
         text += &format!(
             " It comes nearest to that of {} ({}), of which it uses {}.",
             nearest.name,
-            nearest.quantity.name(),
+            nearest.quantity.called(&nearest.unit),
             number::percent(nearest.used)
         );
     }
@@ -143,7 +143,7 @@ fn limits(judged: &Judgement, name: &str) -> Table {
         };
         let mark = if limit.broken { "  BROKEN" } else { "" };
         table.row([
-            &format!("{} {}", limit.name, quantity(limit.quantity, &limit.unit)),
+            &format!("{} {}", limit.name, limit.quantity.called(&limit.unit)),
             &value(limit.least),
             &value(limit.most),
             &allowed,
@@ -152,14 +152,6 @@ fn limits(judged: &Judgement, name: &str) -> Table {
         ]);
     }
     table
-}
-
-/// What a drive takes is called by its unit.
-fn quantity(quantity: Quantity, unit: &str) -> &'static str {
-    match quantity {
-        Quantity::Drive if unit != "V" => "torque",
-        quantity => quantity.name(),
-    }
 }
 
 /// Expected deviations, and the relative ones of `beside` in a column of their own.
@@ -321,7 +313,7 @@ pub fn figure(
         let of = BoundedQuantity::symmetric(kind, i, "", "", 1.0);
         let value = |state| machine.quantities(state).of(&of);
         MotionPanel {
-            quantity: quantity(kind, &unit).into(),
+            quantity: kind.called(&unit).into(),
             unit,
             values: states
                 .iter()

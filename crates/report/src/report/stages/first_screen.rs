@@ -5,12 +5,13 @@ use crate::report::Writer;
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
 use cft_ident_core::diagnose::{Errors, FoundEffect};
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, LoggedRobot, separating_command};
+use cft_ident_files::config::ModelFile;
+use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, separating_command};
 
 /// Errors per joint as bars, and the next thing to do.
 pub fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     page.figure(&bars(machine, found).svg());
-    page.paragraph(&next(machine, found));
+    page.paragraph(&next(machine, found, "MODEL.toml"));
 }
 
 /// Errors of every joint before and after: held-out ones where there are any.
@@ -45,15 +46,38 @@ fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
     written.find(|step| !step.alternatives.is_empty())
 }
 
-/// The motion that [`next`] asks for, as a command; nothing where no motion of one joint will do.
-pub fn next_command(machine: &LoggedRobot, found: &Diagnosed) -> Option<String> {
+/// The next motion to record, as a command that ends a result: it separates the first effect that the data do not tell
+/// from its like, or narrows what is weak in the model that is written, `path` as a shell takes it.
+pub fn next_motion(
+    writer: &mut Writer,
+    (machine, found): (&LoggedRobot, &Diagnosed),
+    (file, path): (&ModelFile, &str),
+) {
     let d = &found.diagnosis;
-    let step = unclear(found).filter(|_| d.determined)?;
-    separating_command(&step.estimate, &machine.robot)
+    // limits of the motion are the positions and speeds of the logs
+    if !d.determined || file.held_out.is_empty() {
+        return;
+    }
+    let separating =
+        unclear(found).and_then(|s| separating_command(&s.estimate, &machine.robot, path));
+    match separating {
+        Some(command) => writer.code(&command),
+        None => narrowing(writer, file, path),
+    }
 }
 
-/// What to do next.
-pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
+/// The motion that narrows what is weak in a model, where something is.
+pub fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
+    if let Some(([open, all], command)) = narrowing_command(file, path) {
+        let words =
+            format!("{open} of {all} parameters are weak; a motion to record that narrows them:");
+        writer.note("", &words, 2);
+        writer.code(&command);
+    }
+}
+
+/// What to do next; `path` is the model's as a shell takes it.
+pub fn next(machine: &LoggedRobot, found: &Diagnosed, path: &str) -> String {
     let d = &found.diagnosis;
     if !d.determined {
         return "Next: move the joints faster and farther, or log a torque with less noise."
@@ -87,9 +111,10 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
             machine.robot.joint_names()[j]
         ),
         None if d.written().next().is_none() => {
-            "Next: use the model (`cft-ident torque`, `cft-ident export`).".to_owned()
+            format!("Next: use the model: `cft-ident export -m {path} --c model.h`.")
         }
-        None => "Next: try the refined model on a log of another motion (`cft-ident validate`)."
-            .to_owned(),
+        None => format!(
+            "Next: try the refined model on a log of another motion: `cft-ident validate LOG -m {path}`."
+        ),
     }
 }

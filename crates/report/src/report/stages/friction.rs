@@ -17,6 +17,8 @@ pub struct Friction<'a> {
     pub found: &'a IdentifiedFriction,
     /// The model that was written.
     pub file: &'a ModelFile,
+    /// Its path as a shell takes it.
+    pub path: &'a str,
     /// Names of the logs.
     pub logs: &'a [String],
 }
@@ -44,12 +46,14 @@ pub fn friction(of: &Friction) -> Report {
     let (tally, _) = parameters::tally(of.file);
     report.detail().paragraph(&format!("{tally}."));
     report.page().paragraph(&format!("{tally}."));
-    report.terminal().note("", NEXT, 2);
+    report.terminal().note("", &next(of.path), 2);
     report
 }
 
-/// What to do next.
-const NEXT: &str = "Next: `cft-ident lsq` with this model as `-m` fits the inertias.";
+/// What to do next with the model at a path.
+fn next(path: &str) -> String {
+    format!("Next: `cft-ident lsq LOG -r ROBOT.toml -m {path} -o model.toml` fits the inertias.")
+}
 
 /// What a page has room for besides; `given` are the robot file and the model whose other joints are
 /// kept.

@@ -27,6 +27,8 @@ pub struct Identify<'a> {
     pub limit: Option<f64>,
     /// What was guessed of the robot file, with the lines to change.
     pub guesses: &'a [String],
+    /// Path of the model that is written last, as a shell takes it.
+    pub path: &'a str,
 }
 
 impl Identify<'_> {
@@ -91,7 +93,7 @@ pub fn identify(of: &Identify) -> Report {
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
     of.verdicts(&mut report.everywhere());
     if let Some(diagnosed) = of.diagnosed() {
-        diagnose::told(&mut report, machine, diagnosed);
+        diagnose::told(&mut report, (machine, diagnosed), (of.model(), of.path));
     }
     if let Some(validated) = &found.validated {
         let caption = format!("torque on held-out data ({})", of.unseen.join(", "));

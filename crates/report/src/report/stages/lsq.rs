@@ -1,5 +1,6 @@
 //! The report of `lsq`.
 
+use super::first_screen;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::{Align, Table, unbroken};
@@ -21,8 +22,12 @@ pub struct Lsq<'a> {
     pub found: &'a IdentifiedDynamics,
     /// The model that was fitted.
     pub file: &'a ModelFile,
+    /// Its path as a shell takes it.
+    pub path: &'a str,
     /// Names of the logs.
     pub logs: &'a [String],
+    /// The logs as a shell takes them.
+    pub typed: &'a str,
 }
 
 /// Parameters that a screen has room for.
@@ -66,7 +71,8 @@ pub fn lsq(of: &Lsq) -> Report {
         consistent(&mut detail, links);
     }
     report.terminal().line("");
-    report.terminal().note("", NEXT, 2);
+    report.terminal().note("", &next(of.typed, of.path), 2);
+    first_screen::narrowing(&mut report.terminal(), of.file, of.path);
     let mut page = report.page();
     gains(&mut page, &of.found.gains);
     known_friction(&mut page, &of.found.friction);
@@ -88,7 +94,7 @@ pub fn pictures(
     quality: &[Inspected],
     command: &str,
 ) {
-    page.paragraph(NEXT);
+    page.paragraph(&next("LOG", "MODEL.toml"));
     parameters::section(page, of.file, &|_| None);
     if let Some(replayed) = replayed {
         let (machine, logs) = (of.machine, &replayed.logs);
@@ -105,9 +111,13 @@ pub fn pictures(
     provenance::section(page, file, &inputs, &[], summary, command);
 }
 
-/// What to do next.
-const NEXT: &str = "Next: `cft-ident validate` on a log that was not fitted, for this error is of the data that were; \
-                    `cft-ident diagnose` finds what the model lacks.";
+/// What to do next with the model at a path that was fitted to these logs.
+fn next(fitted: &str, path: &str) -> String {
+    format!(
+        "Next: `cft-ident validate LOG -m {path}` on a log that was not fitted, for this error is of the data that \
+         were; `cft-ident diagnose {fitted} -m {path} -o refined.toml` finds what the model lacks."
+    )
+}
 
 /// The error of the fit, how good that is and whether the model can be used; and whether nothing calls for attention.
 fn words(of: &Lsq) -> (String, bool) {

@@ -1,0 +1,71 @@
+//! The next motion to record, as a command to type: one that narrows what is weak in a model, or separates an effect
+//! from its like.
+
+use cft_ident_core::effect::{Added, Place};
+use cft_ident_core::robot::Robot;
+use cft_ident_core::verdict::Verdict;
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::model_file::Parameter;
+
+/// A motion of one joint alone, both ways at several speeds, where such a motion separates the effect; none where it
+/// takes a payload, a standstill, a motor alone or other sensors. `model` is the path as a shell takes it.
+pub fn separating_command(effect: &Added, robot: &Robot, model: &str) -> Option<String> {
+    effect.law.entry.ladder?;
+    let joint = match effect.place {
+        // the other joint alone
+        Place::Pair { of, .. } | Place::Geared { other: of, .. } => of,
+        Place::Joint(j) => j,
+        Place::Actuator(_) | Place::All => return None,
+    };
+    let aim = format!("{}:{}", effect.name(), robot.joint_names().get(joint)?);
+    Some(command(model, &aim))
+}
+
+/// A motion that narrows the parameters that are not identified, and how many of how many they are; none where every
+/// one is, and where positions and speeds of the logs are not known. What the data say nothing of counts as little as
+/// what no motion shows (a constant torque beside the weight of a slide): they look alike.
+pub fn narrowing_command(file: &ModelFile, model: &str) -> Option<([usize; 2], String)> {
+    let estimated = |p: &Parameter| {
+        let mut own = file.estimates.iter();
+        let own = own.find(|e| e.name == p.name && e.joint == p.joint);
+        own.is_some_and(|e| e.std.is_some())
+    };
+    let rated = || file.parameters.iter().filter(|p| p.verdict.is_some());
+    let open = |p: &&Parameter| {
+        let weak = matches!(p.verdict, Some(Verdict::Weak | Verdict::NotIdentifiable));
+        weak && (p.std.is_some() || estimated(p))
+    };
+    let open = rated().filter(open).count();
+    let known = file.held_out.len() == file.robot.robot().joints();
+    (open > 0 && known).then(|| ([open, rated().count()], command(model, "weak")))
+}
+
+fn command(model: &str, aim: &str) -> String {
+    format!("cft-ident excite -m {model} --for {aim} -o next.toml")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cft_ident_core::effect::law;
+    use cft_ident_core::robot::cft::{Setup, Structure};
+
+    #[test]
+    fn a_coupling_is_separated_by_the_other_joint_alone() {
+        let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+        let of = |name: &str, place: Place| {
+            let law = law(&robot, name).unwrap();
+            let (shape, linear) = (vec![0.0; law.shape.len()], vec![0.0; law.linear.len()]);
+            let effect = Added::new(law, place, shape, linear);
+            separating_command(&effect, &robot, "m.toml")
+        };
+        let coupling = of("coupling", Place::Pair { on: 1, of: 3 }).unwrap();
+        assert!(
+            coupling.contains("-m m.toml --for coupling:q5 "),
+            "{coupling}"
+        );
+        let play = of("backlash", Place::Joint(0)).unwrap();
+        assert!(play.contains("--for backlash:q1 "), "{play}");
+        assert_eq!(of("delay", Place::All), None);
+    }
+}
