@@ -74,7 +74,7 @@ fn links(text: &str) -> Vec<&str> {
 
 #[test]
 fn the_page_tells_of_every_effect_whose_numbers_have_a_range() {
-    let page = fs::read_to_string(root().join("docs/closing-the-loop.md")).unwrap();
+    let page = fs::read_to_string(root().join("docs/diagnosis.md")).unwrap();
     let (_, rest) = page.split_once("## What a name must satisfy").unwrap();
     let (section, _) = rest.split_once("\n## ").unwrap();
     let rows = section.lines().filter(|line| line.starts_with("| "));

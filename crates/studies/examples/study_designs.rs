@@ -2,7 +2,7 @@
 //! N = 4, 0.4 Hz, 4000 revolutions per minute of every motor, 10 V, what `excite` does by default.
 //!
 //! `cargo run --example study_designs -- [FOLDER]` writes into FOLDER the summary that
-//! docs/excitation.md is generated from. It takes a minute or two on two cores.
+//! docs/studies.md is generated from. It takes a minute or two on two cores.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
