@@ -1,5 +1,5 @@
 //! Writes the tables of README.md and docs/*.md anew from the results in docs/results:
-//! `cargo run --example docs_tables`. With `--check` it writes nothing and fails where one differs.
+//! `cargo run -p cft-ident-studies --example docs_tables`. With `--check` it writes nothing and fails where one differs.
 //!
 //! A table stands between `<!-- table: KIND FILE... -->` and `<!-- end of table -->`; the kinds are
 //! in `tables.rs`, figures of results in `figures.rs`. The results are made by `docs/generate`, or by the command that they name.
@@ -13,7 +13,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(cft_ident_support::ROOT);
     let check = std::env::args().any(|word| word == "--check");
     let mut failed = false;
     for path in blocks::documents(root) {

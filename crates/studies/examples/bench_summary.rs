@@ -1,5 +1,5 @@
 //! Turns what `cargo bench --bench pipeline` left in target/criterion into docs/results/bench.json,
-//! from which docs/speed.md has its table: `cargo run --example bench_summary`.
+//! from which docs/speed.md has its table: `cargo run -p cft-ident-studies --example bench_summary`.
 
 use std::path::Path;
 
@@ -68,7 +68,7 @@ fn main() {
         .collect();
     let document = json!({
         "study": "speed on one core",
-        "command": "cargo bench --bench pipeline && cargo run --example bench_summary",
+        "command": "cargo bench --bench pipeline && cargo run -p cft-ident-studies --example bench_summary",
         "rows": rows,
     });
     std::fs::write("docs/results/bench.json", format!("{document:#}\n")).expect("it is written");

@@ -18,10 +18,9 @@ pub fn render(words: &[&str]) -> Rendered {
         ["errors", validations @ ..] => errors(validations),
         ["friction", result] => friction(&json(result)?),
         ["curve", result, published] => curve(&json(result)?, &json(published)?),
-        ["study", study] => self::study(&json(study)?),
+        ["study", study, columns @ ..] => self::study(&json(study)?, columns),
         ["steps", diagnosis] => steps(&json(diagnosis)?),
         ["estimators", validations @ ..] => estimators(validations),
-        ["before-after", diagnoses @ ..] => before_after(diagnoses),
         ["arm-errors", names @ ..] => arms::errors(names),
         ["arm-friction", names @ ..] => arms::friction(names),
         ["arm-parameters", names @ ..] => arms::named(names),
@@ -73,7 +72,7 @@ fn replay(result: &Value) -> String {
 }
 
 fn read(name: &str) -> Result<String, String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results");
+    let folder = Path::new(cft_ident_support::ROOT).join("docs/results");
     std::fs::read_to_string(folder.join(name))
         .map_err(|error| format!("docs/results/{name}: {error}"))
 }
@@ -207,82 +206,24 @@ fn steps(diagnosis: &Value) -> Rendered {
     Ok(table(&columns, &lines))
 }
 
-/// Relative errors by joint of validations named LOG_est_ESTIMATOR, one row each.
+/// Errors over the joints of validations named MACHINE_est_ESTIMATOR: a row an estimator, a column a machine.
 fn estimators(names: &[&str]) -> Rendered {
-    let mut lines = Vec::new();
-    let mut columns = vec!["<estimator".to_owned(), "<evaluated on".to_owned()];
-    for (i, name) in names.iter().enumerate() {
-        let result = json(name)?;
-        let joints = rows(&result["joints"]);
-        if i == 0 {
-            columns.extend(joints.iter().map(|j| text(&j["joint"]).to_owned()));
-            columns.push("rms of these".to_owned());
-        }
-        let estimator = name.rsplit_once("_est_").map_or(*name, |(_, e)| e);
-        let input = &result["inputs"][0];
-        let log = match input["span"].as_str() {
-            Some(span) => format!("{}@{span}", text(&input["name"])),
-            None => text(&input["name"]).to_owned(),
-        };
-        let mut line = vec![estimator.replace('_', " "), log];
-        line.extend(joints.iter().map(|j| percent(number(&j["relative_error"]))));
-        line.push(percent(number(&result["overall"]["mean_relative_error"])));
-        lines.push(line);
-    }
-    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
-    Ok(table(&columns, &lines))
-}
-
-/// Errors before and after, one row per diagnosis and joint.
-fn before_after(names: &[&str]) -> Rendered {
-    let mut lines = Vec::new();
+    let mut machines: Vec<&str> = Vec::new();
+    let mut lines: Vec<Vec<String>> = Vec::new();
     for name in names {
-        let result = json(name)?;
-        let logs: Vec<String> = rows(&result["inputs"])
-            .iter()
-            .map(|i| match i["span"].as_str() {
-                None => text(&i["name"]).to_owned(),
-                Some(span) => format!("{}@{span}", text(&i["name"])),
-            })
-            .collect();
-        for (j, joint) in rows(&result["after"]["train"]["joints"]).iter().enumerate() {
-            let of = |when: &str, rows: &str| &result[when][rows]["joints"][j];
-            let after = of("after", "holdout");
-            let interval = rows(&after["interval_95"]);
-            let interval = match interval {
-                [low, high] => format!("{} to {}", percent(number(low)), percent(number(high))),
-                _ => "-".to_owned(),
-            };
-            lines.push(vec![
-                logs.join(", "),
-                text(&joint["joint"]).to_owned(),
-                text(&result["verdict"]).to_owned(),
-                percent(number(&of("before", "train")["relative_error"])),
-                percent(number(&joint["relative_error"])),
-                percent(number(&of("before", "holdout")["relative_error"])),
-                percent(number(&after["relative_error"])),
-                interval,
-                format!(
-                    "{} to {} {}",
-                    significant(number(&of("before", "holdout")["rmse"]), 3),
-                    significant(number(&after["rmse"]), 3),
-                    text(&after["unit"])
-                ),
-            ]);
+        let (machine, estimator) = name
+            .split_once("_est_")
+            .ok_or_else(|| format!("`{name}` is no MACHINE_est_ESTIMATOR"))?;
+        if !machines.contains(&machine) {
+            machines.push(machine);
+        }
+        let error = percent(number(&json(name)?["overall"]["mean_relative_error"]));
+        match lines.iter_mut().find(|line| line[0] == estimator) {
+            Some(line) => line.push(error),
+            None => lines.push(vec![estimator.to_owned(), error]),
         }
     }
-    let columns = [
-        "<logs, the unseen one last",
-        "<joint",
-        "<verdict",
-        "fitted before",
-        "after",
-        "unseen before",
-        "after",
-        "95 % of it",
-        "<unseen rms",
-    ];
-    Ok(table(&columns, &lines))
+    Ok(table(&[&["<estimator"], &machines[..]].concat(), &lines))
 }
 
 fn signed_percent(fraction: f64) -> String {
@@ -433,13 +374,24 @@ fn curve(result: &Value, published: &Value) -> Rendered {
     Ok(out)
 }
 
-/// A study: its command, its seeds, and its rows with their keys as columns, in their order.
-fn study(study: &Value) -> Rendered {
-    let columns: Vec<&str> = rows(&study["rows"])
+/// A study: its command, its seeds, and its rows with their keys as columns; those of these numbers, from 1, or all.
+fn study(study: &Value, chosen: &[&str]) -> Rendered {
+    let all: Vec<&str> = rows(&study["rows"])
         .first()
         .and_then(Value::as_object)
         .map(|row| row.keys().map(String::as_str).collect())
         .ok_or("the study has no rows")?;
+    let chosen = chosen.iter().map(|column| {
+        let number: Option<usize> = column.parse().ok();
+        let found = number.and_then(|k| all.get(k.wrapping_sub(1)));
+        found.ok_or_else(|| format!("the study has no column {column}"))
+    });
+    let mut columns: Vec<&str> = chosen
+        .map(|found| found.copied())
+        .collect::<Result<_, _>>()?;
+    if columns.is_empty() {
+        columns = all.clone();
+    }
     let lines: Vec<Vec<String>> = rows(&study["rows"])
         .iter()
         .map(|row| columns.iter().map(|column| cell(&row[*column])).collect())

@@ -1,4 +1,4 @@
-//! Draws figures from made-up numbers, to be looked at: `cargo run --example figures -- DIR`.
+//! Draws figures from made-up numbers, to be looked at: `cargo run -p cft-ident-studies --example figures -- DIR`.
 
 use std::path::PathBuf;
 
