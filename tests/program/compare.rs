@@ -171,7 +171,7 @@ fn both_models_are_judged_on_the_same_rows_as_validate_judges_them() {
     tool(at, "compare a.toml b.toml log.csv")
         .assert()
         .code(0)
-        .stdout(contains("A is closer on these logs"));
+        .stdout(contains("a.toml is closer on these logs"));
     // a model beside itself differs in nothing
     let same = json(at, "compare a.toml a.toml log.csv");
     assert_eq!(same["logs"]["joints"][0]["difference"], 0.0);

@@ -33,21 +33,28 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
         _ => "No effect is confirmed: a residual above the noise is left that none explains in all parts of the data."
             .to_owned(),
     };
-    let (bought, worse) = bought(d);
+    let (bought, gains_nothing) = bought(d);
     text += &format!(" {bought}");
     text += &taken_out(machine, d);
-    if !robot_is_exact(d) {
+    if !is_exact(d) {
         text += &format!(" {}", usual::words(machine.file.log.torque_is));
     }
     if let Some(left) = most_is_left(machine, d) {
         text += &format!(" {left}");
     }
-    let good = !worse && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
+    let runs_worse = found.free_run.as_ref();
+    let runs_worse = runs_worse.is_some_and(|run| run.worse().next().is_some());
+    let unusual =
+        errors(&d.after).1.overall.mean_relative_error > usual::band(machine.file.log.torque_is)[1];
+    let good = !gains_nothing
+        && !runs_worse
+        && !unusual
+        && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
     (text, good)
 }
 
 /// Whether the error is so small that no published figure is of use beside it.
-fn robot_is_exact(d: &Diagnosis) -> bool {
+pub(super) fn is_exact(d: &Diagnosis) -> bool {
     let least = [usual::Measured::Sensors, usual::Measured::Currents]
         .map(|measured| usual::range(measured)[0])
         .into_iter()
@@ -96,18 +103,18 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
     }
 }
 
-/// What the diagnosis did to the error, and whether that is worse.
+/// What the diagnosis did to the error, and whether effects were written that gain nothing.
 fn bought(d: &Diagnosis) -> (String, bool) {
     let ((data, before), (_, after)) = (errors(&d.before), errors(&d.after));
     let mean = |e: &Errors| e.overall.mean_relative_error;
     let percent = |e: &Errors| number::percent(mean(e));
-    let (goes, worse) = match (
+    let goes = match (
         percent(before) == percent(after),
         mean(after) > mean(before),
     ) {
-        (true, _) => ("stays at", false),
-        (false, true) => ("RISES", true),
-        (false, false) => ("falls", false),
+        (true, _) => "stays at",
+        (false, true) => "RISES",
+        (false, false) => "falls",
     };
     let mut text = match (d.written().next(), goes) {
         (None, _) => format!("The {data} is {}", percent(after)),
@@ -125,7 +132,7 @@ fn bought(d: &Diagnosis) -> (String, bool) {
         }
         text += ")";
     }
-    (text + ".", worse && d.written().next().is_some())
+    (text + ".", goes != "falls" && d.written().next().is_some())
 }
 
 /// What held-out data took out of the model.

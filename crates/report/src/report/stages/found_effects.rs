@@ -1,6 +1,6 @@
 //! The effects that a diagnosis found, on a page: a table of their numbers, and a card for each that is written.
 
-use super::step_words::{alternatives, grade, in_words, worsened};
+use super::step_words::{alternatives, grade, in_words, titled, worsened};
 use crate::report::Writer;
 use crate::report::sections::effects;
 use cft_ident_core::diagnose::FoundEffect;
@@ -21,7 +21,7 @@ pub(super) fn show(
         false => "the fitted data",
     };
     for (step, rows) in d.written().zip(&replayed.effects) {
-        let said = words(machine, step);
+        let said = (titled(machine, &step.estimate), words(machine, step));
         effects::card(page, (machine, &d.model), rows, said, data);
     }
     if !d.steps.is_empty() {
