@@ -15,7 +15,7 @@ import numpy as np
 
 import cft_ident as ci
 
-PERIOD, STEPS, BANDWIDTH = 2e-3, 10, 15.0  # of the controller [s], of the robot in it, of the loop [rad/s]
+PERIOD, STEPS, BANDWIDTH = 5e-3, 10, 15.0  # of the controller [s], of the robot in it, of the loop [rad/s]
 
 model = ci.Model.load(sys.argv[1])
 n = len(model.joints)
@@ -24,8 +24,8 @@ inertia = np.diag(model.mass_matrix(rest)[0])
 
 
 def tracking_error(compensated: bool) -> float:
-    """Root mean square of the position error along three seconds of a sine on every joint."""
-    t = PERIOD * np.arange(1500)[:, None] + np.zeros((1, n))
+    """Root mean square of the position error along a second and a half of a sine on every joint."""
+    t = PERIOD * np.arange(300)[:, None] + np.zeros((1, n))
     w, amplitude = 2.0, 0.3
     desired = amplitude * (1 - np.cos(w * t))
     speed, acceleration = amplitude * w * np.sin(w * t), amplitude * w**2 * np.cos(w * t)

@@ -18,6 +18,7 @@ followed = ci.track({robot: parts}).to_dict()
 for one in followed["robots"]:
     for parameter in one["parameters"]:
         if parameter["name"] == "viscous":
-            print(parameter["joint"], "viscous", f"[{parameter['unit']}]:", parameter["values"])
+            course = " ".join("-" if value is None else f"{value:.2f}" for value in parameter["values"])
+            print(f"viscous of {parameter['joint']} [{parameter['unit']}]: {course}")
     for change in one["changes"]:
-        print(f"{change['parameter']} of {change['joint']} changed by {change['size']:.3f} {change['unit']} at log {change['log']}")
+        print(f"{change['parameter']} of {change['joint']} changed by {change['size']:.3f} {change['unit']} at {one['logs'][change['log']]}")

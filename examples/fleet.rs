@@ -33,16 +33,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let followed = track(&robots, &control)?;
     for robot in &followed.robots {
         for parameter in robot.parameters.iter().filter(|p| p.name == "viscous") {
+            let course = parameter.values.iter();
+            let course = course.map(|value| value.map_or("-".to_owned(), |v| format!("{v:.2}")));
+            let course: Vec<String> = course.collect();
+            let joint = parameter.joint.as_deref().unwrap_or_default();
             println!(
-                "{:?} viscous [{}]: {:.2?}",
-                parameter.joint, parameter.unit, parameter.values
+                "viscous of {joint} [{}]: {}",
+                parameter.unit,
+                course.join(" ")
             );
         }
         for change in &robot.changes {
-            let (parameter, at) = (&change.parameter, change.log);
+            let joint = change.joint.as_deref().unwrap_or_default();
             println!(
-                "{parameter} of {:?} changed by {:.3} {} at log {at}",
-                change.joint, change.size, change.unit
+                "{} of {joint} changed by {:.3} {} at {}",
+                change.parameter, change.size, change.unit, robot.logs[change.log]
             );
         }
     }

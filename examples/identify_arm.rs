@@ -28,7 +28,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         eprintln!("{robot}: {}", finding.told());
     }
 
-    let fit = lsq(&arm, &fitted, &LsqSettings::default(), &control)?;
+    let settings = LsqSettings {
+        consistent: true, // links that can exist, beside the plain fit
+        ..LsqSettings::default()
+    };
+    let fit = lsq(&arm, &fitted, &settings, &control)?;
     let model = fit.model(&arm, None);
     let used = refined(&model, "model")?;
     let judged = validate(

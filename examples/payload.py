@@ -4,7 +4,7 @@ cft-ident example ur10
 cft-ident lsq ur10/ur10.csv@0..70% -r ur10/ur10.toml -o empty.toml
 python payload.py empty.toml ur10/ur10.csv@70..100%
 
-Nothing hangs on this arm in the second part of its log: zero lies in the interval of the mass.
+This arm carries nothing in either part of its log: give a log of yours with its load.
 """
 
 import json

@@ -6,7 +6,7 @@
 //! cargo run --release --example payload -- empty.toml ur10/ur10.csv@70..100%
 //! ```
 //!
-//! Nothing hangs on this arm in the second part of its log: zero lies in the interval of the mass.
+//! This arm carries nothing in either part of its log: give a log of yours with its load.
 
 use std::error::Error;
 use std::path::Path;

@@ -87,8 +87,7 @@ impl ErrorFigure {
         let most = self.most();
         let x = |error: f64| left + room * (error / most).clamp(0.0, 1.0);
         if let Some(usual) = self.usual {
-            let [least, most] = usual.map(number::percent);
-            let name = format!("usual: {least} to {most}");
+            let name = usual_words(usual);
             let key = (Key::Patch(colour::COVERED), name.as_str());
             legend::draw(&mut svg, [14.0, 44.0 + LINE], &[key]);
             let [from, to] = usual.map(x);
@@ -172,12 +171,16 @@ impl ErrorFigure {
         let limit = self.limit.map_or(String::new(), |limit| {
             format!("; limit {}", number::percent(limit))
         });
-        let usual = self.usual.map_or(String::new(), |usual| {
-            let [least, most] = usual.map(number::percent);
-            format!("; usual {least} to {most}")
-        });
+        let usual = self.usual.map(|usual| format!("; {}", usual_words(usual)));
+        let usual = usual.unwrap_or_default();
         format!("Relative torque error: {}{limit}{usual}", joints.join("; "))
     }
+}
+
+/// `usual: 3.1 to 13 %`.
+fn usual_words(usual: [f64; 2]) -> String {
+    let [least, most] = usual.map(|error| number::significant(100.0 * error, 2));
+    format!("usual: {least} to {most} %")
 }
 
 /// `5.17 % (4.25..6.11)`.
@@ -240,7 +243,7 @@ mod tests {
             "14.6 %",
             "5.00 % (4.00..6.00)",
             "limit 10",
-            "usual: 3.10 % to 12.9 %",
+            "usual: 3.1 to 13 %",
         ] {
             assert!(svg.contains(part), "{part}: {svg}");
         }

@@ -19,14 +19,6 @@ pub fn section(writer: &mut Writer, found: Option<&FreeRun>) {
         true => writer.table(compared(found)),
         false => writer.table(growing(found)),
     }
-    let worse: Vec<&str> = found.worse().map(|joint| joint.joint.as_str()).collect();
-    if !worse.is_empty() {
-        writer.paragraph(&format!(
-            "The refined model moves worse than the model given at {}: take it for feed-forward, and the given one to \
-             simulate.",
-            worse.join(", ")
-        ));
-    }
     if found.astray > 0 {
         writer.paragraph(&format!(
             "{} of {} windows went astray and are not counted.",

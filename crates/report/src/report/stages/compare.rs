@@ -91,7 +91,7 @@ pub fn pictures(
             names: [name.clone().into(), format!("residual of {name}").into()],
             styles: [style, style],
         };
-        let models = [drawn(a, TraceStyle::After), drawn(b, TraceStyle::Before)];
+        let models = [drawn(a, TraceStyle::Before), drawn(b, TraceStyle::After)];
         let title = replayed.logs.join(", ");
         torque::section(page, &of.machine, &replayed.torque, &models, &title);
         quality::section(page, quality, &[]);

@@ -42,12 +42,19 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     if let Some(left) = most_is_left(machine, d) {
         text += &format!(" {left}");
     }
-    let runs_worse = found.free_run.as_ref();
-    let runs_worse = runs_worse.is_some_and(|run| run.worse().next().is_some());
+    let worse = found.free_run.iter().flat_map(|run| run.worse());
+    let worse: Vec<&str> = worse.map(|joint| joint.joint.as_str()).collect();
+    if !worse.is_empty() {
+        text += &format!(
+            " Use it for feed-forward and not to simulate: driven by the measured torques, it moves worse than the \
+             given model at {}.",
+            worse.join(", ")
+        );
+    }
     let unusual =
         errors(&d.after).1.overall.mean_relative_error > usual::band(machine.file.log.torque_is)[1];
     let good = !gains_nothing
-        && !runs_worse
+        && worse.is_empty()
         && !unusual
         && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
     (text, good)
