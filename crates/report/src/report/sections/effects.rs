@@ -8,16 +8,27 @@ use cft_ident_core::number::{self, MILLIMETRES};
 use cft_ident_stages::identify::LoggedRobot;
 use cft_ident_stages::replay::EffectRows;
 
+/// What a card says besides its picture.
+pub struct Said {
+    pub title: String,
+    pub words: Vec<String>,
+    /// Why nothing is gained by the effect, where that is so.
+    pub no_gain: Option<String>,
+}
+
 /// Part of the residual's rms that an effect takes away at least, where its card is not folded.
 const GAIN: f64 = 0.01;
 
-/// The card of an effect of `model` under its `title` with what is said of it besides, over logs that are called `data`;
-/// folded away where these logs gain nothing by it.
+/// The card of an effect of `model`, over logs that are called `data`; folded away where these logs gain little by it.
 pub fn card(
     page: &mut Writer,
     (machine, model): (&LoggedRobot, &AugmentedModel),
     of: &EffectRows,
-    (title, said): (String, Vec<String>),
+    Said {
+        title,
+        words: said,
+        no_gain,
+    }: Said,
     data: &str,
 ) {
     let effect = &model.effects[of.effect];
@@ -54,11 +65,13 @@ pub fn card(
     words.push(format!("What to do: {}.", effect.law.entry.remedy));
     words.extend(said);
     let cells = figure.cells(words);
-    match rms_with > (1.0 - GAIN) * rms_without {
-        true => page.folded(
-            &format!("{title}: nothing gained on {data} ({without} without it, {with} with it)"),
-            &cells,
-        ),
-        false => page.figures(&cells),
+    let little = match rms_with < rms_without {
+        true => format!("little gained on {data} ({without} without it, {with} with it)"),
+        false => format!("nothing gained on {data} ({without} without it, {with} with it)"),
+    };
+    let little = (rms_with > (1.0 - GAIN) * rms_without).then_some(little);
+    match no_gain.or(little) {
+        Some(why) => page.folded(&format!("{title}: {why}"), &cells),
+        None => page.figures(&cells),
     }
 }
