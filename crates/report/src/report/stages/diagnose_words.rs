@@ -6,6 +6,7 @@ use crate::report::usual;
 use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
+use cft_ident_stages::open_loop::JointFreeRun;
 
 /// Effects that the verdict names; it counts the others.
 const NAMED: usize = 3;
@@ -42,8 +43,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     if let Some(left) = most_is_left(machine, d) {
         text += &format!(" {left}");
     }
-    let worse = found.free_run.iter().flat_map(|run| run.worse());
-    let worse: Vec<&str> = worse.map(|joint| joint.joint.as_str()).collect();
+    let worse = runs_worse(found);
     if !worse.is_empty() {
         text += &format!(
             " Use it for feed-forward and not to simulate: driven by the measured torques, it moves worse than the \
@@ -58,6 +58,17 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
         && !unusual
         && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
     (text, good)
+}
+
+/// Joints that move worse, driven by the measured torques, where the model moves worse over all joints.
+fn runs_worse(found: &Diagnosed) -> Vec<&str> {
+    let Some(run) = &found.free_run else {
+        return Vec::new();
+    };
+    let grows = |joint: &JointFreeRun| Some((joint.after.as_ref()?.rms / joint.given.rms).ln());
+    let change: f64 = run.joints.iter().filter_map(grows).sum();
+    let worse = run.worse().filter(|_| change > 0.0);
+    worse.map(|joint| joint.joint.as_str()).collect()
 }
 
 /// Whether the error is so small that no published figure is of use beside it.
