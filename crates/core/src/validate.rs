@@ -53,8 +53,15 @@ pub struct Overall {
     pub relative_error_moving: Option<f64>,
     /// The same of the rows in which each joint rests.
     pub relative_error_rest: Option<f64>,
-    /// Root mean square over joints of their relative errors.
+    /// Root mean square of the relative errors of the joints that move.
     pub mean_relative_error: f64,
+}
+
+impl JointError {
+    /// Whether it moves at all: the torque of a joint that stands still is any that friction takes.
+    pub fn moves(&self) -> bool {
+        self.resting < self.samples
+    }
 }
 
 /// Errors joint by joint, and over the joints.
@@ -478,7 +485,6 @@ impl<'a> Reconstruction<'a> {
             }
         }
         let robot = &self.model.robot;
-        let n = robot.joints();
         let has_band = self.band.is_some();
         let known = |x: Option<f64>| x.filter(|_| !self.summed).unwrap_or(f64::NAN);
         let joint = |(j, s): (usize, &ErrorSums)| JointError {
@@ -526,16 +532,19 @@ impl<'a> Reconstruction<'a> {
                 .then(|| ratio(error.max(0.0), torque, rows))
                 .flatten()
         };
-        let mean = joints
-            .iter()
-            .map(|e| e.relative_error * e.relative_error)
-            .sum::<f64>();
+        let counted: Vec<f64> = match joints.iter().any(JointError::moves) {
+            true => (joints.iter().filter(|e| e.moves()))
+                .map(|e| e.relative_error)
+                .collect(),
+            false => joints.iter().map(|e| e.relative_error).collect(),
+        };
+        let mean = counted.iter().map(|e| e * e).sum::<f64>() / counted.len() as f64;
         TorqueErrors {
             overall: Overall {
                 relative_error: one_unit.then(|| (error / torque).sqrt()),
                 relative_error_moving: part(in_motion, torque_in_motion, moving),
                 relative_error_rest: part(at_rest, torque_at_rest, resting),
-                mean_relative_error: (mean / n as f64).sqrt(),
+                mean_relative_error: mean.sqrt(),
             },
             joints,
         }

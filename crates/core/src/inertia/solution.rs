@@ -193,19 +193,11 @@ pub(super) fn solve(
         }
         inverse += v * v.transpose() / (svd.s[k] * svd.s[k]);
     }
-    let mut determined: Vec<bool> = (0..u).map(|i| scale[i] > 0.0).collect();
-    let mut confounded = Vec::new();
-    for k in (0..svd.s.len()).filter(|k| !kept.contains(k)) {
-        let v = svd.v.column(k);
-        let mut terms: Vec<(usize, f64)> = (0..u)
-            .filter(|&i| v[i].abs() > SHARE)
-            .map(|i| (i, v[i]))
-            .collect();
-        terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        for (i, _) in &terms {
-            determined[*i] = false;
-        }
-        confounded.push(Confounded { terms });
+    let lost = (0..svd.s.len()).filter(|k| !kept.contains(k));
+    let confounded = open_directions(lost.map(|k| svd.v.column(k).into_owned()), &scale);
+    let mut determined = vec![true; u];
+    for (i, _) in confounded.iter().flat_map(|c| &c.terms) {
+        determined[*i] = false;
     }
     let theta = DVector::from_fn(u, |i, _| z[i] * unscale(i));
     let inverse = DMatrix::from_fn(u, u, |i, j| inverse[(i, j)] * unscale(i) * unscale(j));
@@ -215,6 +207,32 @@ pub(super) fn solve(
         determined,
         confounded,
     })
+}
+
+/// The directions that the data leave open, each unknown without a column by itself.
+fn open_directions(lost: impl Iterator<Item = DVector<f64>>, scale: &[f64]) -> Vec<Confounded> {
+    let silent = |i: &usize| scale[*i] == 0.0;
+    let single = |i: usize| Confounded {
+        terms: vec![(i, 1.0)],
+    };
+    let mut out: Vec<Confounded> = (0..scale.len()).filter(silent).map(single).collect();
+    let mut others: Vec<DVector<f64>> = Vec::new();
+    for mut v in lost {
+        (0..scale.len()).filter(silent).for_each(|i| v[i] = 0.0);
+        for other in &others {
+            v -= other * other.dot(&v);
+        }
+        if v.norm() < SHARE {
+            continue;
+        }
+        v.normalize_mut();
+        let terms = v.iter().copied().enumerate();
+        let mut terms: Vec<(usize, f64)> = terms.filter(|(_, x)| x.abs() > SHARE).collect();
+        terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        out.push(Confounded { terms });
+        others.push(v);
+    }
+    out
 }
 
 pub(super) fn residual_std(

@@ -42,12 +42,24 @@ impl PositionFilter {
         }))
     }
 
-    /// Filters positions, `samples x joints` row-major, in place.
+    /// Filters positions, `samples x joints` row-major, in place; of a joint that stands still exactly nothing
+    /// changes, so that it has no speed of rounding.
     ///
     /// # Errors
     /// [`MotionError`] for too few samples.
     pub fn run(&self, q: &mut [f64], joints: usize) -> Result<(), MotionError> {
-        Ok(run_each(|joint| self.of(joint), q, joints)?)
+        let first = q[..joints.min(q.len())].to_vec();
+        let each = |q: &mut [f64], add: f64| {
+            for row in q.chunks_exact_mut(joints.max(1)) {
+                row.iter_mut()
+                    .zip(&first)
+                    .for_each(|(q, first)| *q += add * first);
+            }
+        };
+        each(q, -1.0);
+        let filtered = run_each(|joint| self.of(joint), q, joints);
+        each(q, 1.0);
+        Ok(filtered?)
     }
 
     /// The filter of a joint.

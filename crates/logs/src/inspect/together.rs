@@ -10,6 +10,7 @@ use super::judge::{Depth, LogJudge, Track};
 use super::lag;
 use super::words::ChannelRole;
 use cft_ident_core::number;
+use std::f64::consts::{PI, TAU};
 
 /// A velocity that lags by more rows is filtered.
 const LAG_ROWS: f64 = 1.5;
@@ -200,8 +201,12 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             continue;
         }
         if found.best > FOLLOWS && (found.times - 1.0).abs() > OFF {
+            let cause = match named_ratio(found.times) {
+                Some(units) => format!("{units}, or the clock of the log"),
+                None => "its unit or gear is another, or the clock of the log".to_owned(),
+            };
             let effect = format!(
-                "is {} times the derivative of `{of}`: its unit or gear is another, or the clock of the log runs at {} of its rate",
+                "is {} times the derivative of `{of}`: {cause} runs at {} of its rate",
                 number::significant(found.times, 3),
                 number::significant(found.times.recip(), 3)
             );
@@ -223,6 +228,21 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             draft.whole(Warning, FaultKind::Filter, track, effect, remedy);
         }
     }
+}
+
+/// The units of position and velocity that give this ratio.
+fn named_ratio(times: f64) -> Option<&'static str> {
+    const RATIOS: [(f64, &str); 6] = [
+        (1.0 / TAU, "a velocity in turns/s beside a position in rad"),
+        (TAU, "a velocity in rad/s beside a position in turns"),
+        (PI / 180.0, "a velocity in rad/s beside a position in deg"),
+        (180.0 / PI, "a velocity in deg/s beside a position in rad"),
+        (60.0 / TAU, "a velocity in rpm beside a position in rad"),
+        (60.0, "a velocity in rpm beside a position in turns"),
+    ];
+    let off = |(ratio, _): &(f64, &str)| (times / ratio).ln().abs();
+    let nearest = RATIOS.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    (off(nearest) < OFF).then_some(nearest.1)
 }
 
 /// Names the joint whose velocity a channel really is.

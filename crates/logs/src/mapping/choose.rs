@@ -189,6 +189,7 @@ impl Mapping {
                     .map(str::to_owned);
             }
         }
+        out.check_position(seen, &beside(&q));
         out.check_torque(seen);
         out
     }
@@ -270,6 +271,22 @@ impl Mapping {
     fn check(&mut self, text: Option<String>) {
         if let Some(text) = text.filter(|text| !self.checks.contains(text)) {
             self.checks.push(text);
+        }
+    }
+
+    /// Asks for the unit of angles whose columns state none and have other names than the tool's own.
+    fn check_position(&mut self, seen: &SeenColumns, columns: &[Option<LogColumn>]) {
+        let unstated = |(joint, column): (&JointColumns, &Option<LogColumn>)| {
+            let own = joint.position.as_deref() == Some(&format!("q_{}", joint.joint));
+            let taken = joint.kind == JointKind::Revolute && joint.position_unit.is_none() && !own;
+            taken
+                && column
+                    .as_ref()
+                    .is_some_and(|column| stated_position(column).is_none())
+        };
+        if !seen.is_recording() && self.joints.iter().zip(columns).any(unstated) {
+            let text = "positions: rad is taken, for no name states a unit; else position_unit = \"deg\" or \"turns\"";
+            self.check(Some(text.to_owned()));
         }
     }
 

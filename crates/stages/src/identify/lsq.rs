@@ -432,11 +432,19 @@ fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
 
 /// What the data do not separate, as warnings.
 fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<String> {
-    let sentence = |c: &Confounded| {
+    let name = |i: usize| match &unknowns[i].joint {
+        Some(joint) if !unknowns[i].key.contains(joint.as_str()) => {
+            format!("{} of {joint}", unknowns[i].key)
+        }
+        _ => unknowns[i].key.clone(),
+    };
+    let (silent, mixed): (Vec<&Confounded>, Vec<&Confounded>) =
+        fit.confounded.iter().partition(|c| c.terms.len() == 1);
+    let sentence = |c: &&Confounded| {
         let most = || c.terms.iter().take(6);
-        let names: Vec<&str> = most().map(|(i, _)| unknowns[*i].key.as_str()).collect();
+        let names: Vec<String> = most().map(|(i, _)| name(*i)).collect();
         let words: Vec<String> = most()
-            .map(|(i, x)| format!("{x:+.3} {}", unknowns[*i].key))
+            .map(|(i, x)| format!("{x:+.3} {}", name(*i)))
             .collect();
         format!(
             "these data cannot separate {}: their combination {} (columns scaled to norm 1) changes nothing",
@@ -444,7 +452,13 @@ fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<String> {
             words.join(" ")
         )
     };
-    fit.confounded.iter().map(sentence).collect()
+    let all: Vec<String> = silent.iter().map(|c| name(c.terms[0].0)).collect();
+    let silent =
+        (!all.is_empty()).then(|| format!("no motion in these data excites {}", all.join(", ")));
+    silent
+        .into_iter()
+        .chain(mixed.iter().map(sentence))
+        .collect()
 }
 
 /// The essential unknowns, and the relative residual of each joint with those alone.

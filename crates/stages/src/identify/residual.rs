@@ -39,3 +39,10 @@ pub struct JointResidual {
     /// The same of the rows in which it rests; null where it never does.
     pub relative_error_rest: Option<f64>,
 }
+
+impl JointResidual {
+    /// Whether it moves at all.
+    pub fn moves(&self) -> bool {
+        self.relative_error_moving.is_some() || self.relative_error_rest.is_none()
+    }
+}

@@ -8,6 +8,8 @@ const SPACING_S: f64 = 0.02;
 const ROUNDED: f64 = 0.999;
 /// Speed up to which a joint rests, over its rms speed.
 const RESTING: f64 = 0.01;
+/// Speed that is rounding and no motion [m/s or rad/s]: a joint of one position rests.
+const ROUNDING: f64 = 1e-9;
 
 /// Steps from which on rows may be poses [s]: no machine is logged in motion so slowly.
 const POSE_S: f64 = 0.2;
@@ -196,6 +198,7 @@ impl SpeedMeter {
             true => (square / self.seconds).sqrt(),
             false => 0.0,
         };
-        self.squares.iter().map(|s| RESTING * rms(s)).collect()
+        let rests = |square| (RESTING * rms(square)).max(ROUNDING);
+        self.squares.iter().map(rests).collect()
     }
 }

@@ -47,7 +47,7 @@ pub(super) fn undecided(problem: &Problem, declared: &Trial) -> Vec<Undecided> {
     let missed = moving
         .iter()
         .copied()
-        .filter(|j| errors[*j] > LIMITS.unexplained);
+        .filter(|j| errors[*j] > LIMITS.unexplained && problem.sample.travel(*j) > LIMITS.still);
     missed
         .map(|joint| Undecided {
             joint,

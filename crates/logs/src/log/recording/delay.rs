@@ -1,18 +1,29 @@
 //! Delay between positions and torques, from the motion itself.
 //!
-//! For each trial delay the torque is fitted per joint by what any joint's motion explains: inertia,
-//! viscous and Coulomb friction, gravity of one link and an offset. The delay at which the residual
-//! is least is the one by which the torques lag. Its standard deviation follows from the curvature
-//! of the residual there (the Gauss-Newton approximation), with the residual's own correlation.
+//! For each trial delay the torque of each joint is fitted by its own motion: inertia, viscous and
+//! Coulomb friction, gravity of one link and an offset, with one set of coefficients for all
+//! stretches of the log. Inertia and friction take power and give none: their coefficients have one
+//! sign. Without these two, a torque that depends on position (cogging) looks like any delay at one
+//! speed. The delay of the least residual is the one by which the torques lag; its standard
+//! deviation is that of the jackknife over the stretches.
 
 /// Rows that are used at most.
-const ROWS: usize = 1 << 13;
+const ROWS: usize = 1 << 14;
 /// Trial delays on each side of 0, in steps of the positions' clock.
 const TRIALS: usize = 40;
-/// Columns of the fit.
+/// Columns of the fit: acceleration, speed, a soft and a sharp step of friction, sine, cosine, 1.
 const COLUMNS: usize = 7;
-/// Share of the torque that the motion must explain for a delay to be told.
+/// Of them the first ones, that only take power.
+const PASSIVE: usize = 4;
+/// Share of the torque that the motion must explain.
 const EXPLAINED: f64 = 0.5;
+/// Least share of each direction in the squared speed: one way at one speed, a torque that depends
+/// on position cannot be told from any delay.
+const BOTH_WAYS: f64 = 0.1;
+/// Share of the gain over no delay that another minimum may reach.
+const SECOND_BEST: f64 = 0.5;
+/// Stretches of the jackknife: the most, and the least that give a deviation.
+const STRETCHES: std::ops::RangeInclusive<usize> = 3..=8;
 
 /// Rows from which a delay is estimated.
 #[derive(Debug, Default)]
@@ -21,6 +32,8 @@ pub struct DelayEstimator {
     t: Vec<f64>,
     q: Vec<f64>,
     tau: Vec<f64>,
+    /// Rows at which a new stretch begins.
+    begins: Vec<usize>,
 }
 
 /// An estimated delay of the torques behind the positions.
@@ -30,6 +43,20 @@ pub struct DelayEstimate {
     pub delay_s: f64,
     /// Its standard deviation [s].
     pub std_s: f64,
+}
+
+/// Sums of one joint over one stretch.
+#[derive(Debug, Clone, Copy)]
+struct Sums {
+    rows: f64,
+    /// Y' Y.
+    normal: [[f64; COLUMNS]; COLUMNS],
+    /// Y' tau of each trial.
+    right: [[f64; COLUMNS]; 2 * TRIALS + 1],
+    /// tau' tau of each trial.
+    power: [f64; 2 * TRIALS + 1],
+    /// Sum of the torque that is not shifted.
+    total: f64,
 }
 
 impl DelayEstimator {
@@ -46,6 +73,11 @@ impl DelayEstimator {
         self.t.push(t);
         self.q.extend(q);
         self.tau.extend(tau);
+    }
+
+    /// The next row does not follow the last one.
+    pub fn begin_stretch(&mut self) {
+        self.begins.push(self.t.len());
     }
 
     /// One sentence about the delay for the user; `removed_s` is already taken off.
@@ -66,128 +98,259 @@ impl DelayEstimator {
         }
     }
 
-    /// Estimates the delay; `None` where the motion explains too little of the torques.
+    /// Estimates the delay; `None` where the motion explains too little of the torques, or some
+    /// stretches alone decide it.
     pub fn estimate(&self) -> Option<DelayEstimate> {
-        let rows = self.t.len();
-        if rows < 8 * TRIALS {
-            return None;
-        }
         let mut steps: Vec<f64> = self.t.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
         let dt = *steps.get(steps.len() / 2)?;
         let half = ((0.01 / dt).round() as usize).clamp(1, 25);
-        let mut residuals = vec![0.0; 2 * TRIALS + 1];
-        let (mut weight, mut best_joint) = (0.0, None);
-        for joint in 0..self.joints {
-            let Some(found) = self.residuals(joint, dt, half) else {
-                continue;
-            };
-            let least = found.iter().copied().fold(f64::INFINITY, f64::min);
-            // What is left at best, of the torque's variation.
-            if least > 1.0 - EXPLAINED {
-                continue;
-            }
-            // A joint weighs by how its residual rises away from the delay.
-            let most = found.iter().copied().fold(0.0, f64::max);
-            for (sum, value) in residuals.iter_mut().zip(&found) {
-                *sum += value / least.max(1e-12);
-            }
-            weight += 1.0;
-            if best_joint.is_none_or(|best| most / least > best) {
-                best_joint = Some(most / least);
-            }
-        }
-        if weight == 0.0 {
+        let stretches = self.stretches(TRIALS + 2 * half + 2);
+        if !(dt > 0.0 && STRETCHES.contains(&stretches.len())) {
             return None;
         }
-        let least = (0..residuals.len()).min_by(|a, b| residuals[*a].total_cmp(&residuals[*b]))?;
-        // At the edge of the trials it is no minimum.
-        if least == 0 || least + 1 == residuals.len() {
-            return None;
-        }
-        let [left, middle, right] = [residuals[least - 1], residuals[least], residuals[least + 1]];
-        let curvature = left - 2.0 * middle + right;
-        if curvature <= 0.0 {
-            return None;
-        }
-        let offset = 0.5 * (left - right) / curvature;
-        let steps = least as f64 - TRIALS as f64 + offset;
-        // Smoothing makes neighbours within its width say the same.
-        let independent = rows as f64 / (2 * half + 1) as f64;
-        let std = (2.0 * middle / (curvature * independent)).sqrt();
+        let sums: Vec<Vec<Sums>> = (0..self.joints)
+            .filter_map(|joint| self.sums(joint, &stretches, dt, half))
+            .collect();
+        let delay = best_delay(&sums, None)? * dt;
+        let without: Option<Vec<f64>> = (0..stretches.len())
+            .map(|left_out| Some(best_delay(&sums, Some(left_out))? * dt))
+            .collect();
+        let without = without?;
+        let count = without.len() as f64;
+        let mean = without.iter().sum::<f64>() / count;
+        let scatter: f64 = without.iter().map(|delay| (delay - mean).powi(2)).sum();
         Some(DelayEstimate {
-            delay_s: steps * dt,
-            std_s: std * dt,
+            delay_s: delay,
+            std_s: (scatter * (count - 1.0) / count).sqrt(),
         })
     }
 
-    /// Share of one joint's torque variation that is left at each trial delay.
-    fn residuals(&self, joint: usize, dt: f64, half: usize) -> Option<Vec<f64>> {
-        let rows = self.t.len();
-        let column = |of: &[f64]| -> Vec<f64> {
-            let values = of.iter().skip(joint).step_by(self.joints);
+    /// Stretches of at least four edges, as many as the jackknife wants.
+    fn stretches(&self, edge: usize) -> Vec<std::ops::Range<usize>> {
+        let mut ends = self.begins.clone();
+        ends.push(self.t.len());
+        let mut whole = Vec::new();
+        let mut from = 0;
+        for end in ends {
+            if end - from >= 4 * edge {
+                whole.push(from..end);
+            }
+            from = end;
+        }
+        if whole.len() >= *STRETCHES.start() {
+            let stride = whole.len().div_ceil(*STRETCHES.end());
+            return whole.into_iter().step_by(stride).collect();
+        }
+        let pieces = |range: std::ops::Range<usize>| {
+            let most = STRETCHES.end().div_ceil(whole.len());
+            let count = (range.len() / (4 * edge)).clamp(1, most);
+            let step = range.len() / count;
+            (0..count).map(move |i| range.start + i * step..range.start + (i + 1) * step)
+        };
+        whole.iter().cloned().flat_map(pieces).collect()
+    }
+
+    /// Sums of one joint over each stretch; `None` for a joint that rests or does not move both ways.
+    fn sums(
+        &self,
+        joint: usize,
+        stretches: &[std::ops::Range<usize>],
+        dt: f64,
+        half: usize,
+    ) -> Option<Vec<Sums>> {
+        let of = |values: &[f64], rows: &std::ops::Range<usize>| -> Vec<f64> {
+            let values = &values[rows.start * self.joints..rows.end * self.joints];
+            let values = values.iter().skip(joint).step_by(self.joints);
             values.copied().collect()
         };
-        let twice = |x: &[f64]| smoothed(&smoothed(x, half), half);
-        // Lightly smoothed for the sign of the speed; torque and motion alike for the fit.
-        let q = smoothed(&column(&self.q), half.min(2));
-        let tau = twice(&column(&self.tau));
-        let v = derivative(&q, dt);
-        let a = derivative(&v, dt);
-        let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
-        let (v_rms, a_rms) = (rms(&v), rms(&a));
-        if v_rms == 0.0 || a_rms == 0.0 {
+        let motions: Vec<[Vec<f64>; 4]> = stretches
+            .iter()
+            .map(|rows| {
+                // lightly smoothed for the sign of the speed; torque and motion alike for the fit
+                let q = smoothed(&of(&self.q, rows), half.min(2));
+                let v = derivative(&q, dt);
+                let a = derivative(&v, dt);
+                [q, v, a, of(&self.tau, rows)]
+            })
+            .collect();
+        let rows: usize = motions.iter().map(|m| m[0].len()).sum();
+        let rms = |which: usize| {
+            let squares = motions.iter().flat_map(|m| &m[which]).map(|x| x * x);
+            (squares.sum::<f64>() / rows as f64).sqrt()
+        };
+        let (v_rms, a_rms) = (rms(1), rms(2));
+        let back = motions
+            .iter()
+            .flat_map(|m| &m[1])
+            .map(|v| v.min(0.0).powi(2));
+        let back = back.sum::<f64>() / (v_rms * v_rms * rows as f64);
+        if v_rms == 0.0 || a_rms == 0.0 || !(BOTH_WAYS..=1.0 - BOTH_WAYS).contains(&back) {
             return None;
         }
-        let of = |column: &dyn Fn(usize) -> f64| twice(&(0..rows).map(column).collect::<Vec<_>>());
-        let columns: [Vec<f64>; COLUMNS] = [
-            of(&|i| a[i] / a_rms),
-            of(&|i| v[i] / v_rms),
-            of(&|i| (10.0 * v[i] / v_rms).tanh()),
-            of(&|i| (50.0 * v[i] / v_rms).tanh()),
-            of(&|i| q[i].sin()),
-            of(&|i| q[i].cos()),
-            vec![1.0; rows],
-        ];
-        let edge = TRIALS + 2 * half + 2;
-        let used = edge..rows.checked_sub(edge).filter(|end| *end > edge)?;
-        let mean = tau[used.clone()].iter().sum::<f64>() / used.len() as f64;
-        let total: f64 = tau[used.clone()].iter().map(|x| (x - mean).powi(2)).sum();
-        if total <= 0.0 {
-            return None;
-        }
-        // The motion stays, the torques are shifted: the normal matrix is the same for all trials.
-        let mut normal = [[0.0; COLUMNS]; COLUMNS];
-        for i in 0..COLUMNS {
-            for j in 0..=i {
-                let pairs = columns[i][used.clone()]
-                    .iter()
-                    .zip(&columns[j][used.clone()]);
-                normal[i][j] = pairs.map(|(x, y)| x * y).sum();
-            }
-        }
-        let factor = cholesky(normal, used.len() as f64)?;
-        let trials = (0..=2 * TRIALS).map(|trial| {
-            let shifted = used.start + trial - TRIALS..used.end + trial - TRIALS;
-            let tau: Vec<f64> = tau[shifted].iter().map(|tau| tau - mean).collect();
-            let power: f64 = tau.iter().map(|tau| tau * tau).sum();
-            let mut right = [0.0; COLUMNS];
-            for (sum, column) in right.iter_mut().zip(&columns) {
-                let pairs = column[used.clone()].iter().zip(&tau);
-                *sum = pairs.map(|(x, tau)| x * tau).sum();
-            }
-            // |r|^2 = |tau|^2 - |L^-1 Y' tau|^2
-            for i in 0..COLUMNS {
-                for j in 0..i {
-                    right[i] -= factor[i][j] * right[j];
-                }
-                right[i] /= factor[i][i];
-            }
-            let explained: f64 = right.iter().map(|x| x * x).sum();
-            ((power - explained) / total).max(0.0)
+        let sums = motions.iter().map(|[q, v, a, tau]| {
+            let of = |column: &dyn Fn(usize) -> f64| {
+                twice(&(0..q.len()).map(column).collect::<Vec<_>>(), half)
+            };
+            let columns: [Vec<f64>; COLUMNS] = [
+                of(&|i| a[i] / a_rms),
+                of(&|i| v[i] / v_rms),
+                of(&|i| (10.0 * v[i] / v_rms).tanh()),
+                of(&|i| (50.0 * v[i] / v_rms).tanh()),
+                of(&|i| q[i].sin()),
+                of(&|i| q[i].cos()),
+                vec![1.0; q.len()],
+            ];
+            Sums::of(&columns, &twice(tau, half), TRIALS + 2 * half + 2)
         });
-        Some(trials.collect())
+        Some(sums.collect())
     }
+}
+
+impl Sums {
+    const NONE: Self = Self {
+        rows: 0.0,
+        normal: [[0.0; COLUMNS]; COLUMNS],
+        right: [[0.0; COLUMNS]; 2 * TRIALS + 1],
+        power: [0.0; 2 * TRIALS + 1],
+        total: 0.0,
+    };
+
+    /// The motion stays and the torques are shifted, so that all trials have one normal matrix.
+    fn of(columns: &[Vec<f64>; COLUMNS], tau: &[f64], edge: usize) -> Self {
+        let mut sums = Self::NONE;
+        for row in edge..tau.len() - edge {
+            sums.rows += 1.0;
+            sums.total += tau[row];
+            for i in 0..COLUMNS {
+                for j in 0..=i {
+                    sums.normal[i][j] += columns[i][row] * columns[j][row];
+                }
+            }
+            for trial in 0..=2 * TRIALS {
+                let tau = tau[row + trial - TRIALS];
+                sums.power[trial] += tau * tau;
+                for (sum, column) in sums.right[trial].iter_mut().zip(columns) {
+                    *sum += column[row] * tau;
+                }
+            }
+        }
+        sums
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.rows += other.rows;
+        self.total += other.total;
+        for (sum, value) in self.power.iter_mut().zip(&other.power) {
+            *sum += value;
+        }
+        let rows = self.normal.iter_mut().chain(&mut self.right);
+        for (sum, value) in rows.zip(other.normal.iter().chain(&other.right)) {
+            for (sum, value) in sum.iter_mut().zip(value) {
+                *sum += value;
+            }
+        }
+    }
+
+    /// Share of the torque's variation that is left at each trial.
+    fn left(&self) -> Option<Vec<f64>> {
+        let variation = self.power[TRIALS] - self.total * self.total / self.rows;
+        if variation <= 0.0 {
+            return None;
+        }
+        // the columns of each subset of the passive ones, with those of any sign
+        let subsets: Vec<(Vec<usize>, [[f64; COLUMNS]; COLUMNS])> = (0..1usize << PASSIVE)
+            .filter_map(|subset| {
+                let taken = |column: &usize| *column >= PASSIVE || subset >> column & 1 == 1;
+                let columns: Vec<usize> = (0..COLUMNS).filter(taken).collect();
+                let factor = cholesky(&self.normal, &columns, self.rows)?;
+                Some((columns, factor))
+            })
+            .collect();
+        let left = |sign: f64| -> Vec<f64> {
+            let trials = self.right.iter().zip(&self.power).map(|(right, power)| {
+                let explained = subsets
+                    .iter()
+                    .filter_map(|(columns, factor)| explained(columns, factor, right, sign));
+                let most = explained.fold(0.0, f64::max);
+                ((power - most) / variation).max(0.0)
+            });
+            trials.collect()
+        };
+        // a torque whose sign is turned has its delay too
+        let least = |left: &[f64]| left.iter().copied().fold(f64::INFINITY, f64::min);
+        let (ahead, turned) = (left(1.0), left(-1.0));
+        Some(if least(&turned) < least(&ahead) {
+            turned
+        } else {
+            ahead
+        })
+    }
+}
+
+/// The delay in steps at which all joints together leave least, without one stretch if asked.
+fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
+    let mut residuals = [0.0; 2 * TRIALS + 1];
+    let mut any = false;
+    for stretches in joints {
+        let mut sums = Sums::NONE;
+        for (index, stretch) in stretches.iter().enumerate() {
+            if Some(index) != left_out {
+                sums.add(stretch);
+            }
+        }
+        let Some(left) = sums.left() else { continue };
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+        if least > 1.0 - EXPLAINED {
+            continue;
+        }
+        any = true;
+        // a joint weighs by how its residual rises away from the delay
+        for (sum, value) in residuals.iter_mut().zip(&left) {
+            *sum += value / least.max(1e-12);
+        }
+    }
+    let least = (0..residuals.len()).min_by(|a, b| residuals[*a].total_cmp(&residuals[*b]))?;
+    // at the edge of the trials it is no minimum
+    if !any || least == 0 || least + 1 == residuals.len() {
+        return None;
+    }
+    // as good at another delay: a motion of one frequency tells it up to whole periods
+    let gain = |trial: usize| residuals[TRIALS] - residuals[trial];
+    let minimum = |trial: &usize| {
+        let higher = |other: Option<&f64>| other.is_none_or(|other| *other >= residuals[*trial]);
+        higher(residuals[..*trial].last()) && higher(residuals.get(trial + 1))
+    };
+    let mut others = (0..residuals.len()).filter(|trial| *trial != least && minimum(trial));
+    if others.any(|other| gain(other) > SECOND_BEST * gain(least)) {
+        return None;
+    }
+    let [before, middle, after] = [residuals[least - 1], residuals[least], residuals[least + 1]];
+    let curvature = before - 2.0 * middle + after;
+    (curvature > 0.0).then(|| least as f64 - TRIALS as f64 + 0.5 * (before - after) / curvature)
+}
+
+/// Power that these columns explain, |L^-1 Y' tau|^2; `None` where a passive one would drive.
+fn explained(
+    columns: &[usize],
+    factor: &[[f64; COLUMNS]; COLUMNS],
+    right: &[f64; COLUMNS],
+    sign: f64,
+) -> Option<f64> {
+    let mut x = [0.0; COLUMNS];
+    for (i, column) in columns.iter().enumerate() {
+        let known: f64 = (0..i).map(|j| factor[i][j] * x[j]).sum();
+        x[i] = (right[*column] - known) / factor[i][i];
+    }
+    let explained = x[..columns.len()].iter().map(|x| x * x).sum();
+    for i in (0..columns.len()).rev() {
+        let known: f64 = (i + 1..columns.len()).map(|j| factor[j][i] * x[j]).sum();
+        x[i] = (x[i] - known) / factor[i][i];
+        if columns[i] < PASSIVE && sign * x[i] < 0.0 {
+            return None;
+        }
+    }
+    Some(explained)
 }
 
 /// Mean over `half` neighbours on each side.
@@ -209,24 +372,34 @@ fn derivative(x: &[f64], dt: f64) -> Vec<f64> {
     out
 }
 
-/// Lower Cholesky factor of a normal matrix of `rows` rows, with a ridge far below what is measured.
-fn cholesky(mut m: [[f64; COLUMNS]; COLUMNS], rows: f64) -> Option<[[f64; COLUMNS]; COLUMNS]> {
-    for i in 0..COLUMNS {
-        m[i][i] += 1e-9 * rows;
+/// The mean of means: a triangular window.
+fn twice(x: &[f64], half: usize) -> Vec<f64> {
+    smoothed(&smoothed(x, half), half)
+}
+
+/// Lower Cholesky factor of these columns' normal matrix, with a ridge far below what is measured.
+fn cholesky(
+    normal: &[[f64; COLUMNS]; COLUMNS],
+    columns: &[usize],
+    rows: f64,
+) -> Option<[[f64; COLUMNS]; COLUMNS]> {
+    let mut factor = [[0.0; COLUMNS]; COLUMNS];
+    for i in 0..columns.len() {
         for j in 0..=i {
-            let known: f64 = (0..j).map(|k| m[i][k] * m[j][k]).sum();
-            let sum = m[i][j] - known;
+            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
+            let mut sum = normal[columns[i]][columns[j]] - known;
             if i == j {
+                sum += 1e-9 * rows;
                 if sum <= 0.0 {
                     return None;
                 }
-                m[i][i] = sum.sqrt();
+                factor[i][i] = sum.sqrt();
             } else {
-                m[i][j] = sum / m[j][j];
+                factor[i][j] = sum / factor[j][j];
             }
         }
     }
-    Some(m)
+    Some(factor)
 }
 
 #[cfg(test)]
@@ -283,5 +456,31 @@ mod tests {
                 .describe("/a", "/b", 0.0)
                 .contains("cannot be determined")
         );
+    }
+
+    /// A slow drive whose torque ripples with position at constant speed, its controller in phase.
+    fn rippling(both_ways: bool) -> DelayEstimator {
+        let mut delay = DelayEstimator::default();
+        let dt = 0.004;
+        for i in 0..8000 {
+            let t = i as f64 * dt;
+            let way = if both_ways && t > 16.0 { -1.0 } else { 1.0 };
+            let q = if way > 0.0 { t } else { 32.0 - t };
+            // the position follows the ripple a quarter of a period late
+            let q = q + 1e-3 * (42.0 * q).cos() * way;
+            let tau = 0.3 * way + 0.4 * (42.0 * q).sin();
+            delay.add(t, &[q], &[tau]);
+        }
+        delay
+    }
+
+    #[test]
+    fn a_torque_that_ripples_with_position_is_no_delay() {
+        for both_ways in [false, true] {
+            let found = rippling(both_ways).estimate();
+            let claims =
+                |found: DelayEstimate| found.delay_s.abs() > 0.008_f64.max(6.0 * found.std_s);
+            assert!(!found.is_some_and(claims), "{both_ways}: {found:?}");
+        }
     }
 }

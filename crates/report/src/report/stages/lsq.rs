@@ -11,8 +11,8 @@ use cft_ident_core::verdict::{IDENTIFIED, Verdict, WEAK};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_stages::identify::{
-    Account, ConsistentLinks, FrictionOfFit, Gain, IdentifiedDynamics, JointAccount, LoggedRobot,
-    MotionFit,
+    Account, ConsistentLinks, FrictionOfFit, Gain, IdentifiedDynamics, JointAccount, JointResidual,
+    LoggedRobot, MotionFit,
 };
 use cft_ident_stages::replay::Replayed;
 
@@ -132,7 +132,7 @@ const NEXT: &str = "Next: `cft-ident validate` on a log that was not fitted, for
 
 /// The error of the fit, how good that is and whether the model can be used; and whether nothing calls for attention.
 fn words(of: &Lsq) -> (String, bool) {
-    let joints = &of.found.joints;
+    let joints: Vec<&JointResidual> = of.found.joints.iter().filter(|j| j.moves()).collect();
     let square: f64 = joints.iter().map(|j| j.relative_error.powi(2)).sum();
     let rms = (square / joints.len().max(1) as f64).sqrt();
     let unusual = rms > usual::range(usual::Measured::Currents)[1];
@@ -147,6 +147,13 @@ fn words(of: &Lsq) -> (String, bool) {
         ),
         None => format!("The fit leaves {rms} of the torque."),
     };
+    text += &super::validate::still(
+        of.found
+            .joints
+            .iter()
+            .filter(|j| !j.moves())
+            .map(|j| &*j.joint),
+    );
     text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
     let useless = joints.iter().filter(|j| j.relative_error >= 1.0);
     let useless: Vec<&str> = useless.map(|j| j.joint.as_str()).collect();
@@ -183,13 +190,14 @@ const LEAST: f64 = 0.05;
 /// Joints whose error is far above those of the others, as a sentence.
 fn far_off(found: &IdentifiedDynamics) -> Option<String> {
     let error = |j: usize| found.joints[j].relative_error;
+    let moving = || (0..found.joints.len()).filter(|j| found.joints[*j].moves());
     let median = |without: usize| {
-        let others = (0..found.joints.len()).filter(|k| *k != without);
+        let others = moving().filter(|k| *k != without);
         let mut errors: Vec<f64> = others.map(error).collect();
         errors.sort_by(f64::total_cmp);
         errors.get(errors.len() / 2).copied()
     };
-    let far = (0..found.joints.len()).filter_map(|j| {
+    let far = moving().filter_map(|j| {
         let median = median(j)?;
         (error(j) > LEAST && error(j) > FAR * median).then(|| {
             format!(
@@ -220,7 +228,10 @@ pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics, joints: &[usiz
             joint.joint.as_str(),
             &number::percent(joint.relative_error),
             &torque(joint.rmse),
-            &torque(*rms),
+            &match joint.moves() {
+                true => torque(*rms),
+                false => number::ABSENT.to_owned(),
+            },
             joint.unit,
         ]);
     }

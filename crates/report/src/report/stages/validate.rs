@@ -200,13 +200,23 @@ fn at_rest(of: &TorqueErrors) -> Option<String> {
     })
 }
 
+/// The joints that stand still, which count in no error.
+pub(super) fn still<'a>(joints: impl Iterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = joints.collect();
+    match names.as_slice() {
+        [] => String::new(),
+        [one] => format!(" {one} stands still and is not counted."),
+        all => format!(" {} stand still and are not counted.", all.join(", ")),
+    }
+}
+
 /// The verdict in words, and whether nothing calls for attention.
 pub fn words(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, bool) {
     let mut text = format!(
         "The model misses {} of the torque of {title}",
         number::percent(of.overall.mean_relative_error)
     );
-    let joints = of.joints.iter();
+    let joints = of.joints.iter().filter(|e| e.moves());
     if let Some(worst) = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))
         && of.joints.len() > 1
     {
@@ -221,13 +231,14 @@ pub fn words(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, boo
         );
     }
     text += ".";
+    text += &still(of.joints.iter().filter(|e| !e.moves()).map(|e| &*e.joint));
     let Some(limit) = limit else {
         return (text, true);
     };
     let beyond: Vec<&str> = of
         .joints
         .iter()
-        .filter(|e| e.relative_error.is_nan() || e.relative_error > limit)
+        .filter(|e| e.moves() && (e.relative_error.is_nan() || e.relative_error > limit))
         .map(|e| e.joint.as_str())
         .collect();
     match beyond.as_slice() {
