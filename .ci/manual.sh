@@ -1,16 +1,18 @@
 #!/bin/bash
 # Runs the commands of the manual: the ```sh blocks of each page, one after the other, in a folder of
 # the page's own.
-#   .ci/manual.sh TOOL [PAGE...]        (pages: README.md, docs/*.md and docs/measured/*.md where absent)
-# `cargo` stands for the build that is there already. A page whose logs are not there is skipped aloud.
+#   .ci/manual.sh TOOL [PAGE...]        (pages: README.md, those of docs and docs/measured, and examples/README.md where
+#                                        absent)
+# `cargo` stands for the build that is there already, examples for those beside TOOL. A page whose logs are not there is skipped aloud.
 set -u
 tool=$(realpath "${1:?the built cft-ident}") || exit 1
 shift
 cd "$(dirname "$0")/.." || exit 1
 repository=$PWD
 pages=("$@")
-[ ${#pages[@]} -gt 0 ] || pages=(README.md docs/*.md docs/measured/*.md)
+[ ${#pages[@]} -gt 0 ] || pages=(README.md docs/*.md docs/measured/*.md examples/README.md)
 
+export CFT_IDENT_EXAMPLES=${tool%/*}/examples
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/bin" "$work/pages"
@@ -21,6 +23,7 @@ cat > "$work/bin/cargo" <<'END'
 case "$*" in
   "build --release" | "test") echo "(cargo $*: done by other steps)" ;;
   "run --release -- "*) shift 3; exec cft-ident "$@" ;;
+  "run --release --example "*) name=$4; shift 5; exec "$CFT_IDENT_EXAMPLES/$name" "$@" ;;
   "run --release -p cft-ident-studies "*) echo "(cargo $*: a study, which takes long; not run)" ;;
   *) echo "cargo $*: not known to .ci/manual.sh" >&2; exit 1 ;;
 esac
@@ -36,12 +39,7 @@ for page in "${pages[@]}"; do
   [ -n "$script" ] || continue
   echo
   if [[ $script == *../shared/* && ! -e $work/pages/shared ]]; then
-    echo "== manual: $page SKIPPED, ../shared/data is not there (docs/data.md says where it is from)"
-    skipped+=("$page")
-    continue
-  fi
-  if [ "$page" = docs/robots.md ]; then
-    echo "== manual: $page SKIPPED, its commands are about the reader's own robot (tests/ runs the like)"
+    echo "== manual: $page SKIPPED, ../shared/data is not there (docs/measured/data.md says where it is from)"
     skipped+=("$page")
     continue
   fi

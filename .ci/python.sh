@@ -39,6 +39,24 @@ else
   echo "SKIPPED: mypy cannot be installed: $(tail -n 1 "$work/pip.log")"
 fi
 
+# the programs to copy
+(
+  cd "$work"
+  "$installed" example cft -q
+  "$installed" lsq ur10/ur10.csv@0..70% -r ur10/ur10.toml -o model.toml -q
+  while read -r program arguments; do
+    echo "$program.py"
+    # shellcheck disable=SC2086
+    timeout 120 python "$OLDPWD/examples/$program.py" $arguments < /dev/null
+  done << 'END'
+identify_arm ur10/ur10.toml ur10/ur10.csv refined.toml
+joint_friction cft/robot.toml friction.toml cft/q4.csv cft/q5.csv
+payload model.toml ur10/ur10.csv@70..100%
+compensation model.toml
+fleet ur10/ur10.toml ur10/ur10.csv@0..50% ur10/ur10.csv@50..100%
+END
+)
+
 CFT_IDENT=$tool timeout 600 pytest -q -rs -p no:cacheprovider python/tests
 
 if pip install -q nbclient ipykernel > "$work/pip.log" 2>&1; then

@@ -171,7 +171,7 @@ fn both_models_are_judged_on_the_same_rows_as_validate_judges_them() {
     tool(at, "compare a.toml b.toml log.csv")
         .assert()
         .code(0)
-        .stdout(contains("A is closer on these logs"));
+        .stdout(contains("a.toml is closer on these logs"));
     // a model beside itself differs in nothing
     let same = json(at, "compare a.toml a.toml log.csv");
     assert_eq!(same["logs"]["joints"][0]["difference"], 0.0);
@@ -222,7 +222,7 @@ fn the_tables_fit_80_columns_and_the_pictures_are_written() {
         assert!(line.chars().count() <= 80, "{line}");
     }
     let svg = fs::read_to_string(at.join("c.svg")).unwrap();
-    assert!(svg.contains("A: a.toml") && svg.contains("B: b.toml"));
+    assert!(svg.contains("a.toml") && svg.contains("b.toml"));
     assert!(fs::read(at.join("c.png")).unwrap().starts_with(b"\x89PNG"));
     let page = fs::read_to_string(at.join("c.html")).unwrap();
     for part in [

@@ -1,10 +1,10 @@
 //! The documents say what the results say, and point to what is there.
 
-#[path = "../../examples/docs_tables/arms.rs"]
+#[path = "../../crates/studies/examples/docs_tables/arms.rs"]
 mod arms;
-#[path = "../../examples/docs_tables/blocks.rs"]
+#[path = "../../crates/studies/examples/docs_tables/blocks.rs"]
 mod blocks;
-#[path = "../../examples/docs_tables/tables.rs"]
+#[path = "../../crates/studies/examples/docs_tables/tables.rs"]
 mod tables;
 
 use std::fs;
@@ -23,7 +23,7 @@ fn every_table_is_that_of_its_result() {
             .unwrap_or_else(|problem| panic!("{name}: {problem}"));
         assert!(
             anew == text,
-            "{name} is not that of docs/results: cargo run --example docs_tables"
+            "{name} is not that of docs/results: cargo run -p cft-ident-studies --example docs_tables"
         );
     }
 }
@@ -73,15 +73,15 @@ fn links(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn the_page_tells_of_every_effect_whose_numbers_have_a_range() {
-    let page = fs::read_to_string(root().join("docs/closing-the-loop.md")).unwrap();
+fn the_page_has_every_effect_whose_numbers_have_a_range() {
+    let page = fs::read_to_string(root().join("docs/diagnosis.md")).unwrap();
     let (_, rest) = page.split_once("## What a name must satisfy").unwrap();
     let (section, _) = rest.split_once("\n## ").unwrap();
     let rows = section.lines().filter(|line| line.starts_with("| "));
     let names = rows
         .skip(2)
         .flat_map(|row| row.split('|').nth(1).unwrap().split(','));
-    let told: Vec<&str> = names.map(str::trim).collect();
+    let named: Vec<&str> = names.map(str::trim).collect();
     let mut held: Vec<&str> = cft_ident::effect::LAWS
         .iter()
         .filter(|law| !law.entry.must.is_empty())
@@ -89,9 +89,9 @@ fn the_page_tells_of_every_effect_whose_numbers_have_a_range() {
         .collect();
     held.dedup();
     for name in &held {
-        assert!(told.contains(name), "{name} is not mentioned");
+        assert!(named.contains(name), "{name} is not mentioned");
     }
-    assert_eq!(told.len(), held.len(), "{told:?}");
+    assert_eq!(named.len(), held.len(), "{named:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Monte Carlo study of whole campaigns: four one-joint logs, one identification log, one unseen
 //! log, on plants whose parameters vary by 15 %, with encoder quantisation and 1 % torque noise.
 //!
-//! `cargo run --release --example study_campaign -- [SEEDS] [FOLDER]` writes one line per seed to
+//! `cargo run --release -p cft-ident-studies --example study_campaign -- [SEEDS] [FOLDER]` writes one line per seed to
 //! target/study_campaign.jsonl as it goes (so that a stopped study goes on where it was) and, at
 //! the end, into FOLDER the summaries that docs/studies.md is generated from.
 

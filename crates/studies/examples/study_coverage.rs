@@ -1,6 +1,6 @@
 //! Whether the intervals of `lsq` cover, by log length, number of logs and correlation of the residual.
 //!
-//! `cargo run --release --example study_coverage -- [SEEDS] [FOLDER]` writes one line per seed to
+//! `cargo run --release -p cft-ident-studies --example study_coverage -- [SEEDS] [FOLDER]` writes one line per seed to
 //! target/study_coverage.jsonl as it goes and, at the end, FOLDER/study_coverage.json. The torque is that of the
 //! declared model along random multisines, with a disturbance whose correlation falls to 1/e in a tenth of a second or
 //! in a second; a slide, and the six joints of a UR10. The intervals are those of reduced logs; the last

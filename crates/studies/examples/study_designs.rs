@@ -1,8 +1,8 @@
 //! Condition numbers that designs reach within each set-up's limits, beside Table 3 of the report:
 //! N = 4, 0.4 Hz, 4000 revolutions per minute of every motor, 10 V, what `excite` does by default.
 //!
-//! `cargo run --example study_designs -- [FOLDER]` writes into FOLDER the summary that
-//! docs/excitation.md is generated from. It takes a minute or two on two cores.
+//! `cargo run -p cft-ident-studies --example study_designs -- [FOLDER]` writes into FOLDER the summary that
+//! docs/studies.md is generated from. It takes a minute or two on two cores.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -76,7 +76,7 @@ fn main() {
     }
     let document = json!({
         "study": "condition numbers of designs and of Table 3",
-        "command": "cargo run --example study_designs",
+        "command": "cargo run -p cft-ident-studies --example study_designs",
         "rows": rows,
     });
     let path = folder.join("study_designs.json");

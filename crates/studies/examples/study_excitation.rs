@@ -5,9 +5,9 @@
 //! Both logs are 40 s long, have the same friction to work with (from the same four one-joint logs)
 //! and the same noise: 1 % of each joint's rms torque along Table 3. A third log has 1 % of its own.
 //!
-//! `cargo run --release --example study_excitation -- [SEEDS] [FOLDER]` writes one line per seed to
+//! `cargo run --release -p cft-ident-studies --example study_excitation -- [SEEDS] [FOLDER]` writes one line per seed to
 //! target/study_excitation.jsonl as it goes and, at the end, into FOLDER the summary that
-//! docs/excitation.md is generated from.
+//! docs/studies.md is generated from.
 
 mod study;
 

@@ -6,9 +6,9 @@
 //! of two linear formulations on the same rows, with the channels among the columns: least squares, and
 //! total least squares (Gautier and Briot 2014).
 //!
-//! `cargo run --release --example study_gains -- [RUNS] [FOLDER]` writes one line per run to
+//! `cargo run --release -p cft-ident-studies --example study_gains -- [RUNS] [FOLDER]` writes one line per run to
 //! target/study_gains.jsonl as it goes and, at the end, into FOLDER the summary that
-//! docs/how-to-currents.md is generated from.
+//! docs/studies.md is generated from.
 
 #[path = "../../../tests/program/currents_arm/mod.rs"]
 mod currents_arm;

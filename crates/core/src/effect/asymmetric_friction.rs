@@ -23,12 +23,17 @@ pub static ENTRY: Entry = Entry {
             false => "forward",
         };
         // the two halves are found apart, and either may be nothing
-        let (key, kind) = match f.value("coulomb") == 0.0 {
-            true => ("viscous", "viscous friction"),
-            false => ("coulomb", "friction"),
-        };
-        let (size, way) = (f.size(key), way(key));
-        format!("{kind} of {} that is {size} higher {way}", f.at)
+        let part = |key: &str| format!("{} higher {}", f.size(key), way(key));
+        match ["coulomb", "viscous"].map(|key| f.value(key) == 0.0) {
+            [true, _] => format!("viscous friction of {} that is {}", f.at, part("viscous")),
+            [_, true] => format!("friction of {} that is {}", f.at, part("coulomb")),
+            _ => format!(
+                "friction of {} that differs by direction (Coulomb {}, viscous {})",
+                f.at,
+                part("coulomb"),
+                part("viscous")
+            ),
+        }
     },
     remedy: "look for a seal, a brake or a gear that rubs in one direction; the refined model compensates it",
     ..Entry::USUAL

@@ -96,6 +96,19 @@ pub fn range(measured: Measured) -> [f64; 2] {
     })
 }
 
+/// Least and largest error that is usual where torques are these; of both kinds where a log does not say how its torques were
+/// measured.
+pub fn band(torque_is: Option<TorqueIs>) -> [f64; 2] {
+    let currents = range(Measured::Currents);
+    match torque_is {
+        Some(TorqueIs::Motor | TorqueIs::Current | TorqueIs::Commanded) => currents,
+        Some(TorqueIs::Joint) | None => {
+            let sensors = range(Measured::Sensors);
+            [sensors[0].min(currents[0]), sensors[1].max(currents[1])]
+        }
+    }
+}
+
 /// How large errors usually are, in a sentence; of both kinds where a log does not say how its torques were measured.
 pub fn words(torque_is: Option<TorqueIs>) -> String {
     let percent = |measured| {

@@ -85,7 +85,7 @@ pub fn write_summary(
 ) {
     let document = json!({
         "study": title,
-        "command": format!("cargo run --release --example {command} -- {seeds}"),
+        "command": format!("cargo run --release -p cft-ident-studies --example {command} -- {seeds}"),
         "seeds": seeds,
         "rows": rows,
     });

@@ -4,9 +4,9 @@
 //! Measured machines: three rotations each, two thirds of the data fitted and the last third scored. Simulated: the
 //! CFT robot on motions whose phases the fit did not see.
 //!
-//! `cargo run --release --example study_bands -- [SEEDS] [FOLDER]` writes one line per machine and per minute of
+//! `cargo run --release -p cft-ident-studies --example study_bands -- [SEEDS] [FOLDER]` writes one line per machine and per minute of
 //! simulated motion to target/study_bands.jsonl as it goes, so that a stopped study goes on where it was, and at the
-//! end the summaries into FOLDER that docs/how-to-watch.md is generated from.
+//! end the summaries into FOLDER that docs/studies.md is generated from.
 
 mod forces;
 mod machines;
@@ -37,7 +37,8 @@ fn main() {
     let simulated: Vec<Value> = (0..minutes)
         .filter_map(|seed| done.once(&format!("minute {seed}"), &|| Some(campaign.minute(seed))))
         .collect();
-    let command = format!("cargo run --release --example study_bands -- {minutes}");
+    let command =
+        format!("cargo run --release -p cft-ident-studies --example study_bands -- {minutes}");
     let mut bands: Vec<Value> = measured.iter().map(machines::band_row).collect();
     bands.extend(simulated::merged(&simulated).iter().map(machines::band_row));
     write(

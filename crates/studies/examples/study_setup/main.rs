@@ -1,5 +1,5 @@
 //! Faults of the set-up, made one at a time on measured and simulated machines, and what the tool says
-//! of each: `cargo build --release && cargo run --release --example study_setup -- [MACHINE...] [--kind=KIND]`.
+//! of each: `cargo build --release && cargo run --release -p cft-ident-studies --example study_setup -- [MACHINE...] [--kind=KIND]`.
 //!
 //! Each case leaves its line in target/study_setup/rows.jsonl as soon as it is done: a stopped study
 //! goes on where it was. `--again` begins anew. `--every=K` takes a sample, every K-th case of each machine from a

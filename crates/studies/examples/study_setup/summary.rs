@@ -139,7 +139,7 @@ pub fn summary(rows: &[Value], all: usize) -> Value {
     let seconds: f64 = rows.iter().filter_map(|r| r["seconds"].as_f64()).sum();
     json!({
         "study": "faults of the set-up",
-        "command": "cargo build --release && cargo run --release --example study_setup",
+        "command": "cargo build --release && cargo run --release -p cft-ident-studies --example study_setup",
         "sample": {"cases": rows.len(), "of": all},
         "all": Count::of(faults.iter().copied()).json(),
         "kinds": kinds,

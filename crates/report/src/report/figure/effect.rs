@@ -28,7 +28,7 @@ const ROWS: usize = 700;
 /// Height of a panel [px].
 const HEIGHT: f64 = 180.0;
 const WITHOUT: &str = "residual without the effect";
-const TORQUE: &str = "torque of the effect, as fitted";
+const TORQUE: &str = "torque of the effect, as written";
 const WITH: &str = "residual with it";
 
 impl EffectFigure {

@@ -28,14 +28,18 @@ pub struct ErrorFigure {
     /// Heading: what the errors are of.
     pub title: String,
     /// Names of the two bars of a joint: of models, or of data.
-    pub names: [&'static str; 2],
+    pub names: [String; 2],
     pub joints: Vec<JointBars>,
     /// Largest error that is wanted, as a fraction.
     pub limit: Option<f64>,
+    /// Least and largest error that is usual, as fractions.
+    pub usual: Option<[f64; 2]>,
 }
 
 const WIDTH: f64 = 440.0;
 const TOP: f64 = 62.0;
+/// Room for a second line of the legend [px].
+const LINE: f64 = 18.0;
 /// Height of one bar, and of the room below a joint's bars [px].
 const BAR: f64 = 13.0;
 const APART: f64 = 12.0;
@@ -49,7 +53,9 @@ impl ErrorFigure {
         let compared = self.joints.iter().any(|joint| joint.before.is_some());
         let rows = if compared { 2.0 } else { 1.0 };
         let pitch = rows * BAR + APART;
-        let height = TOP + pitch * self.joints.len() as f64 + 34.0;
+        let top = TOP + if self.usual.is_some() { LINE } else { 0.0 };
+        let bottom = top + pitch * self.joints.len() as f64;
+        let height = bottom + 34.0;
         let mut svg = Svg::new(WIDTH, height, &self.title, &self.words());
         svg.text(
             [14.0, 22.0],
@@ -58,8 +64,8 @@ impl ErrorFigure {
         );
         let mut keys = Vec::new();
         if compared {
-            keys.push((Key::Patch(colour::VERMILLION), self.names[0]));
-            keys.push((Key::Patch(colour::BLUE), self.names[1]));
+            keys.push((Key::Patch(colour::VERMILLION), self.names[0].as_str()));
+            keys.push((Key::Patch(colour::BLUE), self.names[1].as_str()));
         } else {
             keys.push((Key::Patch(colour::BLUE), "error"));
         }
@@ -80,17 +86,24 @@ impl ErrorFigure {
         let room = WIDTH - left - NUMBERS;
         let most = self.most();
         let x = |error: f64| left + room * (error / most).clamp(0.0, 1.0);
-        let bottom = TOP + pitch * self.joints.len() as f64;
+        if let Some(usual) = self.usual {
+            let name = usual_words(usual);
+            let key = (Key::Patch(colour::COVERED), name.as_str());
+            legend::draw(&mut svg, [14.0, 44.0 + LINE], &[key]);
+            let [from, to] = usual.map(x);
+            let band = [from, top - 4.0, to - from, bottom - top + 4.0];
+            svg.rect(band, colour::COVERED, None);
+        }
         for (error, text) in ticks(most) {
             let grid = Stroke::solid(colour::GRID, 1.0);
-            svg.line([x(error), TOP - 4.0], [x(error), bottom], grid);
+            svg.line([x(error), top - 4.0], [x(error), bottom], grid);
             let style = Type::new(10.5, Anchor::Middle).muted();
             svg.text([x(error), bottom + 15.0], &text, style);
         }
         for (k, joint) in self.joints.iter().enumerate() {
-            let top = TOP + pitch * k as f64;
+            let row_top = top + pitch * k as f64;
             let name = fitted(&joint.joint, SIZE, left - 26.0);
-            let middle = top + 0.5 * rows * BAR + 4.0;
+            let middle = row_top + 0.5 * rows * BAR + 4.0;
             svg.text([left - 10.0, middle], &name, Type::new(SIZE, Anchor::End));
             let bars = [
                 (joint.before, colour::VERMILLION),
@@ -100,7 +113,7 @@ impl ErrorFigure {
                 .into_iter()
                 .filter_map(|(bar, fill)| Some((bar?, fill)));
             for (row, (bar, fill)) in bars.enumerate() {
-                let y = top + BAR * row as f64;
+                let y = row_top + BAR * row as f64;
                 svg.rect([left, y, x(bar.error) - left, BAR - 2.0], fill, None);
                 let mut end = x(bar.error);
                 if let Some([low, high]) = bar.interval_95 {
@@ -123,10 +136,10 @@ impl ErrorFigure {
             }
         }
         if let Some(limit) = self.limit {
-            svg.line([x(limit), TOP - 4.0], [x(limit), bottom], wanted);
+            svg.line([x(limit), top - 4.0], [x(limit), bottom], wanted);
         }
         let axis = Stroke::solid(colour::FRAME, 1.0);
-        svg.line([left, TOP - 4.0], [left, bottom], axis);
+        svg.line([left, top - 4.0], [left, bottom], axis);
         svg.finish()
     }
 
@@ -135,7 +148,8 @@ impl ErrorFigure {
         let bars = self.joints.iter();
         let bars = bars.flat_map(|joint| joint.before.into_iter().chain([joint.after]));
         let ends = bars.flat_map(|bar| [Some(bar.error), bar.interval_95.map(|[_, high]| high)]);
-        let all = ends.flatten().chain(self.limit);
+        let usual = self.usual.map(|[_, most]| most);
+        let all = ends.flatten().chain(self.limit).chain(usual);
         let most = all.filter(|x| x.is_finite()).fold(0.0, f64::max);
         if most > 0.0 { 1.02 * most } else { 1.0 }
     }
@@ -157,8 +171,16 @@ impl ErrorFigure {
         let limit = self.limit.map_or(String::new(), |limit| {
             format!("; limit {}", number::percent(limit))
         });
-        format!("Relative torque error: {}{limit}", joints.join("; "))
+        let usual = self.usual.map(|usual| format!("; {}", usual_words(usual)));
+        let usual = usual.unwrap_or_default();
+        format!("Relative torque error: {}{limit}{usual}", joints.join("; "))
     }
+}
+
+/// `usual: 3.1 to 13 %`.
+fn usual_words(usual: [f64; 2]) -> String {
+    let [least, most] = usual.map(|error| number::significant(100.0 * error, 2));
+    format!("usual: {least} to {most} %")
 }
 
 /// `5.17 % (4.25..6.11)`.
@@ -201,13 +223,14 @@ mod tests {
         };
         ErrorFigure {
             title: "held-out error".into(),
-            names: ["before", "after"],
+            names: ["before", "after"].map(str::to_owned),
             joints: vec![JointBars {
                 joint: "q1".into(),
                 before: Some(bar(0.146)),
                 after: bar(after),
             }],
             limit: Some(0.1),
+            usual: Some([0.031, 0.129]),
         }
     }
 
@@ -220,6 +243,7 @@ mod tests {
             "14.6 %",
             "5.00 % (4.00..6.00)",
             "limit 10",
+            "usual: 3.1 to 13 %",
         ] {
             assert!(svg.contains(part), "{part}: {svg}");
         }

@@ -46,8 +46,8 @@ const ROWS: usize = 500;
 
 /// Told apart by dashes as well as by colour.
 const STROKES: [Stroke; 2] = [
-    Stroke::solid(colour::BLUE, 1.8),
-    Stroke::dashed(colour::VERMILLION, 1.6, "7 3"),
+    Stroke::solid(colour::VERMILLION, 1.8),
+    Stroke::dashed(colour::BLUE, 1.6, "7 3"),
 ];
 
 impl OverlayFigure {

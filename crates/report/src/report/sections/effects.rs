@@ -8,19 +8,34 @@ use cft_ident_core::number::{self, MILLIMETRES};
 use cft_ident_stages::identify::LoggedRobot;
 use cft_ident_stages::replay::EffectRows;
 
-/// The card of an effect of `model` with what is said of it besides, over logs that are called `data`.
+/// What a card says besides its picture.
+pub struct Said {
+    pub title: String,
+    pub words: Vec<String>,
+    /// Why nothing is gained by the effect, where that is so.
+    pub no_gain: Option<String>,
+}
+
+/// Part of the residual's rms that an effect takes away at least, where its card is not folded.
+const GAIN: f64 = 0.01;
+
+/// The card of an effect of `model`, over logs that are called `data`; folded away where these logs gain little by it.
 pub fn card(
     page: &mut Writer,
     (machine, model): (&LoggedRobot, &AugmentedModel),
     of: &EffectRows,
-    said: Vec<String>,
+    Said {
+        title,
+        words: said,
+        no_gain,
+    }: Said,
     data: &str,
 ) {
     let effect = &model.effects[of.effect];
     let robot = &machine.robot;
     let joint = &robot.joint_names()[of.joint];
     let unit = machine.file.torque_unit(of.joint);
-    let own = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+    let [rms_without, rms_with] = of.rms;
     let [without, with] = of
         .rms
         .map(|rms| format!("{} {unit}", number::significant(rms, 3)));
@@ -38,7 +53,7 @@ pub fn card(
         false => "",
     };
     let figure = EffectFigure {
-        title: effect.said_and_named(robot, own),
+        title: title.clone(),
         told: told.clone(),
         over,
         of: (format!("{torque}{along}"), unit.to_owned()),
@@ -49,5 +64,14 @@ pub fn card(
     let mut words = vec![told];
     words.push(format!("What to do: {}.", effect.law.entry.remedy));
     words.extend(said);
-    page.figures(&figure.cells(words));
+    let cells = figure.cells(words);
+    let little = match rms_with < rms_without {
+        true => format!("little gained on {data} ({without} without it, {with} with it)"),
+        false => format!("nothing gained on {data} ({without} without it, {with} with it)"),
+    };
+    let little = (rms_with > (1.0 - GAIN) * rms_without).then_some(little);
+    match no_gain.or(little) {
+        Some(why) => page.folded(&format!("{title}: {why}"), &cells),
+        None => page.figures(&cells),
+    }
 }

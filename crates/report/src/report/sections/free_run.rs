@@ -63,6 +63,7 @@ fn compared(found: &FreeRun) -> Table {
         ("after", Align::Decimal),
         ("95 % CI of the change", Align::Right),
         ("unit", Align::Left),
+        ("change", Align::Left),
     ])
     .caption(&caption(found));
     let rms = |error: &PositionError| number::significant(error.rms, 3);
@@ -79,7 +80,17 @@ fn compared(found: &FreeRun) -> Table {
             after.as_deref().unwrap_or(number::ABSENT),
             change.as_deref().unwrap_or(number::ABSENT),
             joint.unit,
+            joint.change.as_ref().map_or("", direction),
         ]);
     }
     table
+}
+
+/// Which way a change goes, where its interval leaves out 0.
+fn direction(change: &PositionErrorChange) -> &'static str {
+    match change.interval_95 {
+        [low, _] if low > 0.0 => "worse",
+        [_, high] if high < 0.0 => "better",
+        _ => "",
+    }
 }

@@ -1,5 +1,7 @@
 //! Measured and reconstructed torque over time, and how far they are apart.
 
+use std::borrow::Cow;
+
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::{Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
 use cft_ident_core::number;
@@ -7,16 +9,19 @@ use cft_ident_stages::identify::LoggedRobot;
 use cft_ident_stages::replay::{JointSeries, TorqueSeries};
 
 /// How the torque of a model is drawn.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Drawn {
     /// Name of its torque, and of its residual.
-    pub names: [&'static str; 2],
+    pub names: [Cow<'static, str>; 2],
     pub styles: [TraceStyle; 2],
 }
 
 /// The only model.
 pub const ONLY: Drawn = Drawn {
-    names: ["reconstructed", "measured \u{2212} reconstructed"],
+    names: [
+        Cow::Borrowed("reconstructed"),
+        Cow::Borrowed("measured \u{2212} reconstructed"),
+    ],
     styles: [TraceStyle::Model, TraceStyle::Residual],
 };
 
@@ -57,13 +62,13 @@ fn trace(machine: &LoggedRobot, of: &TorqueSeries, models: &[Drawn], name: Strin
         let mut differences = Vec::new();
         for (drawn, hat) in models.iter().zip(&series.reconstructed) {
             lines.push(TraceLine {
-                name: drawn.names[0].into(),
+                name: drawn.names[0].to_string(),
                 style: drawn.styles[0],
                 values: hat.clone(),
             });
             let apart = series.measured.iter().zip(hat);
             differences.push(TraceLine {
-                name: drawn.names[1].into(),
+                name: drawn.names[1].to_string(),
                 style: drawn.styles[1],
                 values: apart.map(|(a, b)| a - b).collect(),
             });

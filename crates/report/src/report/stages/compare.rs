@@ -1,11 +1,11 @@
 //! The report of `compare`.
 
-use crate::report::figure::{OverlayFigure, OverlayPanel};
+use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, OverlayFigure, OverlayPanel};
 use crate::report::sections::provenance;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::{self, Drawn};
 use crate::report::table::{Align, Table};
-use crate::report::{Report, TraceStyle, Writer};
+use crate::report::{Report, TraceStyle, Writer, usual};
 use cft_ident_core::number;
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_stages::compare::{
@@ -21,10 +21,14 @@ const FEW: usize = 8;
 pub fn compare(of: &Compared, logs: &str) -> Report {
     let title = format!("{} and {}", of.name(0), of.name(1));
     let mut report = Report::new(&format!("Comparison of {title}"));
-    let names = [of.name(0), of.name(1)];
+    let (names, letters) = (labels(of), LETTERS.map(str::to_owned));
+    let legend = format!("A is {}, B is {}; ", names[0], names[1]);
     let apart = || apart_tables(&of.table, &names);
-    let parameters = &of.table.parameters;
-    let parameters = (!parameters.is_empty()).then(|| parameter_table(parameters.iter(), &names));
+    let all = &of.table.parameters;
+    let table = |heads: &[String; 2], legend: &str| {
+        (!all.is_empty()).then(|| parameter_table(all.iter(), heads, legend))
+    };
+    let parameters = table(&letters, &legend);
     report
         .everywhere()
         .verdict(&words(of), of.warnings.is_empty());
@@ -36,7 +40,7 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
         report.detail().table(table);
         let differ = of.different();
         if !differ.is_empty() {
-            let table = parameter_table(differ.into_iter().take(FEW), &names);
+            let table = parameter_table(differ.into_iter().take(FEW), &letters, &legend);
             report.terminal().line("");
             report.terminal().table(table);
         }
@@ -49,19 +53,19 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
         report.detail().table(table);
     }
     if let Some(tried) = &of.tried {
-        let errors = error_table(tried, logs);
         report.terminal().line("");
-        report.terminal().table(errors.clone());
+        report.terminal().table(error_table(tried, logs, &letters));
         let mut page = report.page();
+        page.figure(&bars(of, tried, &names).svg());
         page.list(&of.warnings);
-        page.table(errors);
+        page.table(error_table(tried, logs, &names));
         used_before(&mut page, of, &tried.in_memory.inputs);
     } else {
         report.page().list(&of.warnings);
     }
     let mut page = report.page();
     page.heading("Parameters");
-    for table in parameters.into_iter().chain(apart()) {
+    for table in table(&names, "").into_iter().chain(apart()) {
         page.table(table);
     }
     report
@@ -82,16 +86,12 @@ pub fn pictures(
         page.figures(&figure(of, replayed).cells());
     }
     if let Some(replayed) = replayed {
-        let models = [
-            Drawn {
-                names: ["A", "residual of A"],
-                styles: [TraceStyle::After, TraceStyle::After],
-            },
-            Drawn {
-                names: ["B", "residual of B"],
-                styles: [TraceStyle::Before, TraceStyle::Before],
-            },
-        ];
+        let [a, b] = labels(of);
+        let drawn = |name: String, style| Drawn {
+            names: [name.clone().into(), format!("residual of {name}").into()],
+            styles: [style, style],
+        };
+        let models = [drawn(a, TraceStyle::Before), drawn(b, TraceStyle::After)];
         let title = replayed.logs.join(", ");
         torque::section(page, &of.machine, &replayed.torque, &models, &title);
         quality::section(page, quality, &[]);
@@ -144,7 +144,7 @@ pub fn figure(of: &Compared, replayed: Option<&ReplayedPair>) -> OverlayFigure {
     };
     OverlayFigure {
         title: format!("Friction of two models{declared}, {range}"),
-        names: [0, 1].map(|k| format!("{}: {}", LETTERS[k], of.name(k))),
+        names: labels(of),
         panels: of.curves.iter().map(panel).collect(),
     }
 }
@@ -153,7 +153,13 @@ pub fn figure(of: &Compared, replayed: Option<&ReplayedPair>) -> OverlayFigure {
 fn words(of: &Compared) -> String {
     let rated = of.table.parameters.iter().filter(|p| p.deviation.is_some());
     let (rated, different) = (rated.count(), of.different());
-    let mut text = format!(
+    let closer = of.tried.as_ref().map(|tried| closer(tried, &labels(of)));
+    if rated == 0 {
+        return closer
+            .unwrap_or_else(|| "No parameter of both has a known uncertainty.".to_owned());
+    }
+    let mut text = closer.map_or(String::new(), |closer| closer + " ");
+    text += &format!(
         "{} of {rated} parameters with known uncertainty differ by more than {DIFFERENT} \
          standard deviations",
         different.len()
@@ -166,24 +172,60 @@ fn words(of: &Compared) -> String {
         );
     }
     text.push('.');
-    let Some(tried) = &of.tried else {
-        return text;
-    };
-    let told = match tried.differences.overall.sign() {
-        -1 => "B is closer on these logs",
-        1 => "A is closer on these logs",
-        _ => "these logs do not show which model is closer",
-    };
-    let error = |k: usize| number::percent(tried.validations[k].errors.overall.mean_relative_error);
-    text += &format!(
-        " Over joints A is off by {}, B by {}: {told}.",
-        error(0),
-        error(1)
-    );
     text
 }
 
-const LETTERS: [&str; 2] = ["A", "B"];
+/// Which model is closer on the logs, in a sentence.
+fn closer(tried: &TriedOnLogs, names: &[String; 2]) -> String {
+    let error = |k: usize| number::percent(tried.validations[k].errors.overall.mean_relative_error);
+    let both = |first: usize| {
+        let second = 1 - first;
+        format!(
+            "{} misses {} of the torque (rms over the joints), {} {}",
+            names[first],
+            error(first),
+            names[second],
+            error(second)
+        )
+    };
+    match tried.differences.overall.sign() {
+        -1 => format!("{} is closer on these logs: {}.", names[1], both(1)),
+        1 => format!("{} is closer on these logs: {}.", names[0], both(0)),
+        _ => format!("These logs do not show which model is closer: {}.", both(0)),
+    }
+}
+
+/// Errors of both joint by joint as bars.
+fn bars(of: &Compared, tried: &TriedOnLogs, names: &[String; 2]) -> ErrorFigure {
+    let [a, b] = tried.validations.each_ref().map(|v| &v.errors.joints);
+    let bar = |error: f64| ErrorBar {
+        error,
+        interval_95: None,
+    };
+    let joints = a.iter().zip(b).map(|(a, b)| JointBars {
+        joint: a.joint.clone(),
+        before: Some(bar(a.relative_error)),
+        after: bar(b.relative_error),
+    });
+    ErrorFigure {
+        title: "Relative torque error on these logs".to_owned(),
+        names: names.clone(),
+        joints: joints.collect(),
+        limit: None,
+        usual: Some(usual::band(of.machine.file.log.torque_is)),
+    }
+}
+
+/// Names of the files, apart from each other.
+fn labels(of: &Compared) -> [String; 2] {
+    let names = [of.name(0), of.name(1)];
+    match names[0] == names[1] {
+        true => [(0, "first"), (1, "second")].map(|(k, word)| format!("{} ({word})", names[k])),
+        false => names,
+    }
+}
+
+pub(super) const LETTERS: [&str; 2] = ["A", "B"];
 
 pub(super) fn key(name: &str, joint: Option<&str>) -> String {
     match joint {
@@ -192,27 +234,28 @@ pub(super) fn key(name: &str, joint: Option<&str>) -> String {
     }
 }
 
-/// Parameters that both have; `names` are those of A and B.
+/// Parameters that both have under the `heads` of both, which `legend` explains.
 pub(super) fn parameter_table<'a>(
     parameters: impl Iterator<Item = &'a ParameterPair> + Clone,
-    names: &[String; 2],
+    [a, b]: &[String; 2],
+    legend: &str,
 ) -> Table {
+    let difference = format!("{b} - {a}");
     let joints = parameters.clone().any(|p| p.joint.is_some());
     let mut columns = vec![("parameter", Align::Left)];
     if joints {
         columns.insert(0, ("joint", Align::Left));
     }
     columns.extend([
-        ("A", Align::Decimal),
+        (a.as_str(), Align::Decimal),
         ("std", Align::Decimal),
-        ("B", Align::Decimal),
+        (b.as_str(), Align::Decimal),
         ("std", Align::Decimal),
-        ("B - A", Align::Decimal),
+        (difference.as_str(), Align::Decimal),
         ("unit", Align::Left),
     ]);
     let mut table = Table::new(&columns).caption(&format!(
-        "parameters: A is {}, B is {}; B - A in standard deviations of the difference",
-        names[0], names[1]
+        "parameters: {legend}{difference} in standard deviations of the difference"
     ));
     for p in parameters {
         let cells = |e: &ParameterEstimate| {
@@ -239,16 +282,16 @@ pub(super) fn parameter_table<'a>(
 /// Parameters that one side has alone, a table of each side that has some.
 pub(super) fn apart_tables(of: &SideBySide, names: &[String; 2]) -> impl Iterator<Item = Table> {
     let only = [&of.only_in_a, &of.only_in_b];
-    let sides = LETTERS.iter().zip(names).zip(only);
-    let tables = sides.filter_map(|((letter, name), only)| apart_table(only, letter, name));
+    let sides = names.iter().zip(only);
+    let tables = sides.filter_map(|(name, only)| apart_table(only, name));
     tables.collect::<Vec<_>>().into_iter()
 }
 
-fn apart_table(only: &[Apart], letter: &str, name: &str) -> Option<Table> {
+fn apart_table(only: &[Apart], name: &str) -> Option<Table> {
     if only.is_empty() {
         return None;
     }
-    let caption = format!("only in {letter}, {name}");
+    let caption = format!("only in {name}");
     let mut columns = vec![
         ("joint", Align::Left),
         ("parameter", Align::Left),
@@ -275,16 +318,18 @@ fn apart_table(only: &[Apart], letter: &str, name: &str) -> Option<Table> {
     Some(table)
 }
 
-/// Errors of both on the same logs.
-fn error_table(tried: &TriedOnLogs, logs: &str) -> Table {
+/// Errors of both on the same logs, under the heads of both.
+fn error_table(tried: &TriedOnLogs, logs: &str, [head_a, head_b]: &[String; 2]) -> Table {
+    let difference = format!("{head_b} - {head_a}");
+    let rms = [head_a, head_b].map(|head| format!("rms {head}"));
     let mut table = Table::new(&[
         ("joint", Align::Left),
-        ("A", Align::Decimal),
-        ("B", Align::Decimal),
-        ("B - A", Align::Decimal),
+        (head_a, Align::Decimal),
+        (head_b, Align::Decimal),
+        (&difference, Align::Decimal),
         ("95 % CI", Align::Right),
-        ("rms A", Align::Decimal),
-        ("rms B", Align::Decimal),
+        (&rms[0], Align::Decimal),
+        (&rms[1], Align::Decimal),
         ("unit", Align::Left),
         ("closer", Align::Left),
     ])
@@ -299,8 +344,8 @@ fn error_table(tried: &TriedOnLogs, logs: &str) -> Table {
         [hundred(a), hundred(b), hundred(d.difference), interval]
     };
     let closer = |d: &Difference| match d.sign() {
-        -1 => "B",
-        1 => "A",
+        -1 => head_b.as_str(),
+        1 => head_a.as_str(),
         _ => number::ABSENT,
     };
     let [a, b] = tried.validations.each_ref().map(|v| &v.errors);
@@ -347,7 +392,7 @@ fn error_table(tried: &TriedOnLogs, logs: &str) -> Table {
 
 /// A log that one of the models was made from favours that model.
 fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
-    for (letter, side) in ["A", "B"].iter().zip(&of.sides) {
+    for (name, side) in labels(of).iter().zip(&of.sides) {
         let made_from = &side.given.file.provenance.inputs;
         let known = |i: &&Provenance| {
             let mut made = made_from.iter().filter(|m| m.made());
@@ -361,7 +406,7 @@ fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
         if !names.is_empty() {
             page.verdict(
                 &format!(
-                    "{} was used to make {letter}: it favours {letter}.",
+                    "{} was used to make {name}: it favours {name}.",
                     names.join(", ")
                 ),
                 false,

@@ -316,11 +316,11 @@ pub fn sections(
     page.list(changes(machine, found));
     sketch::section(page, machine, replayed.poses.as_ref(), &errors);
     let after = Drawn {
-        names: ["after", "residual after"],
+        names: ["after", "residual after"].map(Into::into),
         styles: [TraceStyle::Model, TraceStyle::After],
     };
     let before = Drawn {
-        names: ["as given", "residual as given"],
+        names: ["as given", "residual as given"].map(Into::into),
         styles: [TraceStyle::Before, TraceStyle::Before],
     };
     let models = match d.written().next() {

@@ -6,6 +6,7 @@ use crate::report::usual;
 use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
+use cft_ident_stages::open_loop::JointFreeRun;
 
 /// Effects that the verdict names; it counts the others.
 const NAMED: usize = 3;
@@ -40,21 +41,45 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
         );
         text += ".";
     }
-    let (bought, worse) = bought(d);
+    let (bought, gains_nothing) = bought(d);
     text += &format!(" {bought}");
     text += &taken_out(machine, d);
-    if !robot_is_exact(d) {
+    if !is_exact(d) {
         text += &format!(" {}", usual::words(machine.file.log.torque_is));
     }
     if let Some(left) = most_is_left(machine, d) {
         text += &format!(" {left}");
     }
-    let good = !worse && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
+    let worse = runs_worse(found);
+    if !worse.is_empty() {
+        text += &format!(
+            " Use it for feed-forward and not to simulate: driven by the measured torques, it moves worse than the \
+             given model at {}.",
+            worse.join(", ")
+        );
+    }
+    let unusual =
+        errors(&d.after).1.overall.mean_relative_error > usual::band(machine.file.log.torque_is)[1];
+    let good = !gains_nothing
+        && worse.is_empty()
+        && !unusual
+        && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
     (text, good)
 }
 
+/// Joints that move worse, driven by the measured torques, where the model moves worse over all joints.
+fn runs_worse(found: &Diagnosed) -> Vec<&str> {
+    let Some(run) = &found.free_run else {
+        return Vec::new();
+    };
+    let grows = |joint: &JointFreeRun| Some((joint.after.as_ref()?.rms / joint.given.rms).ln());
+    let change: f64 = run.joints.iter().filter_map(grows).sum();
+    let worse = run.worse().filter(|_| change > 0.0);
+    worse.map(|joint| joint.joint.as_str()).collect()
+}
+
 /// Whether the error is so small that no published figure is of use beside it.
-fn robot_is_exact(d: &Diagnosis) -> bool {
+pub(super) fn is_exact(d: &Diagnosis) -> bool {
     let least = [usual::Measured::Sensors, usual::Measured::Currents]
         .map(|measured| usual::range(measured)[0])
         .into_iter()
@@ -111,18 +136,18 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
     }
 }
 
-/// What the diagnosis did to the error, and whether that is worse.
+/// What the diagnosis did to the error, and whether effects were written that gain nothing.
 fn bought(d: &Diagnosis) -> (String, bool) {
     let ((data, before), (_, after)) = (errors(&d.before), errors(&d.after));
     let mean = |e: &Errors| e.overall.mean_relative_error;
     let percent = |e: &Errors| number::percent(mean(e));
-    let (goes, worse) = match (
+    let goes = match (
         percent(before) == percent(after),
         mean(after) > mean(before),
     ) {
-        (true, _) => ("stays at", false),
-        (false, true) => ("RISES", true),
-        (false, false) => ("falls", false),
+        (true, _) => "stays at",
+        (false, true) => "RISES",
+        (false, false) => "falls",
     };
     let mut text = match (d.written().next(), goes) {
         (None, _) => format!("The {data} is {}", percent(after)),
@@ -140,7 +165,7 @@ fn bought(d: &Diagnosis) -> (String, bool) {
         }
         text += ")";
     }
-    (text + ".", worse && d.written().next().is_some())
+    (text + ".", goes != "falls" && d.written().next().is_some())
 }
 
 /// What held-out data took out of the model.

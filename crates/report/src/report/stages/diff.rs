@@ -1,6 +1,6 @@
 //! The report of `diff`: two runs beside each other.
 
-use super::compare::{apart_tables, key, parameter_table};
+use super::compare::{LETTERS, apart_tables, key, parameter_table};
 use crate::report::Report;
 use crate::report::table::{Align, Table};
 use cft_ident_core::number;
@@ -26,7 +26,9 @@ pub fn diff(of: &RunDifference, names: &[String; 2]) -> Report {
         tables.push(verdict_table(&of.verdicts));
     }
     if differ.clone().next().is_some() {
-        tables.push(parameter_table(differ, names));
+        let legend = format!("A is {}, B is {}; ", names[0], names[1]);
+        let letters = LETTERS.map(str::to_owned);
+        tables.push(parameter_table(differ, &letters, &legend));
     }
     tables.extend(apart_tables(&of.table, names));
     for table in tables {

@@ -1,9 +1,9 @@
 //! What the page of a diagnosis shows first: errors per joint as bars, and the next thing to do.
 
-use super::diagnose_words::errors as errors_of;
-use crate::report::Writer;
+use super::diagnose_words::{errors as errors_of, is_exact};
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
-use cft_ident_core::diagnose::{Errors, FoundEffect};
+use crate::report::{Writer, usual};
+use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, separating_command};
@@ -34,10 +34,16 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
     });
     ErrorFigure {
         title: format!("Relative torque error on {data}"),
-        names: ["as given", "after"],
+        names: ["as given", "after"].map(str::to_owned),
         joints: joints.collect(),
         limit: None,
+        usual: usual_of(machine, d),
     }
+}
+
+/// The errors that are usual, where they are of use beside those of this model.
+fn usual_of(machine: &LoggedRobot, d: &Diagnosis) -> Option<[f64; 2]> {
+    (!is_exact(d)).then(|| usual::band(machine.file.log.torque_is))
 }
 
 /// The first effect of the written model that the data do not separate from another.

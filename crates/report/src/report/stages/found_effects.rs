@@ -1,8 +1,8 @@
 //! The effects that a diagnosis found, on a page: a table of their numbers, and a card for each that is written.
 
-use super::step_words::{alternatives, grade, in_words, worsened};
+use super::step_words::{alternatives, grade, in_words, titled, worsened};
 use crate::report::Writer;
-use crate::report::sections::effects;
+use crate::report::sections::effects::{self, Said};
 use cft_ident_core::diagnose::FoundEffect;
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
@@ -21,12 +21,25 @@ pub(super) fn show(
         false => "the fitted data",
     };
     for (step, rows) in d.written().zip(&replayed.effects) {
-        let said = words(machine, step);
+        let said = Said {
+            title: titled(machine, &step.estimate),
+            words: words(machine, step),
+            no_gain: no_gain(step),
+        };
         effects::card(page, (machine, &d.model), rows, said, data);
     }
     if !d.steps.is_empty() {
         table(page, machine, found);
     }
+}
+
+/// That the held-out error does not fall with an effect, in words.
+fn no_gain(step: &FoundEffect) -> Option<String> {
+    let [before, after] = step.holdout.filter(|[before, after]| after >= before)?;
+    let [before, after] = [before, after].map(number::percent);
+    Some(format!(
+        "the held-out error does not fall by it ({before} without it, {after} with it)"
+    ))
 }
 
 /// What is said of one effect besides its picture.

@@ -56,9 +56,6 @@ impl Identify<'_> {
     }
 
     fn verdicts(&self, page: &mut Writer) {
-        for guess in self.guesses {
-            page.verdict(&format!("Guessed, CHECK IT: {guess}."), false);
-        }
         if let Some(fault) = self.fault() {
             let text = diagnose::at_fault(fault);
             page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
@@ -92,6 +89,7 @@ pub fn identify(of: &Identify) -> Report {
     let (machine, found) = (of.machine, of.found);
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
     of.verdicts(&mut report.everywhere());
+    guesses(&mut report.terminal(), of.guesses);
     if let Some(diagnosed) = of.diagnosed() {
         diagnose::told(&mut report, (machine, diagnosed), (of.model(), of.path));
     }
@@ -131,9 +129,20 @@ pub fn identify(of: &Identify) -> Report {
             lsq::residuals(&mut page, &found.dynamics, &all);
         }
     }
+    guesses(&mut page, of.guesses);
     page.paragraph(&format!("{tally}."));
     parameters::section(&mut page, of.model(), of.truth);
     report
+}
+
+/// What was guessed of the robot file, as one verdict.
+fn guesses(writer: &mut Writer, guesses: &[String]) {
+    if !guesses.is_empty() {
+        writer.verdict(
+            &format!("Guessed, CHECK IT: {}.", guesses.join("; ")),
+            false,
+        );
+    }
 }
 
 /// Every parameter of the model, beside its truth where that is known.

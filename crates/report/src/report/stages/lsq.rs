@@ -1,6 +1,7 @@
 //! The report of `lsq`.
 
 use super::first_screen;
+use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::{Align, Table, unbroken};
@@ -79,9 +80,30 @@ pub fn lsq(of: &Lsq) -> Report {
     if let Some(fit) = &of.found.by_motion {
         motion(&mut page, fit);
     }
+    page.figure(&bars(of).svg());
+    page.paragraph(&next("LOG", "MODEL.toml"));
     residuals(&mut page, of.found, &all);
     page.paragraph(&format!("{tally}."));
     report
+}
+
+/// Errors of the fitted data joint by joint as bars.
+fn bars(of: &Lsq) -> ErrorFigure {
+    let joints = of.found.joints.iter().map(|joint| JointBars {
+        joint: joint.joint.clone(),
+        before: None,
+        after: ErrorBar {
+            error: joint.relative_error,
+            interval_95: None,
+        },
+    });
+    ErrorFigure {
+        title: "Relative torque error on the fitted data".to_owned(),
+        names: [String::new(), String::new()],
+        joints: joints.collect(),
+        limit: None,
+        usual: Some(usual::band(of.machine.file.log.torque_is)),
+    }
 }
 
 /// What a page has room for besides; `given` are the robot file and the model that gave the friction,
@@ -94,7 +116,6 @@ pub fn pictures(
     quality: &[Inspected],
     command: &str,
 ) {
-    page.paragraph(&next("LOG", "MODEL.toml"));
     parameters::section(page, of.file, &|_| None);
     if let Some(replayed) = replayed {
         let (machine, logs) = (of.machine, &replayed.logs);

@@ -21,7 +21,8 @@ const ROBOTS: usize = 20;
 /// The changes, and the courses.
 pub fn track(of: &Tracked) -> Report {
     let mut report = Report::new("Parameters over time");
-    let good = of.robots.iter().all(|r| r.changes.is_empty()) && of.fleet.is_empty();
+    let same = of.robots.iter().all(|r| r.changes.is_empty()) && of.fleet.is_empty();
+    let good = same && !too_few(of);
     report.everywhere().verdict(&words(of), good);
     if let Some(table) = changes(of) {
         let mut all = report.everywhere();
@@ -109,6 +110,9 @@ fn words(of: &Tracked) -> String {
         n => format!(" of {n} robots"),
     };
     let mut text = match changes {
+        0 if too_few(of) => format!(
+            "{logs} logs{of_robots} are too few to show a change: it needs six logs before it and six from it on."
+        ),
         0 => format!("No parameter changed over {logs} logs{of_robots}."),
         n => format!("{n} changes of parameters over {logs} logs{of_robots}, in {changed} robots."),
     };
@@ -124,13 +128,16 @@ fn words(of: &Tracked) -> String {
     text
 }
 
+/// Whether no change could have been seen.
+fn too_few(of: &Tracked) -> bool {
+    let mut all = of.robots.iter().flat_map(|r| &r.parameters);
+    all.all(|p| p.least_seen.is_none())
+}
+
 /// How small a change the logs could not have shown, as a sentence.
 fn unseen(of: &Tracked) -> String {
     let all = || of.robots.iter().flat_map(|r| &r.parameters);
     let mut least: Vec<f64> = all().filter_map(relative_least).collect();
-    if all().all(|p| p.least_seen.is_none()) {
-        return " There are too few logs to show one: a change needs six logs before it and six from it on.".to_owned();
-    }
     least.sort_by(f64::total_cmp);
     match least.get(least.len() / 2) {
         Some(median) => format!(

@@ -90,9 +90,10 @@ fn bars(of: &Validate) -> ErrorFigure {
     });
     ErrorFigure {
         title: "Relative torque error".to_owned(),
-        names: ["on logs that made the model", "on unseen logs"],
+        names: ["on logs that made the model", "on unseen logs"].map(str::to_owned),
         joints: joints.collect(),
         limit: of.limit,
+        usual: Some(usual::band(of.machine.file.log.torque_is)),
     }
 }
 
@@ -107,7 +108,7 @@ pub fn pictures(
     let validation = &of.found.validation;
     let title = escaped(of.logs);
     page.paragraph(
-        "Next: `cft-ident diagnose` with this log as `--holdout` tells which effects the model lacks.",
+        "Next: `cft-ident diagnose` with this log as `--holdout` finds the effects that the model lacks.",
     );
     parameters::section(page, of.file, &|_| None);
     match replayed {

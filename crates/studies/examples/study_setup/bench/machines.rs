@@ -127,7 +127,9 @@ pub fn machine(name: &str, folder: &Path) -> Option<Machine> {
         _ => None,
     };
     if found.is_none() {
-        eprintln!("SKIPPED: the log of {name} is not there (docs/data.md says where it is from)");
+        eprintln!(
+            "SKIPPED: the log of {name} is not there (docs/measured/data.md says where it is from)"
+        );
     }
     found
 }
