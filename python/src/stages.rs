@@ -37,11 +37,7 @@ struct Checked {
 }
 
 /// Refuses a set-up that the torques plainly contradict, as the commands do.
-fn checked(
-    machine: &LoggedRobot,
-    logs: &[identify::Log],
-    control: &Control,
-) -> PyResult<Checked> {
+fn checked(machine: &LoggedRobot, logs: &[identify::Log], control: &Control) -> PyResult<Checked> {
     // logs that cannot be checked are told by the fit itself
     let report = check_setup(machine, logs, control)
         .unwrap_or_default()
@@ -118,6 +114,7 @@ pub fn friction(
             machine: &machine,
             found: &found,
             file: &model,
+            path: "friction.toml",
             logs: &names,
         });
         let told = told(&document.map_err(of_input)?, &report);
@@ -190,7 +187,9 @@ pub fn lsq(
             machine: &machine,
             found: &found,
             file: &model,
+            path: "model.toml",
             logs: &names,
+            typed: "LOG",
         });
         let told = told(&document.map_err(of_input)?, &report);
         Ok((told, Model::of("model.toml", model)?))
@@ -270,13 +269,16 @@ pub fn diagnose(
                 let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
                 let result = found.result(&machine);
                 let document = Document::new("diagnose", inputs, warnings, &result);
+                let refined = found.model(&machine, &file);
                 let report = stages::diagnose::diagnose(&stages::diagnose::Diagnose {
                     machine: &machine,
                     file: &file,
                     given: &given,
                     found: &found,
+                    refined: &refined,
+                    path: "refined.toml",
                 });
-                let model = Model::of("refined.toml", found.model(&machine, &file))?;
+                let model = Model::of("refined.toml", refined)?;
                 Ok((told(&document.map_err(of_input)?, &report), Some(model)))
             }
         }
