@@ -1,7 +1,14 @@
 from collections.abc import Sequence
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
+
+__all__ = [
+    "__version__", "CftIdentError", "UsageError", "InputError", "UndeterminedError", "Robot", "Log", "Model", "Part",
+    "run", "main", "friction", "lsq", "validate", "diagnose", "reduce", "torque", "regressor", "joint_friction",
+    "rest_speeds", "mass_matrix", "covariance", "merge", "track",
+]
 
 __version__: str
 
@@ -10,6 +17,7 @@ class UsageError(CftIdentError): ...
 class InputError(CftIdentError): ...
 class UndeterminedError(CftIdentError): ...
 
+@final
 class Robot:
     @staticmethod
     def load(path: str) -> Robot: ...
@@ -20,6 +28,7 @@ class Robot:
     @property
     def joints(self) -> list[str]: ...
 
+@final
 class Log:
     @staticmethod
     def load(path: str) -> Log: ...
@@ -37,6 +46,7 @@ class Log:
     @property
     def path(self) -> str | None: ...
 
+@final
 class Model:
     @staticmethod
     def load(path: str) -> Model: ...
@@ -51,6 +61,7 @@ class Model:
     @property
     def parameters(self) -> list[tuple[str, str | None, float, float | None, float, str]]: ...
 
+@final
 class Part:
     @staticmethod
     def load(path: str) -> Part: ...
