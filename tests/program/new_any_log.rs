@@ -171,6 +171,10 @@ fn is_read(folder: &Path, log: &str) {
 /// What is asked of every log whose columns have names of their own.
 const TORQUE_CHECK: &str = "torques at the joints? no name says it; else torque_is = \"motor\" or \"current\", with torque_scale";
 
+/// What is asked of every log whose angles state no unit.
+const ANGLE_CHECK: &str =
+    "positions: rad is taken, for no name states a unit; else position_unit = \"deg\" or \"turns\"";
+
 /// Patterns of columns, position and torque that are to be taken first.
 const STYLES: &[(&str, &[(&str, Held)])] = &[
     (
@@ -329,11 +333,12 @@ fn names_in_fifteen_styles_from_0_and_from_1_are_mapped_and_read() {
                 "{place}"
             );
             assert_eq!(columns(&found, "torque"), wanted(patterns[1].0), "{place}");
-            assert_eq!(
-                found["checks"],
-                serde_json::json!([TORQUE_CHECK]),
-                "{place}"
-            );
+            let states = patterns[0].0.contains("_deg") || patterns[0].0.contains("_rad");
+            let wanted = match states {
+                true => serde_json::json!([TORQUE_CHECK]),
+                false => serde_json::json!([ANGLE_CHECK, TORQUE_CHECK]),
+            };
+            assert_eq!(found["checks"], wanted, "{place}");
             // a fit of each style once
             if base == style % 2 {
                 is_read(folder.path(), "log.csv");
@@ -431,7 +436,7 @@ fn joints_with_names_are_found_by_them_in_any_order() {
         assert_eq!(columns(&found, "torque"), wanted);
         assert_eq!(
             found["checks"],
-            serde_json::json!([TORQUE_CHECK]),
+            serde_json::json!([ANGLE_CHECK, TORQUE_CHECK]),
             "{wanted:?}"
         );
         is_read(folder.path(), "log.csv");
@@ -545,7 +550,10 @@ fn files_without_a_header_or_times_are_described_by_what_they_hold() {
     std::fs::write(folder.path().join("log.csv"), text).unwrap();
     let call = "new mine --urdf arm.urdf --log log.csv --rate 200";
     let found = document(folder.path(), &call.split(' ').collect::<Vec<_>>());
-    assert_eq!(found["checks"], serde_json::json!([TORQUE_CHECK]));
+    assert_eq!(
+        found["checks"],
+        serde_json::json!([ANGLE_CHECK, TORQUE_CHECK])
+    );
     is_read(folder.path(), "log.csv");
 }
 
@@ -819,5 +827,8 @@ fn the_heavy_arm_and_the_pendulum_are_mapped_by_number() {
     let found = document(folder.path(), &call);
     assert_eq!(columns(&found, "position"), ["pos1", "pos2"]);
     assert_eq!(columns(&found, "torque"), ["tau1", "tau2"]);
-    assert_eq!(found["checks"], serde_json::json!([TORQUE_CHECK]));
+    assert_eq!(
+        found["checks"],
+        serde_json::json!([ANGLE_CHECK, TORQUE_CHECK])
+    );
 }

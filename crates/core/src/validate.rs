@@ -532,13 +532,10 @@ impl<'a> Reconstruction<'a> {
                 .then(|| ratio(error.max(0.0), torque, rows))
                 .flatten()
         };
-        let counted: Vec<f64> = match joints.iter().any(JointError::moves) {
-            true => (joints.iter().filter(|e| e.moves()))
-                .map(|e| e.relative_error)
-                .collect(),
-            false => joints.iter().map(|e| e.relative_error).collect(),
-        };
-        let mean = counted.iter().map(|e| e * e).sum::<f64>() / counted.len() as f64;
+        let any = joints.iter().any(JointError::moves);
+        let counted = joints.iter().filter(|e| e.moves() || !any);
+        let squares: Vec<f64> = counted.map(|e| e.relative_error.powi(2)).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
         TorqueErrors {
             overall: Overall {
                 relative_error: one_unit.then(|| (error / torque).sqrt()),

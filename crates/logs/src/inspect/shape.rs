@@ -358,7 +358,12 @@ fn spikes(
     draft: &mut FaultList,
 ) {
     let track = &judge.tracks[place];
-    let usual = track.spikes.usual(track.deviation());
+    // whose joint's motion is known, pulses of a command are no spikes; of other channels nothing tells them apart
+    let known = track.channel.role == ChannelRole::Position || track.position.is_some();
+    let usual = match known {
+        true => track.spikes.usual(track.deviation()),
+        false => track.spikes.nearly_all(),
+    };
     let grain = track.flat.steps.quantile_not_zero(0.05);
     let least = (SPIKE * usual)
         .max(GRAINS * grain)

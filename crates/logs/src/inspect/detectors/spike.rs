@@ -154,8 +154,13 @@ impl Spikes {
         self.suspect = SUSPECT * self.differences_seen.quantile(MOST_ROWS);
     }
 
-    /// What nearly all rows differ from their neighbours. Where more of them are spikes than that leaves out, they are
-    /// set aside first: they hide each other where they are counted among the rest (Rosner 1983). `deviation` is that
+    /// What nearly all rows differ from their neighbours.
+    pub(in crate::inspect) fn nearly_all(&self) -> f64 {
+        self.differences_seen.quantile(NEARLY_ALL)
+    }
+
+    /// The same, but where more rows are spikes than that leaves out, those are set
+    /// aside first: they hide each other where they are counted among the rest (Rosner 1983). `deviation` is that
     /// of the channel.
     pub(in crate::inspect) fn usual(&self, deviation: f64) -> f64 {
         let rows = self.differences_seen.total().max(1) as f64;

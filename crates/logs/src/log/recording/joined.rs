@@ -464,7 +464,7 @@ impl LogRows for JoinedTopics {
         let mut out = self.breaks();
         let mut topics: Vec<&str> = self.sources.iter().map(|one| one.topic.as_str()).collect();
         topics.dedup();
-        let topics = list(topics.into_iter());
+        let topics = list(topics);
         if self.sources.len() > 1 {
             out.push(format!(
                 "rows are those of {topics}, interpolated linearly at the times of the first"
