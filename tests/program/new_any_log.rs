@@ -334,11 +334,11 @@ fn names_in_fifteen_styles_from_0_and_from_1_are_mapped_and_read() {
             );
             assert_eq!(columns(&found, "torque"), wanted(patterns[1].0), "{place}");
             let states = patterns[0].0.contains("_deg") || patterns[0].0.contains("_rad");
-            let wanted = match states {
+            let asked = match states {
                 true => serde_json::json!([TORQUE_CHECK]),
                 false => serde_json::json!([ANGLE_CHECK, TORQUE_CHECK]),
             };
-            assert_eq!(found["checks"], wanted, "{place}");
+            assert_eq!(found["checks"], asked, "{place}");
             // a fit of each style once
             if base == style % 2 {
                 is_read(folder.path(), "log.csv");
