@@ -92,9 +92,10 @@ fn number(step: &Value, key: &str) -> (f64, f64) {
     (p["value"].as_f64().unwrap(), p["std"].as_f64().unwrap())
 }
 
-/// Each part of this log holds about one stroke, in which friction of one direction is a constant.
+/// Each part of this log holds about one stroke, in which friction of one direction is a constant: few parts hold both,
+/// and so few must agree the better.
 #[test]
-fn what_the_parts_of_a_short_log_do_not_agree_on_is_seen_and_not_in_the_model() {
+fn the_few_strokes_of_a_short_log_agree_on_asymmetric_friction_and_unseen_data_gain() {
     let (Some(id), Some(unseen)) = (
         measured("emps/emps_id.csv"),
         measured("emps/emps_pulses_val.csv"),
@@ -113,18 +114,18 @@ fn what_the_parts_of_a_short_log_do_not_agree_on_is_seen_and_not_in_the_model() 
     assert_eq!(first["effect"], "asymmetric-friction");
     assert_eq!(
         (&first["status"], &first["written"]),
-        (&"seen".into(), &false.into())
+        (&"indicated".into(), &true.into())
     );
     assert!(first["cv_gain"].as_f64().unwrap() > 0.5, "{first}");
     let written = effects(&found);
-    assert!(!written.contains(&("asymmetric-friction", Some("q1"))));
+    assert!(written.contains(&("asymmetric-friction", Some("q1"))));
     let refined = std::fs::read_to_string(at.join("refined.toml")).unwrap();
     assert_eq!(refined.matches("[[effect]]").count(), written.len());
     let (before, after) = (
         mean(&found, "before", "holdout"),
         mean(&found, "after", "holdout"),
     );
-    assert!(after <= before, "{before} {after}");
+    assert!(after < 0.8 * before, "{before} {after}");
     // what is left has its signals, the strongest first, each beyond chance
     let dependence = found["dependence"].as_array().unwrap();
     let share = |told: &Value| told["share"].as_f64().unwrap();

@@ -333,7 +333,7 @@ fn names_in_fifteen_styles_from_0_and_from_1_are_mapped_and_read() {
                 "{place}"
             );
             assert_eq!(columns(&found, "torque"), wanted(patterns[1].0), "{place}");
-            let states = patterns[0].0.contains("_deg") || patterns[0].0.contains("_rad");
+            let states = patterns[0].0.contains("deg");
             let asked = match states {
                 true => serde_json::json!([TORQUE_CHECK]),
                 false => serde_json::json!([ANGLE_CHECK, TORQUE_CHECK]),

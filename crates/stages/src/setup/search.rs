@@ -303,7 +303,7 @@ impl Look<'_> {
         let others = others.filter(|(t, j)| j.change != best.trial.change && *t <= turned(best));
         let others: Vec<&Trial> = others.map(|(_, j)| j).filter(|j| near(j)).collect();
         let tied: Vec<Change> = others.iter().filter_map(|j| j.change.clone()).collect();
-        // a ratio that its neighbours are as good as, and that leaves something else wrong, is an estimate
+        // a ratio that its neighbours are as good as, and that leaves most of the error, is an estimate
         let ratio = |c: &Change| match c {
             Change::Scale(_, _, f) | Change::Gear(_, f) => {
                 *f != -1.0 && oddity(*f, &self.problem.known.ratios) > 0
@@ -311,8 +311,8 @@ impl Look<'_> {
             _ => false,
         };
         let neighbour = |c: &Change| ratio(c) && c.joints() == change.joints();
-        let sound = after.iter().all(|e| *e <= LIMITS.sound);
-        if ratio(&change) && tied.iter().any(neighbour) && !sound {
+        let most = |d: &Judged| best.trial.whole() <= LIMITS.floor * d.trial.whole();
+        if ratio(&change) && tied.iter().any(neighbour) && !declared.is_none_or(most) {
             return None;
         }
         let made = change.clone();

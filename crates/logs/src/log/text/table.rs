@@ -67,6 +67,8 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
             .position(|k| lines[*k].number == number)
             .or_else(|| rows.iter().position(|k| lines[*k].number > number))
     });
+    // a name in quotes that goes on in the next line: its lines are no rows
+    let goes_on = |line: usize| lines[line].text.matches('"').count() % 2 == 1;
     let table = |row: usize| Table::at(lines, &rows[row..], parting, wanted);
     let plain = |row: usize| {
         let line = rows.get(row).map_or("", |k| &lines[*k].text);
@@ -93,9 +95,7 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
             };
             let begins = |row: &usize| headless(*row) || table(*row).is_some();
             let fits = |row: &usize| begins(row) && lasts(*row);
-            // a name in quotes that goes on in the next line: its lines are no rows
-            let goes_on = |row: usize| lines[rows[row]].text.matches('"').count() % 2 == 1;
-            let row = match rows.get(from).is_some() && goes_on(from) {
+            let row = match rows.get(from).is_some_and(|k| goes_on(*k)) {
                 true => from,
                 false => (from..rows.len())
                     .find(fits)
@@ -108,6 +108,8 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     };
     let at = rows.get(row).copied().unwrap_or(first);
     let number = lines[at].number;
+    // what a name in quotes goes on with is no row of its own
+    let second = found.second.filter(|_| !goes_on(at));
     if row > 0 || asked.is_some() {
         told.push(format!(
             "the table begins at line {number}: {} passed over (`header_line` in [log] of the robot file says another)",
@@ -118,7 +120,7 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
         ));
     }
     let mut units = Vec::new();
-    if let Some(second) = found.second {
+    if let Some(second) = second {
         let (sign, spaces) = found.parting;
         let below = &lines[rows[row + 1]];
         let fields = split(&below.text, sign, spaces);
@@ -135,7 +137,7 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     Found {
         at,
         parting: found.parting,
-        second_row: found.second.is_some(),
+        second_row: second.is_some(),
         units,
         told,
     }
