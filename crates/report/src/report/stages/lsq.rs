@@ -89,7 +89,8 @@ pub fn lsq(of: &Lsq) -> Report {
 
 /// Errors of the fitted data joint by joint as bars.
 fn bars(of: &Lsq) -> ErrorFigure {
-    let joints = of.found.joints.iter().map(|joint| JointBars {
+    let moving = of.found.joints.iter().filter(|joint| joint.moves());
+    let joints = moving.map(|joint| JointBars {
         joint: joint.joint.clone(),
         before: None,
         after: ErrorBar {
