@@ -148,64 +148,10 @@ fn joint_name(joint: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::family::How;
-    use super::super::fitting::best;
     use super::*;
 
     fn columns(names: &[&str]) -> Vec<LogColumn> {
         names.iter().map(|name| LogColumn::named(name)).collect()
-    }
-
-    fn matched(joints: &[&str], names: &[&str]) -> (Vec<Option<String>>, Option<How>) {
-        let columns = columns(names);
-        let found = best(&columns, ChannelRole::Position, false, joints, None);
-        match found {
-            None => (vec![None; joints.len()], None),
-            Some(taken) => {
-                let names = taken.columns.iter().map(|c| c.map(|c| c.name.clone()));
-                (names.collect(), Some(taken.how))
-            }
-        }
-    }
-
-    fn some(names: &[&str]) -> Vec<Option<String>> {
-        names.iter().map(|n| Some((*n).to_owned())).collect()
-    }
-
-    #[test]
-    fn columns_go_by_name_before_number_and_by_number_before_order() {
-        let (found, how) = matched(&["elbow", "wrist"], &["q_wrist", "q_elbow"]);
-        assert_eq!(
-            (found, how),
-            (some(&["q_elbow", "q_wrist"]), Some(How::Fits))
-        );
-        let (found, how) = matched(&["joint_2", "joint_1"], &["q1", "q2"]);
-        assert_eq!((found, how), (some(&["q2", "q1"]), Some(How::Fits)));
-        let (found, how) = matched(&["joint_1", "joint_2"], &["q0", "q1"]);
-        assert_eq!((found, how), (some(&["q0", "q1"]), Some(How::Fits)));
-        let (found, how) = matched(&["pan", "lift"], &["q1", "q2"]);
-        assert_eq!((found, how), (some(&["q1", "q2"]), Some(How::InOrder)));
-        // one column too few is no order
-        let (found, _) = matched(&["pan", "lift"], &["q1"]);
-        assert_eq!(found, [None, None]);
-        // an arm without its fingers
-        let hand = [
-            "arm_joint1",
-            "arm_joint2",
-            "finger_joint1",
-            "finger_joint2",
-            "finger_joint3",
-        ];
-        let (found, how) = matched(&hand, &["q1", "q2"]);
-        assert_eq!(found[..2], some(&["q1", "q2"]));
-        assert_eq!(
-            (&found[2..], how),
-            (&[None, None, None][..], Some(How::InPart))
-        );
-        // one too many may begin anywhere
-        let (found, how) = matched(&["joint_1", "joint_2"], &["q0", "q1", "q2"]);
-        assert_eq!(found.len(), 2);
-        assert_eq!(how, Some(How::InPart));
     }
 
     #[test]

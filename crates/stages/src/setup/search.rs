@@ -304,12 +304,7 @@ impl Look<'_> {
         let others: Vec<&Trial> = others.map(|(_, j)| j).filter(|j| near(j)).collect();
         let tied: Vec<Change> = others.iter().filter_map(|j| j.change.clone()).collect();
         // a ratio that its neighbours are as good as, and that leaves most of the error, is an estimate
-        let ratio = |c: &Change| match c {
-            Change::Scale(_, _, f) | Change::Gear(_, f) => {
-                *f != -1.0 && oddity(*f, &self.problem.known.ratios) > 0
-            }
-            _ => false,
-        };
+        let ratio = |c: &Change| c.times(1.0).is_some() && self.oddity(c) > 0;
         let neighbour = |c: &Change| ratio(c) && c.joints() == change.joints();
         let most = |d: &Judged| best.trial.whole() <= LIMITS.floor * d.trial.whole();
         if ratio(&change) && tied.iter().any(neighbour) && !declared.is_none_or(most) {
@@ -355,15 +350,19 @@ impl Look<'_> {
         })
     }
 
+    /// How far from what people write the factor of a change is; 0 where it has none.
+    fn oddity(&self, change: &Change) -> u32 {
+        match change {
+            Change::Scale(_, _, f) | Change::Gear(_, f) => oddity(*f, &self.problem.known.ratios),
+            _ => 0,
+        }
+    }
+
     /// The first reading, or another factor of its channel that the blocks do not tell from it and that people write
     /// more often.
     fn plainer<'j>(&self, order: &[&'j Judged]) -> Option<&'j Judged> {
         let best = *order.first()?;
-        let ratios = &self.problem.known.ratios;
-        let odd = |j: &Judged| match &j.trial.change {
-            Some(Change::Scale(_, _, f) | Change::Gear(_, f)) => oddity(*f, ratios),
-            _ => 0,
-        };
+        let odd = |j: &Judged| j.trial.change.as_ref().map_or(0, |c| self.oddity(c));
         let alike = |j: &&&Judged| match (&best.trial.change, &j.trial.change) {
             (Some(Change::Scale(a, of, _)), Some(Change::Scale(b, other, _))) => {
                 a == b && of == other

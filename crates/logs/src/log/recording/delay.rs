@@ -7,6 +7,8 @@
 //! speed. The delay of the least residual is the one by which the torques lag; its standard
 //! deviation is that of the jackknife over the stretches.
 
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
 /// Rows that are used at most.
 const ROWS: usize = 1 << 14;
 /// Trial delays on each side of 0, in steps of the positions' clock.
@@ -252,6 +254,14 @@ impl Sums {
         }
     }
 
+    /// Normal matrix of some columns, with a ridge far below what is measured.
+    fn of_columns(&self, columns: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+            let (i, j) = (columns[i.max(j)], columns[i.min(j)]);
+            self.normal[i][j] + if i == j { 1e-9 * self.rows } else { 0.0 }
+        })
+    }
+
     /// Share of the torque's variation that is left at each trial.
     fn left(&self) -> Option<Vec<f64>> {
         let variation = self.power[TRIALS] - self.total * self.total / self.rows;
@@ -259,27 +269,26 @@ impl Sums {
             return None;
         }
         // the columns of each subset of the passive ones, with those of any sign
-        let subsets: Vec<(Vec<usize>, [[f64; COLUMNS]; COLUMNS])> = (0..1usize << PASSIVE)
+        let subsets: Vec<(Vec<usize>, Cholesky<f64, Dyn>)> = (0..1usize << PASSIVE)
             .filter_map(|subset| {
                 let taken = |column: &usize| *column >= PASSIVE || subset >> column & 1 == 1;
                 let columns: Vec<usize> = (0..COLUMNS).filter(taken).collect();
-                let factor = cholesky(&self.normal, &columns, self.rows)?;
+                let factor = self.of_columns(&columns).cholesky()?;
                 Some((columns, factor))
             })
             .collect();
-        let left = |sign: f64| -> Vec<f64> {
-            let trials = self.right.iter().zip(&self.power).map(|(right, power)| {
-                let explained = subsets
-                    .iter()
-                    .filter_map(|(columns, factor)| explained(columns, factor, right, sign));
-                let most = explained.fold(0.0, f64::max);
-                ((power - most) / variation).max(0.0)
-            });
-            trials.collect()
-        };
+        let (mut ahead, mut turned) = (Vec::new(), Vec::new());
+        for (right, power) in self.right.iter().zip(&self.power) {
+            let explained = subsets
+                .iter()
+                .map(|(columns, factor)| explained(columns, factor, right));
+            let most = explained.fold([0.0f64; 2], |[a, b], [x, y]| [a.max(x), b.max(y)]);
+            let [own, other] = most.map(|most| ((power - most) / variation).max(0.0));
+            ahead.push(own);
+            turned.push(other);
+        }
         // a torque whose sign is turned has its delay too
         let least = |left: &[f64]| left.iter().copied().fold(f64::INFINITY, f64::min);
-        let (ahead, turned) = (left(1.0), left(-1.0));
         Some(if least(&turned) < least(&ahead) {
             turned
         } else {
@@ -330,27 +339,19 @@ fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
     (curvature > 0.0).then(|| least as f64 - TRIALS as f64 + 0.5 * (before - after) / curvature)
 }
 
-/// Power that these columns explain, |L^-1 Y' tau|^2; `None` where a passive one would drive.
-fn explained(
-    columns: &[usize],
-    factor: &[[f64; COLUMNS]; COLUMNS],
-    right: &[f64; COLUMNS],
-    sign: f64,
-) -> Option<f64> {
-    let mut x = [0.0; COLUMNS];
-    for (i, column) in columns.iter().enumerate() {
-        let known: f64 = (0..i).map(|j| factor[i][j] * x[j]).sum();
-        x[i] = (right[*column] - known) / factor[i][i];
-    }
-    let explained = x[..columns.len()].iter().map(|x| x * x).sum();
-    for i in (0..columns.len()).rev() {
-        let known: f64 = (i + 1..columns.len()).map(|j| factor[j][i] * x[j]).sum();
-        x[i] = (x[i] - known) / factor[i][i];
-        if columns[i] < PASSIVE && sign * x[i] < 0.0 {
-            return None;
+/// Power that these columns explain where passive ones take power, and where all of them drive: then the sign of the
+/// torque is turned; 0 where neither is so.
+fn explained(columns: &[usize], factor: &Cholesky<f64, Dyn>, right: &[f64; COLUMNS]) -> [f64; 2] {
+    let right = DVector::from_iterator(columns.len(), columns.iter().map(|i| right[*i]));
+    let x = factor.solve(&right);
+    let explained = right.dot(&x);
+    [1.0, -1.0].map(|sign| {
+        let drives = |(column, x): (&usize, &f64)| *column < PASSIVE && sign * x < 0.0;
+        match columns.iter().zip(&x).any(drives) {
+            true => 0.0,
+            false => explained,
         }
-    }
-    Some(explained)
+    })
 }
 
 /// Mean over `half` neighbours on each side.
@@ -375,31 +376,6 @@ fn derivative(x: &[f64], dt: f64) -> Vec<f64> {
 /// The mean of means: a triangular window.
 fn twice(x: &[f64], half: usize) -> Vec<f64> {
     smoothed(&smoothed(x, half), half)
-}
-
-/// Lower Cholesky factor of these columns' normal matrix, with a ridge far below what is measured.
-fn cholesky(
-    normal: &[[f64; COLUMNS]; COLUMNS],
-    columns: &[usize],
-    rows: f64,
-) -> Option<[[f64; COLUMNS]; COLUMNS]> {
-    let mut factor = [[0.0; COLUMNS]; COLUMNS];
-    for i in 0..columns.len() {
-        for j in 0..=i {
-            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            let mut sum = normal[columns[i]][columns[j]] - known;
-            if i == j {
-                sum += 1e-9 * rows;
-                if sum <= 0.0 {
-                    return None;
-                }
-                factor[i][i] = sum.sqrt();
-            } else {
-                factor[i][j] = sum / factor[j][j];
-            }
-        }
-    }
-    Some(factor)
 }
 
 #[cfg(test)]
