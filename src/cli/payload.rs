@@ -30,8 +30,8 @@ pub struct Args {
     /// Model file of the arm without the load
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// Model file to write, with the load as an effect: the given model, byte for byte, where no load is seen or where
-    /// it makes the error of a joint larger
+    /// Model file to write, with the load as an effect: the given model, byte for byte, where no load is seen, where
+    /// free gains contradict it, or where it makes the error of a joint larger
     #[arg(short, long, value_name = "LOADED.toml")]
     pub output: Option<PathBuf>,
 }
@@ -96,6 +96,9 @@ fn sentences(found: &Payload) -> Vec<String> {
         ),
         PayloadVerdict::NotApartFromGains => format!(
             "payload: {held} if the gains of the torque channels are those of the model\nthese data cannot tell the mass apart from the gains: {free} with a gain error of every joint free; a log of wider motion of all joints, the arm stretched out and folded, lifted against gravity, does"
+        ),
+        PayloadVerdict::GainsContradict => format!(
+            "the gains of the torque channels are not those of the model, or the log is not of this arm: {held} with them, {free} with a gain error of every joint free"
         ),
         PayloadVerdict::NoneSeen => format!(
             "no payload seen: {held}; with a gain error of every joint free: {free}"

@@ -16,8 +16,10 @@ use cft_ident_logs::log::Provenance;
 pub enum PayloadVerdict {
     /// The interval lies above zero, whatever the gains of the torques are.
     Seen,
-    /// It does with the gains of the model; with a gain error of each joint it holds zero.
+    /// It does with the gains of the model; with a gain error of each joint it holds both that mass and zero.
     NotApartFromGains,
+    /// It does with the gains of the model; with a gain error of each joint it does not hold that mass.
+    GainsContradict,
     /// The interval holds zero with the gains of the model.
     NoneSeen,
     /// The log holds nothing on the mass.
@@ -89,18 +91,25 @@ impl Number95 {
     fn is_above_zero(&self) -> bool {
         self.interval_95.is_some_and(|[low, _]| low > 0.0)
     }
+
+    /// Whether the interval leaves a value out; false where there is none.
+    fn leaves_out(&self, value: f64) -> bool {
+        self.interval_95
+            .is_some_and(|[low, high]| value < low || value > high)
+    }
 }
 
 impl PayloadVerdict {
     pub(super) fn of(readings: &[PayloadReading]) -> Self {
-        let of = |gains_free: bool| readings.iter().find(|one| one.gains_free == gains_free);
-        let mass = |gains_free: bool| of(gains_free).map(|one| &one.mass);
-        match (mass(false), mass(true)) {
-            (Some(held), _) if held.value.is_none() => Self::NotDetermined,
-            (Some(held), _) if !held.is_above_zero() => Self::NoneSeen,
-            (Some(_), Some(free)) if free.is_above_zero() => Self::Seen,
-            (Some(_), _) => Self::NotApartFromGains,
-            (None, _) => Self::NotDetermined,
+        let [held, free] = readings else {
+            return Self::NotDetermined;
+        };
+        match held.mass.value {
+            None => Self::NotDetermined,
+            Some(_) if !held.mass.is_above_zero() => Self::NoneSeen,
+            Some(mass) if free.mass.leaves_out(mass) => Self::GainsContradict,
+            Some(_) if free.mass.is_above_zero() => Self::Seen,
+            Some(_) => Self::NotApartFromGains,
         }
     }
 }
@@ -142,8 +151,8 @@ impl PayloadReading {
 }
 
 impl Payload {
-    /// The model with the body of the reading without gain errors, as an effect; none where no body is seen, or where
-    /// it makes the error of a joint larger.
+    /// The model with the body of the reading without gain errors, as an effect; none where no body is seen, where free
+    /// gains contradict it, or where it makes the error of a joint larger.
     pub fn loaded(&self, file: &ModelFile) -> Option<ModelFile> {
         use PayloadVerdict::{NotApartFromGains, Seen};
         let reading = self.readings.first()?;
