@@ -178,15 +178,42 @@ fn places(j: usize, n: usize, gains: bool) -> Vec<usize> {
     (0..STANDARD).chain(own).chain(gain).collect()
 }
 
-/// The columns of a row, the gain's where it is free: it multiplies what the joint carries with the body.
-fn columns(row: &[f64; OWN + 3], body: &DVector<f64>, gains: bool) -> Vec<f64> {
-    let carried: f64 = row[..STANDARD]
-        .iter()
-        .zip(body.iter())
-        .map(|(y, x)| y * x)
-        .sum();
-    let gain = gains.then_some(row[HAT] + carried);
-    row[..OWN].iter().copied().chain(gain).collect()
+/// Where a fit stands: gain errors multiply the body, so that its columns depend on both.
+struct Point {
+    body: DVector<f64>,
+    /// Gain error of each joint, 0 where gains are held.
+    gains: Vec<f64>,
+}
+
+impl Point {
+    fn of(theta: &DVector<f64>, n: usize, gains: bool) -> Self {
+        let gain = |j: usize| {
+            if gains {
+                theta[STANDARD + 3 * n + j]
+            } else {
+                0.0
+            }
+        };
+        Self {
+            body: theta.rows(0, STANDARD).into_owned(),
+            gains: (0..n).map(gain).collect(),
+        }
+    }
+
+    fn carried(&self, row: &[f64; OWN + 3]) -> f64 {
+        let each = row[..STANDARD].iter().zip(self.body.iter());
+        each.map(|(y, x)| y * x).sum()
+    }
+
+    /// The columns of a row of joint `j`, the gain's where it is free, and what they are to give: the torque
+    /// (1 + gain) (body + model) less the model, linear about this point.
+    fn linear(&self, j: usize, row: &[f64; OWN + 3], gains: bool) -> (Vec<f64>, f64) {
+        let (gain, carried) = (self.gains[j], self.carried(row));
+        let of_body = row[..STANDARD].iter().map(|y| (1.0 + gain) * y);
+        let of_gain = gains.then_some(row[HAT] + carried);
+        let columns = of_body.chain(row[STANDARD..OWN].iter().copied());
+        (columns.chain(of_gain).collect(), row[LEFT] + gain * carried)
+    }
 }
 
 fn reading(
@@ -203,15 +230,16 @@ fn reading(
     for _ in 0..ROUNDS {
         let mut factor = RFactor::new(u + 1);
         let mut whole = vec![0.0; u + 1];
-        let body = theta.rows(0, STANDARD).into_owned();
+        let point = Point::of(&theta, n, gains);
         for (j, of) in rows.joints.iter().enumerate() {
             let places = places(j, n, gains);
             for (row, _) in of {
                 whole.fill(0.0);
-                for (at, x) in places.iter().zip(columns(row, &body, gains)) {
+                let (columns, left) = point.linear(j, row, gains);
+                for (at, x) in places.iter().zip(columns) {
                     whole[*at] = weights[j] * x;
                 }
-                whole[u] = weights[j] * row[LEFT];
+                whole[u] = weights[j] * left;
                 factor.fold(&whole);
             }
         }
@@ -224,29 +252,29 @@ fn reading(
         }
     }
     let (inverse, open) = inverse(&normal)?;
-    let body = theta.rows(0, STANDARD).into_owned();
+    let point = Point::of(&theta, n, gains);
     let mut scores = vec![DVector::zeros(u); rows.blocks.len()];
     let mut by_model = DMatrix::zeros(u, covariance.nrows());
     for (j, of) in rows.joints.iter().enumerate() {
         let places = places(j, n, gains);
         let square = weights[j] * weights[j];
         for ((row, block), error) in of.iter().zip(errors(rows, j, n, &theta, gains)) {
-            for (at, x) in places.iter().zip(columns(row, &body, gains)) {
+            for (at, x) in places.iter().zip(point.linear(j, row, gains).0) {
                 scores[*block][*at] += square * x * error;
             }
         }
-        let beside = &rows.beside[j];
-        let carried = beside.rows(0, STANDARD).tr_mul(&body);
         // an error of the model is scaled as the model is
-        let scale = match gains {
-            true => square * (1.0 + theta[STANDARD + 3 * n + j]),
-            false => square,
-        };
+        let gain = 1.0 + point.gains[j];
+        let beside = &rows.beside[j];
+        let carried = beside.rows(0, STANDARD).tr_mul(&point.body);
         for (c, at) in places.iter().enumerate() {
             for k in 0..by_model.ncols() {
-                // the gain's column is what the joint carries, the body with it
-                let with_body = if c == HAT { carried[k] } else { 0.0 };
-                by_model[(*at, k)] += scale * (beside[(c, k)] + with_body);
+                let column = match c {
+                    0..STANDARD => gain * beside[(c, k)],
+                    HAT => beside[(c, k)] + carried[k],
+                    _ => beside[(c, k)],
+                };
+                by_model[(*at, k)] += square * gain * column;
             }
         }
     }
@@ -265,11 +293,11 @@ fn errors<'a>(
     theta: &'a DVector<f64>,
     gains: bool,
 ) -> impl Iterator<Item = f64> + 'a {
-    let (places, body) = (places(j, n, gains), theta.rows(0, STANDARD).into_owned());
+    let (places, point) = (places(j, n, gains), Point::of(theta, n, gains));
     rows.joints[j].iter().map(move |(row, _)| {
-        let fitted = columns(row, &body, gains);
-        let fitted = places.iter().zip(fitted).map(|(at, x)| theta[*at] * x);
-        row[LEFT] - fitted.sum::<f64>()
+        let (columns, left) = point.linear(j, row, gains);
+        let fitted = places.iter().zip(columns).map(|(at, x)| theta[*at] * x);
+        left - fitted.sum::<f64>()
     })
 }
 

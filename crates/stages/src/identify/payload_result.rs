@@ -10,6 +10,9 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
 use cft_ident_logs::log::Provenance;
 
+/// Standard deviations by which two readings contradict each other: as many as a change between logs needs.
+const FAR: f64 = 3.0;
+
 /// What a log says of the mass on the last link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -92,10 +95,12 @@ impl Number95 {
         self.interval_95.is_some_and(|[low, _]| low > 0.0)
     }
 
-    /// Whether the interval leaves a value out; false where there is none.
-    fn leaves_out(&self, value: f64) -> bool {
-        self.interval_95
-            .is_some_and(|[low, high]| value < low || value > high)
+    /// Whether a value is far from it; false where there is none.
+    fn is_far_from(&self, value: f64) -> bool {
+        let [Some(own), Some(std)] = [self.value, self.std] else {
+            return false;
+        };
+        (value - own).abs() > FAR * std
     }
 }
 
@@ -107,7 +112,7 @@ impl PayloadVerdict {
         match held.mass.value {
             None => Self::NotDetermined,
             Some(_) if !held.mass.is_above_zero() => Self::NoneSeen,
-            Some(mass) if free.mass.leaves_out(mass) => Self::GainsContradict,
+            Some(mass) if free.mass.is_far_from(mass) => Self::GainsContradict,
             Some(_) if free.mass.is_above_zero() => Self::Seen,
             Some(_) => Self::NotApartFromGains,
         }
