@@ -258,6 +258,9 @@ pub fn diagnose(
         found.in_memory.stretches = case.stretches;
         errors?;
     }
+    if found.diagnosis.withdraw_worse(&found.given) {
+        found.held = Held::default();
+    }
     let _work = control.begin("free run", None);
     found.free_run = found.run_freely(machine, (name, as_given))?;
     let spoiled = found.free_run.as_ref().and_then(spoiled);
