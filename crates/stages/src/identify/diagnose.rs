@@ -219,6 +219,8 @@ pub fn diagnose(
     };
     in_memory.stretches = std::mem::take(&mut case.stretches);
     let train = logs.train;
+    // beside a log that vetoes, held-out data measure and choose nothing
+    let holdout_chooses = logs.veto.is_empty();
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
         if aside.role == LogRole::Holdout {
@@ -258,7 +260,7 @@ pub fn diagnose(
         found.in_memory.stretches = case.stretches;
         errors?;
     }
-    if found.diagnosis.withdraw_worse(&found.given) {
+    if holdout_chooses && found.diagnosis.withdraw_worse(&found.given) {
         found.held = Held::default();
     }
     let _work = control.begin("free run", None);

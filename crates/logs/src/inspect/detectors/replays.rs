@@ -30,7 +30,8 @@ pub(in crate::inspect) struct Replays {
     seen: HashMap<u64, u64>,
     /// A row is remembered where these bits of its sum are 0.
     mask: u64,
-    before: u64,
+    /// Sums of the positions and of all numbers of the row before.
+    before: [u64; 2],
     rows: u64,
     run: Option<Replay>,
     found: Vec<Replay>,
@@ -48,13 +49,15 @@ impl Replays {
     #[inline]
     pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
         self.rows += 1;
-        let own = sum(others, sum(positions, 1));
+        let place = sum(positions, 1);
+        let own = sum(others, place);
+        let [place_before, own_before] = self.before;
+        self.before = [place, own];
         // what stands still repeats itself
-        if own == self.before || others.is_empty() {
+        if place == place_before || others.is_empty() {
             return;
         }
-        let pair = self.before.rotate_left(32) ^ own;
-        self.before = own;
+        let pair = own_before.rotate_left(32) ^ own;
         // the low bits of a product depend on few bits of its factors
         if (pair >> 40) & self.mask == 0 {
             self.look_up(t, pair);
@@ -63,6 +66,7 @@ impl Replays {
 
     fn look_up(&mut self, t: f64, pair: u64) {
         let Some(row) = self.seen.get(&pair) else {
+            self.part();
             self.seen.insert(pair, self.rows);
             if self.seen.len() > MAX_REMEMBERED {
                 self.mask = 2 * self.mask + 1;
@@ -116,9 +120,10 @@ mod tests {
     fn found(rows: u64, of: impl Fn(u64) -> u64) -> Vec<(f64, f64, u64)> {
         let mut replays = Replays::default();
         for k in 0..rows {
-            let x = of(k) as f64;
-            // a coarse position and a torque whose noise has few digits
-            let torque = (1e3 * (12.9 * x).sin()).round() / 10.0;
+            let row = of(k);
+            let x = row as f64;
+            // a coarse position, and a torque with noise
+            let torque = (row.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
             replays.take(
                 k as f64,
                 &[(0.3 * x).sin().mul_add(1e3, 0.5).floor()],

@@ -58,8 +58,8 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             worse.join(", ")
         );
     }
-    let unusual =
-        errors(d.errors_now()).1.overall.mean_relative_error > usual::band(machine.file.log.torque_is)[1];
+    let unusual = errors(d.errors_now()).1.overall.mean_relative_error
+        > usual::band(machine.file.log.torque_is)[1];
     let good = !gains_nothing
         && worse.is_empty()
         && !unusual
