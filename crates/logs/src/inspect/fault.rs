@@ -136,7 +136,7 @@ impl FaultKind {
             Self::StuckChannel => RowFault::StuckChannel,
             Self::Saturation => RowFault::Saturation,
             Self::Clipping => RowFault::Clipping,
-            Self::RepeatedRows | Self::RepeatedPart => RowFault::RepeatedRows,
+            Self::RepeatedRows => RowFault::RepeatedRows,
             Self::SampleAndHold => RowFault::SampleAndHold,
             Self::PositionStep => RowFault::PositionStep,
             Self::WrappedEncoder => RowFault::WrappedEncoder,

@@ -126,15 +126,19 @@ fn repeated_parts(judge: &LogJudge, draft: &mut FaultList) {
     let episodes = judge.replays.found();
     let effect = |rows: u64, times: usize| {
         format!(
-            "{} that stand in the log before, number for number: a file was appended to itself, or a buffer written twice. Counted twice they would make intervals too narrow; a fit takes them once",
+            "{} that stand in the log before, number for number: a file was appended to itself, or a buffer written twice. Counted twice, they make intervals too narrow",
             rows_text(rows, times)
         )
     };
-    let remedy =
-        "look for what wrote them again; where the rest of the log is whole, nothing is lost";
-    let kind = FaultKind::RepeatedPart;
-    draft.stretches(kind, Warning, None, &episodes, &effect, remedy);
-    draft.cut(kind, None, &episodes);
+    let remedy = "leave them out of a fit: `--leave-out FROM..TOs`; a simulation without noise repeats itself rightly";
+    draft.stretches(
+        FaultKind::RepeatedPart,
+        Warning,
+        None,
+        &episodes,
+        &effect,
+        remedy,
+    );
 }
 
 fn copies(judge: &LogJudge, draft: &mut FaultList) {
