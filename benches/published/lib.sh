@@ -19,8 +19,8 @@ needs() {
   [ -d "$1" ] || { echo "$name: SKIPPED, $1 is not there: $here/get says where the logs are"; exit 0; }
 }
 
-# told COMMAND...: runs it, and shows what it says only where it fails
-told() {
+# quietly COMMAND...: runs it, and shows what it says only where it fails
+quietly() {
   "$@" > "$work/said" 2>&1 || { cat "$work/said" >&2; exit 1; }
 }
 
@@ -28,9 +28,9 @@ told() {
 three() {
   local robot=$1
   shift
-  told "$tool" lsq --unconstrained --estimator ols "$@" -r "$robot" -o "$work/ols.toml" -q
-  told "$tool" lsq "$@" -r "$robot" -o "$work/default.toml" -q
-  told "$tool" diagnose "$@" -m "$work/default.toml" -o "$work/diagnosed.toml" -q
+  quietly "$tool" lsq --unconstrained --estimator ols "$@" -r "$robot" -o "$work/ols.toml" -q
+  quietly "$tool" lsq "$@" -r "$robot" -o "$work/default.toml" -q
+  quietly "$tool" diagnose "$@" -m "$work/default.toml" -o "$work/diagnosed.toml" -q
 }
 
 # row MACHINE DATA ERROR PUBLISHED FILTER SPAN LOG: the three models on a log; SPAN is "" or FROM..TO
@@ -40,7 +40,7 @@ row() {
   jq -n --arg machine "$1" --arg data "$2" --arg error "$3" --arg published "$4" \
     '{machine: $machine, data: $data, error: $error, "published": $published}' > "$work/row$count.json"
   for model in ols default diagnosed; do
-    told "$tool" validate "$7" -m "$work/$model.toml" -o "$work/$model.csv" -q
+    quietly "$tool" validate "$7" -m "$work/$model.toml" -o "$work/$model.csv" -q
   done
   "$python" "$published/metric.py" "$work/row$count.json" "$5" ${6:+"$6"} "$work"/{ols,default,diagnosed}.csv
 }

@@ -60,7 +60,7 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
         false => judge.clone(),
     };
     let written = work.halfway(written);
-    work.told(&ways, judge, written)
+    work.described(&ways, judge, written)
 }
 
 struct Judging<'a> {
@@ -250,7 +250,7 @@ impl Judging<'_> {
         model
     }
 
-    fn told(
+    fn described(
         &self,
         ways: &[Way],
         judge: AugmentedModel,

@@ -70,7 +70,7 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     if stale.moving == 0 {
         return;
     }
-    let episodes = stale.episodes.told();
+    let episodes = stale.episodes.merged();
     let (from, to) = match (episodes.first(), episodes.last()) {
         (Some((first, _)), Some((last, _))) => (first.from, last.to),
         _ => return,

@@ -145,7 +145,7 @@ pub struct EffectValueFound {
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
-    /// It is held at a bound, for these data do not tell it.
+    /// It is held at a bound, for these data do not determine it.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub bound: bool,
 }
@@ -339,7 +339,11 @@ impl Diagnosed {
             effect: effect.name(),
             family: effect.family().name(),
             joint: effect.place.name(robot),
-            parameters: self.told(machine, step).into_iter().map(number).collect(),
+            parameters: self
+                .numbers_of(machine, step)
+                .into_iter()
+                .map(number)
+                .collect(),
             alternatives,
             status: step.status,
             written: step.written.is_some(),

@@ -52,7 +52,7 @@ fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
     written.find(|step| !step.alternatives.is_empty())
 }
 
-/// The next motion to record, as a command that ends a result: it separates the first effect that the data do not tell
+/// The next motion to record, as a command that ends a result: it separates the first effect that the data do not determine
 /// from its like, or narrows what is weak in the model that is written, `path` as a shell takes it.
 pub fn next_motion(
     writer: &mut Writer,
