@@ -6,7 +6,7 @@ tool=$(realpath "${1:-target/release/cft-ident}")
 published=$(dirname "$here")
 root=$(realpath "$published/../..")
 shared=$root/../shared/data
-result=${RESULT:-$root/docs/results}/published_$name.json
+result=${RESULT:-$root/docs/results/published}/$name.json
 python=${PYTHON:-python3}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
