@@ -13,7 +13,7 @@ trap 'rm -rf "$work"' EXIT
 
 # stage: name, then the functions that are it, none of which calls another of the table
 stages=$(cat <<'END'
-check of the set-up|stages::setup::trial::SetupFit::new,stages::setup::trial::SetupFit::judged
+check of the set-up|stages::setup::trial::Trial::new
 rows of the fit and their filters|motion::window::FilterWindow::process
 data set aside: errors, bands, observer|identify::hold_out::Trial::run
 parameters that can exist|identify::consistent::consistent,identify::consistent::project_in
@@ -30,7 +30,7 @@ END
 # shares COMMAND...: processor seconds, then the share of each stage
 shares() {
   local times
-  times=$( { TIMEFORMAT='%U %S'; time perf record -q -F 499 --call-graph dwarf,16384 -o "$work/perf" \
+  times=$( { TIMEFORMAT='%U %S'; time perf record -q -F 199 --call-graph dwarf,8192 -o "$work/perf" \
     "$@" > "$work/said" 2>&1; } 2>&1 )
   perf report -i "$work/perf" --children --stdio -g none --percent-limit 0 2> /dev/null > "$work/report"
   while IFS='|' read -r stage functions; do

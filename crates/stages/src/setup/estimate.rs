@@ -10,7 +10,7 @@ use super::correction::{Change, Correction};
 use super::finding::ChannelKind::{self, Both, Position, Torque};
 use super::hypotheses::{LARGEST, round_numbers};
 use super::problem::Problem;
-use super::trial::{SetupFit, Trial, smallest};
+use super::trial::Trial;
 use super::weight::TWO_SIDED;
 
 /// Step of the grid of factors, by their logarithm, and of angles \[rad\].
@@ -141,19 +141,14 @@ fn best(
 ) -> Option<SetupEstimate> {
     let at = |x: f64, every: usize, same: &Trial| {
         let change = free.change(problem, x);
-        SetupFit::new(problem, (base, Some(&change)), every, Some(&same.fit))
+        Trial::new(problem, (base, Some(&change)), every, Some(same))
     };
     let [low, high] = free.range();
     let count = ((high - low) / STEP).ceil();
     let grid = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
-    let grid: Vec<f64> = grid.collect();
-    // from the set-up as it is outwards: the first are the best most often
-    let mut order: Vec<usize> = (0..grid.len()).collect();
-    order.sort_by(|a, b| grid[*a].abs().total_cmp(&grid[*b].abs()));
-    let quick = |x: f64| at(x, problem.few(), few);
-    let best = smallest(order, 1, |i| quick(grid[i]));
-    let mut x = grid[best.first()?.1];
-    let found = quick(x)?.judged()?;
+    let (mut x, found) = grid
+        .filter_map(|x| Some((x, at(x, problem.few(), few)?)))
+        .min_by(|a, b| a.1.whole().total_cmp(&b.1.whole()))?;
     let own: Vec<usize> = free
         .joint()
         .map_or_else(|| problem.channels_that_move(), |j| vec![j]);
@@ -164,7 +159,10 @@ fn best(
     }
     let (mut std, mut h) = (0.0, 0.2 * STEP);
     for _ in 0..STEPS {
-        let of = |x: f64| Some(at(x, 1, whole)?.of_blocks());
+        let of = |x: f64| -> Option<Vec<f64>> {
+            let fitted = at(x, 1, whole)?.fitted;
+            Some(fitted.iter().map(|block| block.iter().sum()).collect())
+        };
         let (below, here, above) = (of(x - h)?, of(x)?, of(x + h)?);
         let scores = below.iter().zip(&above).map(|(b, a)| (a - b) / (2.0 * h));
         let sum = |of: &[f64]| of.iter().sum::<f64>();

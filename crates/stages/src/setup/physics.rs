@@ -50,14 +50,14 @@ impl Broken {
 
 /// The mean inertia that each joint's drive feels, as weights of the unknowns.
 fn inertias(problem: &Problem, trial: &Trial) -> Vec<DVector<f64>> {
-    let robot = &trial.fit.robot;
+    let robot = &trial.robot;
     let (n, p) = (robot.joints(), robot.parameters().len());
     let mut carried = Carried::new(n);
-    let mut out = vec![DVector::zeros(trial.fit.theta.len()); n];
+    let mut out = vec![DVector::zeros(trial.theta.len()); n];
     let (mut unit, still) = (vec![0.0; n], vec![0.0; n]);
     let (mut y, mut at_rest) = (vec![0.0; n * p], vec![0.0; n * p]);
     for k in (0..problem.sample.len()).step_by(problem.few()) {
-        if !(problem.channels).carry(robot, problem.sample.row(k), &trial.fit.by, &mut carried) {
+        if !(problem.channels).carry(robot, problem.sample.row(k), &trial.by, &mut carried) {
             continue;
         }
         robot.regressor(&carried.q, &still, &still, &mut at_rest);
@@ -77,8 +77,8 @@ fn inertias(problem: &Problem, trial: &Trial) -> Vec<DVector<f64>> {
 /// a joint that goes one way only, where friction and a constant torque are the same.
 fn friction_power(problem: &Problem, trial: &Trial, joint: usize) -> Option<DVector<f64>> {
     let own = &problem.columns.own[joint];
-    let first = problem.first_own(&trial.fit.robot, joint);
-    let sums = &trial.fit.total[joint];
+    let first = problem.first_own(&trial.robot, joint);
+    let sums = &trial.total[joint];
     let column = |of: Own| {
         let at = own.iter().position(|o| *o == of)?;
         Some(sums.nrows() - 1 - own.len() + at)
@@ -91,9 +91,9 @@ fn friction_power(problem: &Problem, trial: &Trial, joint: usize) -> Option<DVec
             return None;
         }
     }
-    let mut out = DVector::zeros(trial.fit.theta.len());
+    let mut out = DVector::zeros(trial.theta.len());
     for (i, of) in own.iter().enumerate().filter(|(_, of)| **of != Own::Offset) {
-        out[first + i] = sums[(speed, column(*of)?)] / trial.fit.rows.count as f64;
+        out[first + i] = sums[(speed, column(*of)?)] / trial.rows.count as f64;
     }
     Some(out)
 }

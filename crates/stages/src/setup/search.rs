@@ -10,7 +10,7 @@ use super::finding::ChannelKind::Torque;
 use super::hypotheses::{self, oddity};
 use super::physics::{Broken, Driven};
 use super::problem::Problem;
-use super::trial::{Compared, SetupFit, Trial, smallest};
+use super::trial::{Compared, Trial};
 use super::undecided::{Undecided, proportion, undecided};
 use super::weight::{Weight, weights};
 use cft_ident_core::judge::NUMBERS;
@@ -119,11 +119,10 @@ impl Look<'_> {
         base: &Correction,
         change: Option<&Change>,
         same: Option<&Trial>,
-    ) -> Option<SetupFit> {
-        let same = same.map(|same| &same.fit);
+    ) -> Option<Trial> {
         match (self.stopped)() {
             true => None,
-            false => SetupFit::new(self.problem, (base, change), self.problem.few(), same),
+            false => Trial::new(self.problem, (base, change), self.problem.few(), same),
         }
     }
 
@@ -138,7 +137,7 @@ impl Look<'_> {
         if doubt.is_empty() && turned == 0 {
             return (None, None);
         }
-        let few = self.quick(base, None, None).and_then(SetupFit::judged);
+        let few = self.quick(base, None, None);
         let all = hypotheses::all(self.problem);
         let mut list = self.judged(base, all, (few.as_ref(), declared));
         let mut fitted: Option<(SetupEstimate, Trial)> = None;
@@ -146,8 +145,7 @@ impl Look<'_> {
             let both = (few, &whole.trial);
             for estimate in estimates(self.problem, base, &doubt, both) {
                 let mistakes = estimate.mistakes(&self.problem.known.ratios);
-                let known =
-                    |c: &Change| list.iter().any(|j| j.trial.fit.change.as_ref() == Some(c));
+                let known = |c: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(c));
                 let new: Vec<Change> = mistakes.into_iter().filter(|c| !known(c)).collect();
                 let of = |c: &Change| self.whole(base, Some(c), Some(&whole.trial));
                 list.extend(new.iter().filter_map(of));
@@ -192,17 +190,20 @@ impl Look<'_> {
         list: Vec<Change>,
         (few, declared): (Option<&Trial>, Option<&Judged>),
     ) -> Vec<Judged> {
-        let quick = |i: usize| self.quick(base, Some(&list[i]), few);
-        let best = smallest(0..list.len(), LIMITS.short_list, quick);
-        let mut chosen: Vec<usize> = best.into_iter().map(|(_, i)| i).collect();
+        let score = |change: &Change| Some(self.quick(base, Some(change), few)?.whole());
+        let scores: Vec<f64> = (list.par_iter())
+            .map(|change| score(change).unwrap_or(f64::INFINITY))
+            .collect();
+        let mut order: Vec<usize> = (0..list.len()).filter(|i| scores[*i].is_finite()).collect();
+        order.sort_by(|a, b| scores[*a].total_cmp(&scores[*b]));
         let turned = declared.map_or(&[][..], |d| &d.broken.turned);
         let turns = |i: &usize| match &list[*i] {
             Change::Scale(_, joints, -1.0) => joints.iter().any(|j| turned.contains(j)),
             _ => false,
         };
-        let others = (0..list.len()).filter(|i| turns(i) && !chosen.contains(i));
-        let others = smallest(others.collect::<Vec<_>>(), list.len(), quick);
-        chosen.extend(others.into_iter().map(|(_, i)| i));
+        let (best, rest) = order.split_at(LIMITS.short_list.min(order.len()));
+        let mut chosen: Vec<usize> = best.to_vec();
+        chosen.extend(rest.iter().copied().filter(turns));
         let same = declared.map(|d| &d.trial);
         (chosen.par_iter())
             .filter_map(|i| self.whole(base, Some(&list[*i]), same))
@@ -218,7 +219,7 @@ impl Look<'_> {
         };
         let same = declared.map(|d| &d.trial);
         let far = |by: f64| {
-            let other = trial.fit.change.as_ref().and_then(|c| c.times(by));
+            let other = trial.change.as_ref().and_then(|c| c.times(by));
             let other = other.and_then(|c| Trial::new(self.problem, (base, Some(&c)), 1, same));
             other.is_none_or(|other| other.square(&seen) > LIMITS.far * trial.square(&seen))
         };
@@ -240,7 +241,7 @@ impl Look<'_> {
             all.iter().filter(other).map(pair).collect()
         };
         firsts
-            .filter_map(|trial| trial.fit.change.as_ref())
+            .filter_map(|trial| trial.change.as_ref())
             .flat_map(with)
             .collect()
     }
@@ -261,7 +262,7 @@ impl Look<'_> {
             turned(a).cmp(&turned(b)).then(errors)
         });
         let best = self.plainer(&order)?;
-        let change = best.trial.fit.change.clone()?;
+        let change = best.trial.change.clone()?;
         let after = best.trial.errors();
         let (mut seen, mut before) = (everyone.clone(), vec![f64::NAN; after.len()]);
         let (mut mended, mut confirmed) = (false, true);
@@ -299,10 +300,9 @@ impl Look<'_> {
         let untold = |j: &Trial| !j.gain(&best.trial, &seen).is_beyond(NUMBERS.screen, None);
         let near = |j: &Trial| j.square(&seen) < LIMITS.far * best.trial.square(&seen) || untold(j);
         let others = order.iter().map(|j| (turned(j), &j.trial));
-        let others =
-            others.filter(|(t, j)| j.fit.change != best.trial.fit.change && *t <= turned(best));
+        let others = others.filter(|(t, j)| j.change != best.trial.change && *t <= turned(best));
         let others: Vec<&Trial> = others.map(|(_, j)| j).filter(|j| near(j)).collect();
-        let tied: Vec<Change> = others.iter().filter_map(|j| j.fit.change.clone()).collect();
+        let tied: Vec<Change> = others.iter().filter_map(|j| j.change.clone()).collect();
         // a ratio that its neighbours are as good as, and that leaves most of the error, is an estimate
         let ratio = |c: &Change| c.times(1.0).is_some() && self.oddity(c) > 0;
         let neighbour = |c: &Change| ratio(c) && c.joints() == change.joints();
@@ -312,13 +312,12 @@ impl Look<'_> {
         }
         let made = change.clone();
         let elsewhere = |j: &&&Trial| {
-            let other = j.fit.change.as_ref();
+            let other = j.change.as_ref();
             other.is_some_and(|other| !same_place(&made, other))
         };
         let open = others.iter().filter(elsewhere).any(|j| untold(j));
         let beside = fitted.is_some_and(|f| {
             let own = f
-                .fit
                 .change
                 .as_ref()
                 .is_some_and(|c| c.joints() == change.joints());
@@ -363,8 +362,8 @@ impl Look<'_> {
     /// more often.
     fn plainer<'j>(&self, order: &[&'j Judged]) -> Option<&'j Judged> {
         let best = *order.first()?;
-        let odd = |j: &Judged| j.trial.fit.change.as_ref().map_or(0, |c| self.oddity(c));
-        let alike = |j: &&&Judged| match (&best.trial.fit.change, &j.trial.fit.change) {
+        let odd = |j: &Judged| j.trial.change.as_ref().map_or(0, |c| self.oddity(c));
+        let alike = |j: &&&Judged| match (&best.trial.change, &j.trial.change) {
             (Some(Change::Scale(a, of, _)), Some(Change::Scale(b, other, _))) => {
                 a == b && of == other
             }
@@ -384,13 +383,13 @@ impl Look<'_> {
 
     /// Errors with gravity and without, where the fit needs none: fewer parameters, and no joint is worse.
     fn without_gravity(&self, declared: &Trial) -> Option<[Vec<f64>; 2]> {
-        if declared.fit.robot.tree().gravity() == [0.0; 3] {
+        if declared.robot.tree().gravity() == [0.0; 3] {
             return None;
         }
         let base = Correction::none(self.problem.robot.joints());
         let none = Change::Gravity([0.0; 3]);
         let none = self.whole(&base, Some(&none), None)?.trial;
-        let fewer = none.fit.robot.parameters().len() < declared.fit.robot.parameters().len();
+        let fewer = none.robot.parameters().len() < declared.robot.parameters().len();
         let sound = none.errors().iter().all(|e| *e <= LIMITS.unexplained);
         let harms = Compared::of(self.problem, declared, &none).harms;
         (fewer && sound && !harms).then(|| [declared.errors(), none.errors()])

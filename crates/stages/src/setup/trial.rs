@@ -13,40 +13,35 @@ use cft_ident_core::judge::{
 };
 use cft_ident_core::robot::Robot;
 
-/// A hypothesis as it was fitted to all blocks.
+/// A hypothesis as it was fitted.
 #[derive(Clone)]
-pub(super) struct SetupFit {
+pub(super) struct Trial {
     pub change: Option<Change>,
     pub by: Correction,
     pub robot: Robot,
     pub rows: Arc<Rows>,
     /// Each joint's torque counts by its own squares; 0 where it does not count.
     pub terms: Terms,
-    sums: BlockSums,
     /// Sums over all blocks.
     pub total: Vec<DMatrix<f64>>,
     /// The unknowns by all blocks.
     pub theta: DVector<f64>,
-}
-
-/// The same with what it leaves of blocks that are left out.
-#[derive(Clone)]
-pub(super) struct Trial {
-    pub fit: SetupFit,
-    /// The unknowns without each block.
+    /// The same without each block.
     pub without: Vec<DVector<f64>>,
     /// Squared errors of blocks that were left out, over the joint's squared torque, `[block][joint]`.
     left_out: Vec<Vec<f64>>,
+    /// The same by the fit to all blocks.
+    pub fitted: Vec<Vec<f64>>,
 }
 
-impl SetupFit {
-    /// Fits a change upon `base` to every so many rows. `same` is a fit to these rows at `base`, whose columns serve
+impl Trial {
+    /// Fits a change upon `base` to every so many rows. `same` is a trial of these rows at `base`, whose columns serve
     /// where only torques change. None where most rows belong to no pose.
     pub fn new(
         problem: &Problem,
         (base, change): (&Correction, Option<&Change>),
         every: usize,
-        same: Option<&SetupFit>,
+        same: Option<&Trial>,
     ) -> Option<Self> {
         let by = change.map_or_else(|| base.clone(), |change| base.with(change));
         let torques = change.is_none_or(Change::is_of_torques);
@@ -78,67 +73,40 @@ impl SetupFit {
             prior: (DMatrix::zeros(0, 0), DVector::zeros(0)),
             ridge: NUMBERS.ridge,
         };
-        let theta = terms.fit(&total, &[]).values;
-        Some(Self {
-            change: change.cloned(),
-            by,
-            robot,
-            rows,
-            terms,
-            sums,
-            total,
-            theta,
-        })
-    }
-
-    fn shares(&self, squares: Vec<f64>) -> Vec<f64> {
-        let each = squares.iter().zip(&self.terms.weights);
-        each.map(|(s, w)| s * w).collect()
-    }
-
-    /// Squared error of each block over all joints, each over its squared torque.
-    pub fn of_blocks(&self) -> Vec<f64> {
-        let blocks = self.sums.blocks.iter();
-        let of = |block| self.shares(self.terms.squares(block, &self.theta));
-        blocks.map(|block| of(block).iter().sum()).collect()
-    }
-
-    /// The least that [`Trial::whole`] can be: a block that is left out of a fit is never nearer to it.
-    pub fn least(&self) -> f64 {
-        self.shares(self.terms.squares(&self.total, &self.theta))
-            .iter()
-            .sum()
-    }
-
-    /// Leaves out each block.
-    pub fn judged(self) -> Option<Trial> {
-        let left_out = BlocksLeftOut::new(&self.sums, 0, &self.terms)?;
-        let errors = left_out.errors().into_iter();
-        let errors: Vec<Vec<f64>> = errors.map(|squares| self.shares(squares)).collect();
+        let left_out = BlocksLeftOut::new(&sums, 0, &terms)?;
+        let shares = |squares: Vec<f64>| -> Vec<f64> {
+            squares
+                .iter()
+                .zip(&terms.weights)
+                .map(|(s, w)| s * w)
+                .collect()
+        };
+        let errors: Vec<Vec<f64>> = left_out.errors().into_iter().map(shares).collect();
         let without = left_out.values().cloned().collect();
-        let finite = errors.iter().flatten().all(|x| x.is_finite());
-        finite.then_some(Trial {
-            without,
-            left_out: errors,
-            fit: self,
-        })
-    }
-}
-
-impl Trial {
-    /// A [`SetupFit`] with each block left out.
-    pub fn new(
-        problem: &Problem,
-        changed: (&Correction, Option<&Change>),
-        every: usize,
-        same: Option<&Trial>,
-    ) -> Option<Self> {
-        SetupFit::new(problem, changed, every, same.map(|same| &same.fit))?.judged()
+        let theta = terms.fit(&total, &[]).values;
+        let fitted = (sums.blocks.iter()).map(|block| shares(terms.squares(block, &theta)));
+        let fitted = fitted.collect();
+        errors
+            .iter()
+            .flatten()
+            .all(|x| x.is_finite())
+            .then_some(Self {
+                change: change.cloned(),
+                by,
+                robot,
+                rows,
+                terms,
+                total,
+                theta,
+                without,
+                left_out: errors,
+                fitted,
+            })
     }
 
     /// Error of each joint in blocks left out, a share of its torque.
     pub fn errors(&self) -> Vec<f64> {
-        let joints = 0..self.fit.terms.weights.len();
+        let joints = 0..self.terms.weights.len();
         joints.map(|j| self.square(&[j]).sqrt()).collect()
     }
 
@@ -159,32 +127,10 @@ impl Trial {
     }
 
     fn only(&self, joints: &[usize]) -> Vec<f64> {
-        let all = 0..self.fit.terms.weights.len();
+        let all = 0..self.terms.weights.len();
         all.map(|j| f64::from(u8::from(joints.contains(&j))))
             .collect()
     }
-}
-
-/// Places and errors on blocks left out of the `count` trials of a list that leave least, least first and of equal ones
-/// the first; a fit that leaves more even of the blocks it was made of is not among them, and no block is left out of it.
-pub(super) fn smallest(
-    places: impl IntoIterator<Item = usize>,
-    count: usize,
-    fit: impl Fn(usize) -> Option<SetupFit>,
-) -> Vec<(f64, usize)> {
-    let mut found: Vec<(f64, usize)> = Vec::new();
-    for place in places {
-        let most = found.get(count - 1).map_or(f64::INFINITY, |of| of.0);
-        // the least is rounded
-        let near = |fit: &SetupFit| fit.least() * (1.0 - 1e-6) <= most;
-        let trial = fit(place).filter(near).and_then(SetupFit::judged);
-        if let Some(trial) = trial {
-            found.push((trial.whole(), place));
-            found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            found.truncate(count);
-        }
-    }
-    found
 }
 
 /// A hypothesis against another one.
@@ -199,7 +145,7 @@ pub(super) struct Compared {
 
 impl Compared {
     pub fn of(problem: &Problem, before: &Trial, after: &Trial) -> Self {
-        let everyone: Vec<usize> = (0..before.fit.terms.weights.len()).collect();
+        let everyone: Vec<usize> = (0..before.terms.weights.len()).collect();
         let gain = before.gain(after, &everyone);
         let (b, a) = (before.errors(), after.errors());
         let changed = |j: &usize, by: f64| {

@@ -73,16 +73,16 @@ pub(super) fn proportion(problem: &Problem, moving: &[usize], j: usize) -> Optio
 /// Share of a joint's torque that its friction terms take, by root mean square.
 fn friction(problem: &Problem, trial: &Trial, j: usize) -> f64 {
     let own = &problem.columns.own[j];
-    let first = problem.first_own(&trial.fit.robot, j);
-    let sums = &trial.fit.total[j];
+    let first = problem.first_own(&trial.robot, j);
+    let sums = &trial.total[j];
     let column = sums.nrows() - 1 - own.len();
     let terms = || (0..own.len()).filter(|i| own[*i] != Own::Offset);
     let product = |a: usize, b: usize| {
-        trial.fit.theta[first + a] * trial.fit.theta[first + b] * sums[(column + a, column + b)]
+        trial.theta[first + a] * trial.theta[first + b] * sums[(column + a, column + b)]
     };
     let square: f64 = terms()
         .flat_map(|a| terms().map(move |b| (a, b)))
         .map(|(a, b)| product(a, b))
         .sum();
-    (square.max(0.0) * trial.fit.terms.weights[j]).sqrt()
+    (square.max(0.0) * trial.terms.weights[j]).sqrt()
 }
