@@ -53,6 +53,8 @@ pub enum FaultKind {
     IrregularClock,
     /// Rows that show the positions of the row before while the robot moves.
     RepeatedRows,
+    /// A stretch that stands in the log before it, number for number.
+    RepeatedPart,
     /// A channel that stands still while what it measures does not.
     StuckChannel,
     /// Flat tops of a torque, current or voltage.
@@ -105,6 +107,7 @@ impl FaultKind {
             Self::Dropout => "dropout",
             Self::IrregularClock => "irregular-clock",
             Self::RepeatedRows => "repeated-rows",
+            Self::RepeatedPart => "repeated-part",
             Self::StuckChannel => "stuck-channel",
             Self::Saturation => "saturation",
             Self::Clipping => "clipping",

@@ -407,7 +407,7 @@ fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult
     let reason = match (step.written, step.status) {
         (Some(_), _) => "",
         (None, StepStatus::Seen) => "the parts of the data do not agree on its amplitude",
-        (None, _) if step.vetoed() => "it makes a joint worse on held-out data",
+        (None, _) if step.vetoed() => "held-out data are worse with it",
         (None, _) => "it can be measured, and the parts of the data do not agree enough",
     };
     CandidateResult {

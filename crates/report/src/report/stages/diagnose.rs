@@ -132,7 +132,7 @@ pub fn diagnosed(
 /// Errors joint by joint, those of a screen.
 fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
     let (_, before) = errors_of(&d.before);
-    let (data, after) = errors_of(&d.after);
+    let (data, after) = errors_of(d.errors_now());
     let changed = d.written().next().is_some();
     let mut columns = vec![
         ("joint", Align::Left),

@@ -21,7 +21,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
         Some(_) => "held-out data",
         None => "the fitted data",
     };
-    let errors = [&d.before, &d.after].map(|split| errors_of(split).1);
+    let errors = [&d.before, d.errors_now()].map(|split| errors_of(split).1);
     let bar = |errors: &Errors, j: usize| ErrorBar {
         error: errors.joints[j].relative_error,
         interval_95: Some(errors.joints[j].interval_95),
