@@ -13,6 +13,7 @@
 //! | [`next_motion`] | what is the motion worth that `lsq` proposes to record next? |
 //! | [`nulls`] | is an effect written where the torque is the model's and noise, along measured motions? |
 //! | [`rotations`] | what does a diagnosis do to measured data that nobody used? |
+//! | [`payload`] | is a load found, and do its intervals hold it? |
 //! | [`setup`] | is a right robot file left in peace, and a mistake named? |
 
 #![forbid(unsafe_code)]
@@ -38,6 +39,7 @@ pub mod next_motion;
 pub mod nulls;
 pub mod page;
 pub mod path;
+pub mod payload;
 pub mod plant;
 pub mod planted;
 pub mod rotations;

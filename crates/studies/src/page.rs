@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::study::{Rows, StudyError};
-use crate::{clean, coverage, next_motion, nulls, planted, rotations, setup};
+use crate::{clean, coverage, next_motion, nulls, payload, planted, rotations, setup};
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
@@ -20,6 +20,7 @@ pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
         ("rotations", rotations::table),
         ("setup", setup::table),
         ("next", next_motion::table),
+        ("payload", payload::table),
     ] {
         let rows = Rows::open(results, &format!("independent_{name}"))?;
         if !rows.rows.is_empty() {

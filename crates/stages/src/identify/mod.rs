@@ -53,6 +53,7 @@ mod open_loop;
 mod own_settings;
 mod passes;
 mod payload;
+mod payload_result;
 mod position_cutoff;
 mod prior;
 mod reduce;
@@ -107,7 +108,8 @@ pub use next_motion::{narrowing_command, separating_command};
 pub use open_log::OpenLog;
 pub use open_loop::{free_run, open_loop};
 pub use passes::SimulatedLoop;
-pub use payload::{GainOff, LeftOfJoint, Number95, Payload, PayloadReading, payload};
+pub use payload::payload;
+pub use payload_result::{GainOff, LeftOfJoint, Number95, Payload, PayloadReading, PayloadVerdict};
 pub use position_cutoff::PositionCutoff;
 pub use reduce::reduce;
 pub use reduced::{

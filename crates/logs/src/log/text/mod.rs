@@ -5,6 +5,7 @@ mod head;
 mod json_lines;
 mod line;
 mod number;
+mod records;
 mod table;
 
 use std::path::Path;
