@@ -67,6 +67,8 @@ pub enum FaultKind {
     Quantisation,
     /// Single rows far off their neighbours.
     Spike,
+    /// A position that leaps to and fro in more rows than can be spikes.
+    Erratic,
     /// Rows in which every channel reads one number, 0 mostly.
     FailedRead,
     /// A channel that is another one's copy.
@@ -114,6 +116,7 @@ impl FaultKind {
             Self::BeyondLimits => "beyond-limits",
             Self::Quantisation => "quantisation",
             Self::Spike => "spike",
+            Self::Erratic => "erratic",
             Self::FailedRead => "failed-read",
             Self::CopiedChannel => "copied-channel",
             Self::CommandAsMeasurement => "command-as-measurement",
@@ -132,7 +135,7 @@ impl FaultKind {
     /// Whether `[log] keep` says that its rows stay as they were logged.
     pub(super) fn kept(self, keep: &[RowFault]) -> bool {
         let of = match self {
-            Self::Spike | Self::FailedRead => RowFault::Spike,
+            Self::Spike | Self::Erratic | Self::FailedRead => RowFault::Spike,
             Self::StuckChannel => RowFault::StuckChannel,
             Self::Saturation => RowFault::Saturation,
             Self::Clipping => RowFault::Clipping,

@@ -129,7 +129,7 @@ pub(super) fn read_pieces(
             }
             Ok(more)
         })
-        .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+        .map_err(|e| open.ended(e))?;
         open.count_run_time(&mut found);
         if model.takes_temperatures() {
             let temperatures = machine.temperatures_for(model, log, open.origin())?;
