@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::study::{Rows, StudyError};
-use crate::{clean, coverage, next_motion, planted, setup};
+use crate::{clean, coverage, formula, next_motion, planted, setup};
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
@@ -16,6 +16,7 @@ pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
         ("coverage", coverage::table as fn(&Rows) -> String),
         ("clean", clean::table),
         ("planted", planted::table),
+        ("formula", formula::table),
         ("setup", setup::table),
         ("next", next_motion::table),
     ] {
