@@ -359,18 +359,7 @@ impl Subject {
         let path = folder.join("with.toml");
         let text =
             std::fs::read_to_string(&path).map_err(|source| StudyError::File { path, source })?;
-        let parts: Vec<&str> = text.split("[[effect]]").collect();
-        let is_formula = |part: &&&str| part.trim_start().starts_with("name = \"formula-");
-        let end = |part: &str| {
-            part.find("\n[[")
-                .or_else(|| part.find("\n[p"))
-                .unwrap_or(part.len())
-        };
-        let kept = parts[1..].iter().map(|part| match is_formula(&part) {
-            true => part[end(part)..].to_owned(),
-            false => format!("[[effect]]{part}"),
-        });
-        let without = format!("{}{}", parts[0], kept.collect::<String>());
+        let without = silent(&text);
         crate::files::write(&folder.join("without.toml"), &without)?;
         let mut torques = Vec::new();
         for (model, out) in [("with.toml", "t1.csv"), ("without.toml", "t0.csv")] {
@@ -396,6 +385,24 @@ impl Subject {
             rms(&beside(&error, &columns)) / rms(&beside(&law, &columns)),
         ))
     }
+}
+
+/// A model file whose formulas have no coefficients but zeros.
+fn silent(model: &str) -> String {
+    let (mut table, mut of_formula) = ("", false);
+    let line = |line| {
+        if str::starts_with(line, '[') {
+            table = line;
+        } else if table == "[[effect]]" && line.starts_with("name = ") {
+            of_formula = line.contains("\"formula-");
+        }
+        let own = of_formula && table.starts_with("[effect.parameters.c");
+        match own && line.starts_with("value = ") {
+            true => "value = 0.0\n".to_owned(),
+            false => format!("{line}\n"),
+        }
+    };
+    model.lines().map(line).collect()
 }
 
 /// Error that the noise of a joint is along a log.

@@ -139,8 +139,10 @@ pub struct FoundFormula {
 pub struct Symmetry {
     /// It flips where the motion is reversed: friction.
     pub odd: f64,
-    /// It goes round with a position: a transmission.
+    /// It goes round with the joint's position: a transmission.
     pub periodic: f64,
+    /// It goes by an acceleration: an inertia.
+    pub inertial: f64,
     /// It takes a signal of another joint: a coupling.
     pub coupled: f64,
 }

@@ -191,7 +191,8 @@ fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
     let place = joint.as_ref().map_or(String::new(), |j| format!(" of {j}"));
     DiagnoseError::Accept {
         name: format!("{name}{place}"),
-        why: "it was not among the candidates: see `candidates` in the JSON document for those that there are"
+        why: "it was not among the candidates: see `candidates` in the JSON document for those that there are; a \
+              formula is there with --search"
             .to_owned(),
     }
 }

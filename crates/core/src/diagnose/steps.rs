@@ -89,7 +89,7 @@ impl Judging<'_> {
         };
         let formula_wanted = |effect: &Added| {
             let joint = effect.place.name(robot);
-            let own = |d: &String| effect.name() == *d;
+            let own = |name: &String| effect.name().starts_with(name);
             joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
         };
         let verified = tables::verified(

@@ -52,8 +52,10 @@ pub struct FormulaResult {
 pub struct SymmetryShares {
     /// It flips where the motion is reversed.
     pub odd: f64,
-    /// It goes round with a position.
+    /// It goes round with the joint's position.
     pub periodic: f64,
+    /// It goes by an acceleration.
+    pub inertial: f64,
     /// It takes a signal of another joint.
     pub coupled: f64,
 }
@@ -63,6 +65,7 @@ impl From<&Symmetry> for SymmetryShares {
         SymmetryShares {
             odd: of.odd,
             periodic: of.periodic,
+            inertial: of.inertial,
             coupled: of.coupled,
         }
     }

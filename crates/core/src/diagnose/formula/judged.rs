@@ -199,7 +199,7 @@ impl PreparedCase<'_> {
             }
             let joint = &names.joints[of.joint];
             Definition {
-                name: formula_name(joint),
+                name: self.free_name(&formula_name(joint)),
                 joints: Some(vec![joint.clone()]),
                 coefficients,
                 shapes: shapes.iter().map(range).collect(),
@@ -212,6 +212,14 @@ impl PreparedCase<'_> {
                 meaning: "a formula of what was left, found by diagnose --search".to_owned(),
             }
         })
+    }
+
+    /// A name, numbered where the given model has an effect that is called so.
+    fn free_name(&self, name: &str) -> String {
+        let known = |own: &String| self.case.given.effects.iter().any(|e| e.name() == own);
+        let numbered = (2..).map(|k| format!("{name}-{k}"));
+        let mut all = std::iter::once(name.to_owned()).chain(numbered);
+        all.find(|own| !known(own)).unwrap_or_default()
     }
 
     fn symmetry(&self, of: &Proposed) -> Symmetry {
