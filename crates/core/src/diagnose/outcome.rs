@@ -9,8 +9,11 @@ use super::problem::unknowns::Unknown;
 use super::unexplained::Unexplained;
 use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::{Errors, JointChange};
+use super::unexplained::signal::Signal;
+use crate::effect::formula::Definition;
 use crate::effect::{Added, AugmentedModel, Law, Place};
 use crate::judge::ErrorGain;
+use crate::robot::FormulaSignal;
 
 /// How firm an effect is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -95,6 +98,63 @@ pub struct FrictionChange {
     pub certainty: f64,
 }
 
+/// What becomes of a formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FormulaEnd {
+    /// It gains on blocks left out, all parts agree, no joint gets worse, and chance makes none as good.
+    Found,
+    /// Searches where whole parts have another sign find as much.
+    Chance,
+    /// The parts of the data do not agree on it, or it gains too little beside the rest.
+    Parts,
+    /// A joint gets worse by it on data set aside.
+    Worse,
+}
+
+/// The formula of a joint.
+#[derive(Debug, Clone)]
+pub struct FoundFormula {
+    pub joint: usize,
+    pub end: FormulaEnd,
+    /// As an effect of the user's own.
+    pub definition: Definition,
+    /// Its numbers, with what the judge says of it.
+    pub step: FoundEffect,
+    /// Chance of a gain as large where whole parts of the residual have another sign.
+    pub p_value: f64,
+    /// Part of the squared error of blocks left out that it takes off.
+    pub share: f64,
+    pub symmetry: Symmetry,
+    /// What its terms are functions of.
+    pub signals: Vec<(FormulaSignal, usize)>,
+    /// None where the parts do not agree, or nothing is held out.
+    pub picture: Option<FormulaPicture>,
+    /// Effects of the catalogue at the joint in whose place it stands.
+    pub in_place_of: Vec<Added>,
+}
+
+/// Parts of what a formula adds, by its terms' squares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Symmetry {
+    /// It flips where the motion is reversed: friction.
+    pub odd: f64,
+    /// It goes round with the joint's position: a transmission.
+    pub periodic: f64,
+    /// It goes by an acceleration: an inertia.
+    pub inertial: f64,
+    /// It takes a signal of another joint: a coupling.
+    pub coupled: f64,
+}
+
+/// What a formula is drawn over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FormulaPicture {
+    pub over: Signal,
+    /// Signal, residual without the formula, torque of the formula.
+    pub rows: Vec<[f64; 3]>,
+}
+
 /// The outcome.
 pub struct Diagnosis {
     /// The model that is written: the given one where nothing is.
@@ -135,6 +195,8 @@ pub struct Diagnosis {
     pub parts_needed: usize,
     /// Whether the declared model explains more of blocks left out than no torque does.
     pub determined: bool,
+    /// Formulas of what is left, where they were looked for.
+    pub formulas: Vec<FoundFormula>,
 }
 
 impl Diagnosis {

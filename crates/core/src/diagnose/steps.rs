@@ -6,6 +6,7 @@ use super::error::DiagnoseError;
 use super::held_out::EffectChange;
 use super::outcome::{FoundEffect, StepStatus};
 use super::prepared::{PreparedCase, moved};
+use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, value};
 use super::search::{Chosen, Field};
@@ -16,6 +17,7 @@ use crate::effect::{Added, AugmentedModel};
 use crate::judge::{Numbers, Terms};
 
 /// What is made of the effects that were chosen.
+#[derive(Clone)]
 pub struct Judged {
     pub steps: Vec<FoundEffect>,
     /// With every effect whose parts agree.
@@ -85,6 +87,11 @@ impl Judging<'_> {
         let is = |effect: &Added, (name, joint): &(String, Option<String>)| {
             effect.name() == name && effect.place.name(robot) == *joint
         };
+        let formula_wanted = |effect: &Added| {
+            let joint = effect.place.name(robot);
+            let own = |name: &String| effect.name().starts_with(name);
+            joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
+        };
         let verified = tables::verified(
             &self.field,
             self.declared,
@@ -94,7 +101,8 @@ impl Judging<'_> {
         let way = |verified: Verified| {
             let effect = &searched.candidates[verified.chosen.candidate].effect;
             Way {
-                accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted)),
+                accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted))
+                    || effect.law.formula.is_some() && formula_wanted(effect),
                 verified,
                 amplitude: None,
                 change: None,

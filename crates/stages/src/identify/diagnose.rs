@@ -20,7 +20,8 @@ use super::temperatures;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, Heard, LogRole, ParameterPrior, Watch, Wishes,
+    self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ParameterPrior, Watch,
+    Wishes,
 };
 use cft_ident_core::effect::{self, AugmentedModel};
 use cft_ident_core::judge::NUMBERS;
@@ -83,6 +84,8 @@ pub struct Diagnosed {
     pub(super) candidates: Vec<CandidateSection>,
     /// The friction was held.
     pub(super) hold_friction: bool,
+    /// Formulas were looked for.
+    pub searched: bool,
     pub filters: ParallelFilters,
     pub cutoff_hz: f64,
 }
@@ -241,6 +244,7 @@ pub fn diagnose(
         friction_prior,
         candidates: settings.candidates.clone(),
         hold_friction: settings.hold_friction,
+        searched: settings.wishes.search,
         filters: case.filters.clone(),
         cutoff_hz: case.cutoff_hz,
     };
@@ -346,6 +350,7 @@ fn case(
         own: own_laws(&settings.candidates, &machine.robot)?,
         wishes: settings.wishes.clone(),
         numbers: NUMBERS,
+        formula: FORMULA_NUMBERS,
     })
 }
 

@@ -111,6 +111,10 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed, path: &str) -> String {
         .structured_joints()
         .max_by(|a, b| share(a).total_cmp(&share(b)));
     match worst {
+        Some(j) if !found.searched => format!(
+            "Next: search a formula for what is left of {}: `cft-ident diagnose LOG... -m {path} --search`.",
+            machine.robot.joint_names()[j]
+        ),
         Some(j) => format!(
             "Next: look at the residual of {}, which has a pattern that no known effect explains, and \
              log it at other speeds and loads.",
