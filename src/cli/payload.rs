@@ -17,7 +17,7 @@ Example:
 /// Find mass, centre of gravity and inertia of what the last link carries, with 95 % intervals.
 ///
 /// The model is that of the arm without the load. Friction and offsets of the joints are free, and the body is one
-/// that can exist. It is told twice: with the gains of the torque channels as the model has them, and with a gain
+/// that can exist. It is reported twice: with the gains of the torque channels as the model has them, and with a gain
 /// error of each joint free, for currents.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE, override_usage = "cft-ident payload [OPTIONS] -m MODEL.toml LOG...")]
@@ -49,7 +49,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = logs_of(&args.logs);
     let of_model = (name.as_str(), &file, &model);
     let found = identify::payload(&machine, of_model, &logs, context.control())?;
-    let mut text = told(&found, &names_of(&args.logs).join(", "));
+    let mut text = text_of(&found, &names_of(&args.logs).join(", "));
     if let Some(path) = &args.output {
         context.write_text(path, &found.loaded(&file).to_toml()?)?;
         text += &format!("written: {}\n", path.display());
@@ -89,7 +89,7 @@ fn sentences(found: &Payload) -> Vec<String> {
 }
 
 /// Both readings, for a person.
-fn told(found: &Payload, logs: &str) -> String {
+fn text_of(found: &Payload, logs: &str) -> String {
     let caption = format!(
         "body on {} by {}, in the frame of that link, with 95 % intervals",
         escape(&found.link),

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::study::{Rows, StudyError};
-use crate::{clean, coverage, formula, next_motion, planted, setup};
+use crate::{clean, coverage, formula, next_motion, nulls, planted, rotations, setup};
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
@@ -17,6 +17,8 @@ pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
         ("clean", clean::table),
         ("planted", planted::table),
         ("formula", formula::table),
+        ("nulls", nulls::table),
+        ("rotations", rotations::table),
         ("setup", setup::table),
         ("next", next_motion::table),
     ] {

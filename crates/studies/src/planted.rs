@@ -9,8 +9,9 @@ use std::path::Path as File;
 use serde_json::{Value, json};
 
 use crate::added::{Added, Shape};
+use crate::campaign::{Campaign, is_done};
 use crate::chance::Chance;
-use crate::clean::{diagnosed, is_done, worst};
+use crate::clean::worst;
 use crate::drive::{Controller, Run};
 use crate::friction::Law;
 use crate::judge::{LIMITS, Share};
@@ -131,7 +132,7 @@ impl Member {
         }
         let along = &mut chance.clone();
         lab.record(folder, "unseen.csv", Motion::PointToPoint, &mut chance)?;
-        let mut row = diagnosed(tool, folder)?;
+        let mut row = Campaign::simulated().diagnosed(tool, folder)?;
         row["own_share"] = json!(own_share);
         row["joint"] = json!(lab.machine.names[self.joint]);
         if row["unseen_before"].is_array() {

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! What decides is the [judge](crate::judge): blocks of time left out screen, the agreement of an amplitude between
-//! parts of the data tests and shrinks it. What fits best and is not confirmed is told, and nothing weaker is put in
+//! parts of the data tests and shrinks it. What fits best and is not confirmed is reported, and nothing weaker is put in
 //! its place. Held-out data are looked at once, at the end.
 //!
 //! | room | does |

@@ -223,6 +223,39 @@ impl Diagnosis {
         self.steps.iter().any(FoundEffect::vetoed)
     }
 
+    /// Errors of the judge's model; of the given one where all that was found was taken out again.
+    pub fn errors_now(&self) -> &SplitErrors {
+        match self.selected.is_some() && self.written().next().is_none() {
+            true => &self.before,
+            false => &self.after,
+        }
+    }
+
+    /// Leaves the model as it was `given`, for with what was found it is worse on held-out data, or on all data where
+    /// none are held out: whether it was so.
+    pub fn withdraw_worse(&mut self, given: &AugmentedModel) -> bool {
+        let after = self.selected.as_ref().unwrap_or(&self.after);
+        let sides = [&self.before, after];
+        let errors = match sides.map(|s| s.holdout.as_ref()) {
+            [Some(before), Some(after)] => [before, after],
+            _ => sides.map(|s| &s.train),
+        };
+        let [before, after] = errors.map(|e| e.overall.mean_relative_error);
+        let wanted = self.written().any(|step| step.accepted_by_user);
+        if wanted || self.written().next().is_none() || after <= before {
+            return false;
+        }
+        for step in &mut self.steps {
+            step.written = None;
+            if step.status == StepStatus::Confirmed {
+                step.status = StepStatus::Indicated;
+            }
+        }
+        self.selected = Some(self.before.clone());
+        self.model = given.clone();
+        true
+    }
+
     /// Whether there is data enough for the parts to confirm anything.
     pub fn long_enough(&self) -> bool {
         self.parts >= self.parts_needed

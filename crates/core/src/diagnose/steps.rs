@@ -62,7 +62,7 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
         false => judge.clone(),
     };
     let written = work.halfway(written);
-    work.told(&ways, judge, written)
+    work.described(&ways, judge, written)
 }
 
 struct Judging<'a> {
@@ -205,14 +205,15 @@ impl Judging<'_> {
     }
 
     /// Compares held-out errors with and without every effect, the others kept and refitted, and takes out what makes a
-    /// joint worse: the worst first.
+    /// joint worse, the worst first; then the one that gains least, for as long as the model as it would be written is
+    /// worse on held-out data than the given one.
     fn look(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
         let roles = &self.prepared.case.roles;
         let vetoing = match roles.contains(&LogRole::Veto) {
             true => LogRole::Veto,
             false => LogRole::Holdout,
         };
-        // blocks that are set aside are as the rest of their log: they measure
+        // blocks that are set aside are as the rest of their log: of single joints they measure
         let given = roles.contains(&vetoing);
         loop {
             let in_it = |w: &Way| w.amplitude.is_some() && !w.vetoed;
@@ -227,13 +228,24 @@ impl Judging<'_> {
                 let change = |role| self.prepared.held_out(role).change([&without, &with]);
                 found.push((*i, change(LogRole::Holdout)?, change(vetoing)?));
             }
-            let worst = |c: &Option<EffectChange>| c.as_ref().and_then(EffectChange::worst);
+            let given_model = &self.prepared.case.given;
+            let whole = self
+                .prepared
+                .held_out(vetoing)
+                .change([given_model, &with])?;
+            let rises = whole.is_some_and(|c| c.mean[1] > c.mean[0]);
             let mut worse: Vec<(usize, f64)> = Vec::new();
+            let mut costs: Vec<(usize, f64)> = Vec::new();
             for (i, holdout, veto) in found {
-                if let Some(by) = worst(&veto).filter(|_| given && !ways[i].accepted) {
-                    worse.push((i, by));
-                }
                 ways[i].change = holdout;
+                let Some(veto) = veto.filter(|_| !ways[i].accepted) else {
+                    continue;
+                };
+                worse.extend(veto.worst().filter(|_| given).map(|by| (i, by)));
+                costs.push((i, veto.mean[1] - veto.mean[0]));
+            }
+            if worse.is_empty() && rises {
+                worse = costs;
             }
             match worse.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some((i, _)) => ways[i].vetoed = true,
@@ -258,7 +270,7 @@ impl Judging<'_> {
         model
     }
 
-    fn told(
+    fn described(
         &self,
         ways: &[Way],
         judge: AugmentedModel,

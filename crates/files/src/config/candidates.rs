@@ -11,7 +11,7 @@ use super::document::Document;
 use cft_ident_core::robot::FormulaSignal;
 
 /// Most effects of one file.
-const MOST: usize = 100;
+const MAX_EFFECTS: usize = 100;
 /// Most columns of one effect, and most shapes.
 const MOST_COLUMNS: usize = 12;
 const MOST_SHAPES: usize = 3;
@@ -102,7 +102,7 @@ pub(super) fn check(
     candidates: &[CandidateSection],
     document: &Document,
 ) -> Result<(), ConfigError> {
-    if candidates.len() > MOST {
+    if candidates.len() > MAX_EFFECTS {
         let problem = format!("has {} tables", candidates.len());
         return Err(document.value(&["candidate"], &problem, "give at most 100"));
     }

@@ -222,6 +222,8 @@ pub fn diagnose(
     };
     in_memory.stretches = std::mem::take(&mut case.stretches);
     let train = logs.train;
+    // beside a log that vetoes, held-out data measure and choose nothing
+    let holdout_chooses = logs.veto.is_empty();
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
         if aside.role == LogRole::Holdout {
@@ -261,6 +263,9 @@ pub fn diagnose(
         let errors = found.judge_in_use(machine, &case, (name, as_given));
         found.in_memory.stretches = case.stretches;
         errors?;
+    }
+    if holdout_chooses && found.diagnosis.withdraw_worse(&found.given) {
+        found.held = Held::default();
     }
     let _work = control.begin("free run", None);
     found.free_run = found.run_freely(machine, (name, as_given))?;

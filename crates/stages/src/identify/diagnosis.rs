@@ -149,7 +149,7 @@ pub struct EffectValueFound {
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
-    /// It is held at a bound, for these data do not tell it.
+    /// It is held at a bound, for these data do not determine it.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub bound: bool,
 }
@@ -348,7 +348,11 @@ impl Diagnosed {
             effect: effect.name(),
             family: effect.family().name(),
             joint: effect.place.name(robot),
-            parameters: self.told(machine, step).into_iter().map(number).collect(),
+            parameters: self
+                .numbers_of(machine, step)
+                .into_iter()
+                .map(number)
+                .collect(),
             alternatives,
             status: step.status,
             written: step.written.is_some(),
@@ -412,7 +416,7 @@ fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult
     let reason = match (step.written, step.status) {
         (Some(_), _) => "",
         (None, StepStatus::Seen) => "the parts of the data do not agree on its amplitude",
-        (None, _) if step.vetoed() => "it makes a joint worse on held-out data",
+        (None, _) if step.vetoed() => "held-out data are worse with it",
         (None, _) => "it can be measured, and the parts of the data do not agree enough",
     };
     CandidateResult {

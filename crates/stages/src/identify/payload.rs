@@ -90,7 +90,7 @@ pub struct PayloadReading {
 /// What `payload` found.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Payload {
-    /// Link that carries the body, in whose frame it is told.
+    /// Link that carries the body, in whose frame it is reported.
     pub link: String,
     /// With the gains of the model, then with free ones.
     pub readings: Vec<PayloadReading>,
@@ -302,7 +302,7 @@ fn reading(
     let lag = bandwidth(&scores, u, BLOCK_S);
     let middle = long_run(&scores, u, lag) + &by_model * covariance * by_model.transpose();
     let spread = &inverse * middle * &inverse;
-    Ok(told(machine, rows, &theta, &spread, &open, gains))
+    Ok(payload_of(machine, rows, &theta, &spread, &open, gains))
 }
 
 /// What a joint's rows leave.
@@ -377,7 +377,7 @@ fn interval(value: f64, variance: f64, open: bool, unit: &str) -> Number95 {
     }
 }
 
-fn told(
+fn payload_of(
     machine: &LoggedRobot,
     rows: &Rows,
     theta: &DVector<f64>,

@@ -90,7 +90,7 @@ impl Diagnosed {
     }
 
     /// Estimated parameters of an effect with their standard deviations.
-    pub fn told(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
+    pub fn numbers_of(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
         let effect = &step.estimate;
         let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
         effect.numbers(&machine.robot, unit, Some(&step.covariance))
@@ -222,7 +222,7 @@ impl Diagnosed {
             else {
                 continue;
             };
-            let estimated = self.told(machine, step);
+            let estimated = self.numbers_of(machine, step);
             let whole = effect.linear == step.estimate.linear;
             let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
             let numbers = match whole {

@@ -3,7 +3,7 @@
 //! The fit's R factor says how much the torques suffer for any parameters, so the nearest feasible
 //! ones are found on it, without reading a log again: least squares over ten free numbers a link
 //! ([`log_cholesky`]) and the logarithm of each drive's inertia, damped as Levenberg and Marquardt
-//! do. What torques do not tell is filled by a prior: the mass properties that the robot file gives,
+//! do. What torques do not determine is filled by a prior: the mass properties that the robot file gives,
 //! or a plain body, with a small weight in the same ten numbers.
 
 mod friction;
@@ -37,7 +37,7 @@ const SETTLED: f64 = 1e-6;
 /// Damping of the steps.
 const DAMPING: StepControl = StepControl::damping(5.0, 4.0, [1e-12, 1e12]);
 /// Most steps under each weight of the prior.
-const MOST: usize = 300;
+const MAX_STEPS: usize = 300;
 /// Weights of the prior on the way to [`PRIOR_WEIGHT`].
 const WEIGHTS: [f64; 7] = [1e4, 1e3, 100.0, 10.0, 1.0, 0.1, PRIOR_WEIGHT];
 /// A number changes by at most this in one step.
@@ -106,7 +106,7 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
         let found = descend(
             at(x),
             &DAMPING,
-            MOST,
+            MAX_STEPS,
             &mut |(x, lowest, jacobian, residual), d| {
                 let step = damped_step(jacobian, residual, d);
                 let next = at(x + step.map(|s| s.clamp(-FARTHEST, FARTHEST)));

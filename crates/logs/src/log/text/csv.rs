@@ -170,7 +170,7 @@ impl TextFile {
     }
 
     /// What was taken for what, and what was passed over, one sentence each.
-    pub(super) fn told(&self) -> Vec<String> {
+    pub(super) fn in_words(&self) -> Vec<String> {
         let mut out = match self.told.is_empty() {
             true => Vec::new(),
             false => vec![self.told.join("; ")],

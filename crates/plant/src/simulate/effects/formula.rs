@@ -105,7 +105,7 @@ fn number(spec: &EffectSpec, key: &str) -> Result<f64, SimulateError> {
     given.map(|(_, value)| *value).ok_or_else(missing)
 }
 
-/// The effect as the truth tells it.
+/// The effect as the truth says it.
 fn value(
     spec: &EffectSpec,
     candidate: &CandidateSection,
