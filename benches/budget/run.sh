@@ -32,7 +32,7 @@ shares() {
   local times
   times=$( { TIMEFORMAT='%U %S'; time perf record -q -F 199 --call-graph dwarf,8192 -o "$work/perf" \
     "$@" > "$work/said" 2>&1; } 2>&1 )
-  perf report -i "$work/perf" --children --stdio -g none --percent-limit 0 2> /dev/null > "$work/report"
+  perf report -i "$work/perf" --no-inline --children --stdio -g none --percent-limit 0 2> /dev/null > "$work/report"
   while IFS='|' read -r stage functions; do
     awk -v functions="$functions" -v stage="$stage" '
       BEGIN { n = split(functions, f, ",") }

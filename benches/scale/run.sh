@@ -29,14 +29,14 @@ for n in "${rows[@]}"; do
     cost validate "$log" -m "$model")"
 done | tee "$work/costs"
 
-jq -Rn '
+jq -Rn --arg rows "${rows[*]}" '
   def names: ["rows"] + [("lsq", "diagnose", "reduce", "validate") | "\(.) [s]", "\(.) [MB]"];
   def slope($k): map([(.[0] | log10), (.[$k] | log10)]) as $p | ($p | length) as $n
     | ([$p[][0]] | add / $n) as $mx | ([$p[][1]] | add / $n) as $my
     | (([$p[] | (.[0] - $mx) * (.[1] - $my)] | add) / ([$p[] | pow(.[0] - $mx; 2)] | add));
   [inputs | split(",") | map(tonumber)] as $all
   | {study: "processor time and peak memory over the rows of a log of four joints, one thread",
-     command: "benches/scale/run.sh",
+     command: "benches/scale/run.sh target/release/cft-ident \($rows)",
      rows: ([$all[] | [., names] | transpose | map({key: .[1], value: .[0]}) | from_entries]
        + [[range(1; 9) as $k | {key: names[$k], value: ($all | slope($k) | . * 100 | round / 100)}] | from_entries
           | {rows: "slope"} + .])}
