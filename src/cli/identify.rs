@@ -141,7 +141,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
 /// Whether a file is the description of a robot and no file of this tool.
 fn is_urdf(file: &Path) -> bool {
-    file.extension().is_some_and(|end| end != "toml")
+    // a document of JSON is refused by the readers of TOML
+    file.extension()
+        .is_some_and(|end| end != "toml" && end != "json")
 }
 
 impl Work {

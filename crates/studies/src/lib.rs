@@ -10,6 +10,7 @@
 //! | [`coverage`] | do 95 % intervals hold the truth, where the verdict is "identified"? |
 //! | [`clean`] | is an effect written where nothing is missing? |
 //! | [`planted`] | is what was planted named, and does the model predict as well as the truth? |
+//! | [`formula`] | is the formula of a law found that stands in no catalogue? |
 //! | [`next_motion`] | what is the motion worth that `lsq` proposes to record next? |
 //! | [`nulls`] | is an effect written where the torque is the model's and noise, along measured motions? |
 //! | [`rotations`] | what does a diagnosis do to measured data that nobody used? |
@@ -29,6 +30,7 @@ pub mod cover;
 pub mod coverage;
 pub mod drive;
 pub mod files;
+pub mod formula;
 pub mod friction;
 pub mod judge;
 pub mod lab;
@@ -48,3 +50,4 @@ pub mod signal;
 pub mod space;
 pub mod study;
 pub mod tool;
+pub mod uncatalogued;

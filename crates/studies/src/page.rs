@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::study::{Rows, StudyError};
-use crate::{clean, coverage, next_motion, nulls, payload, planted, rotations, setup};
+use crate::{clean, coverage, formula, next_motion, nulls, payload, planted, rotations, setup};
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
@@ -18,6 +18,7 @@ pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
         ("planted", planted::table),
         ("nulls", nulls::table),
         ("rotations", rotations::table),
+        ("formula", formula::table),
         ("setup", setup::table),
         ("next", next_motion::table),
         ("payload", payload::table),

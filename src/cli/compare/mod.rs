@@ -54,18 +54,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs::listed(None, &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let is_document = |path: &&PathBuf| path.extension().is_some_and(|end| end == "json");
-    match [&args.a, &args.b]
-        .iter()
-        .filter(|path| is_document(path))
-        .count()
-    {
-        0 => {}
-        1 => {
-            return Err(
-                CliError::usage("a model and a JSON document cannot be compared").hint(
-                    "give two model files (.toml), or two documents that --json wrote (.json)",
-                ),
+    let both = [&args.a, &args.b];
+    let documents: Vec<&&PathBuf> = both.iter().filter(|path| is_document(path)).collect();
+    match documents[..] {
+        [] => {}
+        [one] => {
+            let what = format!(
+                "{} is a JSON document, the other a model: they cannot be compared",
+                one.display()
             );
+            return Err(CliError::usage(what)
+                .hint("give two model files (.toml), or two documents that --json wrote (.json)"));
         }
         _ if !args.logs.is_empty() || !outputs.is_empty() => {
             return Err(CliError::usage(

@@ -31,7 +31,7 @@ pub fn is_friction_law(effect: &Added) -> bool {
 }
 
 /// A law that these data cannot show at a place, with what they lack.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct NotTried {
     pub law: &'static Law,
     pub place: Place,

@@ -19,7 +19,13 @@ pub static LAW: Law = Law {
     fits: |robot, _, _| !robot.tool_stays_level(),
     shape: &["x", "y", "z"],
     starts: |_, _| {
-        let corner = |k: usize, axis: usize| if k >> axis & 1 == 0 { START_DISTANCE_M } else { -START_DISTANCE_M };
+        let corner = |k: usize, axis: usize| {
+            if k >> axis & 1 == 0 {
+                START_DISTANCE_M
+            } else {
+                -START_DISTANCE_M
+            }
+        };
         let corners = (0..8).map(|k| (0..3).map(|axis| corner(k, axis)).collect());
         Ok(corners.collect())
     },

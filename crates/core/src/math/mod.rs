@@ -80,7 +80,7 @@ pub enum MathError {
 
     /// A cut-off frequency that the sampling rate does not carry.
     #[error(
-        "a cut-off of {cutoff_hz} Hz needs a sampling rate of more than {} Hz, found {rate_hz} Hz: lower the cut-off",
+        "a cut-off of {cutoff_hz} Hz needs a sampling rate of more than {} Hz, found {rate_hz} Hz; lower the cut-off, or correct the times of the log if its rate is another",
         2.0 * cutoff_hz
     )]
     Cutoff {

@@ -70,7 +70,7 @@ fn is_one(unit: &String) -> bool {
 }
 
 /// A file of candidates.
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CandidatesToml {
     candidate: Vec<CandidateSection>,
@@ -85,6 +85,16 @@ pub fn parse(file: &str, text: &str) -> Result<Vec<CandidateSection>, ConfigErro
     let raw: CandidatesToml = document.read()?;
     check(&raw.candidate, &document)?;
     Ok(raw.candidate)
+}
+
+/// The text of a file of candidates.
+///
+/// # Errors
+/// [`toml::ser::Error`] for what TOML cannot hold.
+pub fn to_toml(candidates: &[CandidateSection]) -> Result<String, toml::ser::Error> {
+    toml::to_string(&CandidatesToml {
+        candidate: candidates.to_vec(),
+    })
 }
 
 /// Checks what needs no robot.

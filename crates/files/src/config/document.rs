@@ -23,6 +23,15 @@ impl<'a> Document<'a> {
 
     /// Deserialises the text, in which no number may be one that cannot be worked with.
     pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
+        if self.text.trim_start().starts_with('{') {
+            return Err(ConfigError::Kind {
+                file: self.file.to_owned(),
+                found: "a JSON document",
+                wanted: "a file of TOML",
+                remedy: "give the file that the command wrote with -o, not the one of --json"
+                    .to_owned(),
+            });
+        }
         let root = DeTable::parse(self.text).map_err(|error| self.explain(&error))?;
         let mut path = Vec::new();
         for (key, value) in root.get_ref() {

@@ -53,6 +53,8 @@ pub enum FaultKind {
     IrregularClock,
     /// Rows that show the positions of the row before while the robot moves.
     RepeatedRows,
+    /// A stretch that stands in the log before it, number for number.
+    RepeatedPart,
     /// A channel that stands still while what it measures does not.
     StuckChannel,
     /// Flat tops of a torque, current or voltage.
@@ -65,6 +67,8 @@ pub enum FaultKind {
     Quantisation,
     /// Single rows far off their neighbours.
     Spike,
+    /// A position that leaps to and fro in more rows than can be spikes.
+    Erratic,
     /// Rows in which every channel reads one number, 0 mostly.
     FailedRead,
     /// A channel that is another one's copy.
@@ -105,12 +109,14 @@ impl FaultKind {
             Self::Dropout => "dropout",
             Self::IrregularClock => "irregular-clock",
             Self::RepeatedRows => "repeated-rows",
+            Self::RepeatedPart => "repeated-part",
             Self::StuckChannel => "stuck-channel",
             Self::Saturation => "saturation",
             Self::Clipping => "clipping",
             Self::BeyondLimits => "beyond-limits",
             Self::Quantisation => "quantisation",
             Self::Spike => "spike",
+            Self::Erratic => "erratic",
             Self::FailedRead => "failed-read",
             Self::CopiedChannel => "copied-channel",
             Self::CommandAsMeasurement => "command-as-measurement",
@@ -129,7 +135,7 @@ impl FaultKind {
     /// Whether `[log] keep` says that its rows stay as they were logged.
     pub(super) fn kept(self, keep: &[RowFault]) -> bool {
         let of = match self {
-            Self::Spike | Self::FailedRead => RowFault::Spike,
+            Self::Spike | Self::Erratic | Self::FailedRead => RowFault::Spike,
             Self::StuckChannel => RowFault::StuckChannel,
             Self::Saturation => RowFault::Saturation,
             Self::Clipping => RowFault::Clipping,

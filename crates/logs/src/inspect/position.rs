@@ -1,9 +1,10 @@
 //! Faults of a position that is no longer what it was: leaps that stay, and encoders that begin anew.
 
 use super::detectors::clock::ClockFacts;
+use super::detectors::spike::SPIKE_SHARE;
 use super::detectors::step::Leap;
 use super::draft::{FaultList, rows_text};
-use super::fault::Severity::Warning;
+use super::fault::Severity::{Error, Warning};
 use super::fault::{Episodes, FaultKind};
 use super::judge::{LogJudge, Track};
 use super::words::ChannelRole;
@@ -98,7 +99,14 @@ pub(super) fn leaps(
         )
         .replace("  ", " ")
     };
-    let remedy = "where its zero matters (gravity, other joints' inertias), use the part whose zero is right: LOG@0..12s or LOG@12..s";
+    let at = judge
+        .clock
+        .first
+        .map_or(found[0].at, |first| found[0].at - first);
+    let remedy = &format!(
+        "where its zero matters (gravity, other joints' inertias), use the part whose zero is right: LOG@0..{at:.3}s or LOG@{at:.3}..s",
+        at = at.max(0.0)
+    );
     let name = Some(track.channel.name.as_str());
     let before = draft.faults.len();
     draft.stretches(
@@ -113,6 +121,29 @@ pub(super) fn leaps(
         fault.size = Some(largest);
     }
     draft.cut(FaultKind::PositionStep, name, &episodes);
+}
+
+/// Tells a position that leaps to and fro in so many rows that none of them is a spike among others: what nearly all
+/// rows differ from their neighbours is more than a spike must have, and the steps between rows are noise and no motion.
+pub(super) fn erratic(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
+    let grain = track.flat.steps.quantile_not_zero(0.0);
+    let height = (SPIKE_SHARE * track.deviation()).max(GRAINS * grain);
+    let hidden = track.spikes.nearly_all() > height && track.spikes.goes_to_and_fro();
+    // a joint at rest shows its noise, and no two sources
+    if !hidden || !(judge.moves(track) || track.spikes.alternates()) {
+        return;
+    }
+    let share = track.spikes.differences_seen.share_outside(0.0, height);
+    let unit = track.channel.unit.as_deref().unwrap_or("");
+    let effect = format!(
+        "leaps to and fro: {} of the rows are off those about them by more than {} {unit}: no speed can be formed, and which rows are right cannot be seen",
+        number::percent(share),
+        number::significant(height, 2)
+    )
+    .replace(" :", ":");
+    let remedy = "see whether two sources write this channel, one row each (`inspect` lists the publishers of a recording); else look at its cable and encoder, and log again";
+    draft.whole(Error, FaultKind::Erratic, track, effect, remedy);
+    draft.acts(FaultKind::Erratic, Some(&track.channel.name));
 }
 
 /// Where a position leaps: the times before and at it [s].

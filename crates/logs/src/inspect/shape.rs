@@ -68,6 +68,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
         .collect();
     if track.channel.role == ChannelRole::Position {
         position::leaps(judge, place, (clock, reach, &mut told), draft);
+        position::erratic(judge, track, draft);
     }
     spikes(judge, place, (clock, &told), draft);
     if judge.depth == Depth::Whole {

@@ -22,6 +22,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 use thiserror::Error;
@@ -86,6 +87,31 @@ pub fn remove_unfinished() {
     }
     // Never unlocked: a file begun now would be left behind.
     std::mem::forget(unfinished);
+}
+
+/// What names of files begin and end with until they are whole.
+const PREFIX: &str = ".cft-ident-";
+const SUFFIX: &str = ".part";
+/// Age from which such a file that nobody holds is abandoned: its process locks it right after it made it.
+const ABANDONED: Duration = Duration::from_secs(60);
+
+/// Removes what a run that was killed left in a folder.
+fn remove_abandoned(folder: &Path) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if !name.starts_with(PREFIX) || !name.ends_with(SUFFIX) {
+            continue;
+        }
+        let age = entry.metadata().and_then(|about| about.modified());
+        let old = age.is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED));
+        let free = |file: File| file.try_lock().is_ok();
+        if old && File::open(entry.path()).is_ok_and(free) {
+            // another run may have been quicker
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -180,8 +206,9 @@ fn open(path: &Path) -> io::Result<OutputTarget> {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
+    remove_abandoned(folder);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".cft-ident-").suffix(".part");
+    builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -191,6 +218,8 @@ fn open(path: &Path) -> io::Result<OutputTarget> {
     // The lock comes first, so that no interruption finds the file before it is known.
     let mut unfinished = unfinished();
     let file = builder.tempfile_in(folder).map_err(plain)?;
+    // Held as long as this process lives; where there are no locks the file is never taken for abandoned.
+    let _ = file.as_file().try_lock();
     unfinished.insert(file.path().to_owned());
     Ok(OutputTarget::Temporary(file, path))
 }
@@ -290,6 +319,24 @@ mod tests {
         drop(file);
         assert_eq!(names(folder.path()), ["model.toml"]);
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    }
+
+    #[test]
+    fn what_a_killed_run_left_is_removed_by_the_next_and_what_is_being_written_is_not() {
+        let folder = folder();
+        let part = |name: &str, minutes: u64| {
+            let path = folder.path().join(format!("{PREFIX}{name}{SUFFIX}"));
+            let file = File::create(path).unwrap();
+            let then = std::time::SystemTime::now() - Duration::from_secs(60 * minutes);
+            file.set_modified(then).unwrap();
+            file
+        };
+        drop((part("killed", 5), part("new", 0)));
+        let held = part("held", 5);
+        held.lock().unwrap();
+        write_whole(&folder.path().join("a.csv"), |file| file.write_all(b"a")).unwrap();
+        let left = [".cft-ident-held.part", ".cft-ident-new.part", "a.csv"];
+        assert_eq!(names(folder.path()), left);
     }
 
     #[test]

@@ -61,8 +61,13 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// The motion of a log, or the processing that a robot file asks for.
-    #[error("{of}: {error}")]
-    Motion { of: String, error: MotionError },
+    #[error("{of}: {error}{}", .left_out.as_ref().map(|told| format!("; {told}")).unwrap_or_default())]
+    Motion {
+        of: String,
+        error: MotionError,
+        /// What was left out of the log before, and why.
+        left_out: Option<String>,
+    },
     #[error(
         "{log}: more than {most} rows; the friction filter passes over a one-joint log many times and holds it in memory; give a span of it, such as FILE@0..600s: minutes are enough for friction"
     )]
@@ -231,6 +236,7 @@ impl IdentifyError {
         Self::Motion {
             of: of.to_owned(),
             error,
+            left_out: None,
         }
     }
 

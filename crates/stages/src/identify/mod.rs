@@ -31,6 +31,7 @@ mod error;
 mod error_kind;
 mod estimate;
 mod first_look;
+mod formulas;
 mod free_swing;
 mod friction;
 mod gain_error;
@@ -90,6 +91,7 @@ pub use diagnosis::{DiagnosisResult, DiagnosisVerdict, signal_words};
 pub use error::{IdentifyError, ReadError};
 pub use error_kind::ErrorKind;
 pub use estimate::{Account, JointAccount};
+pub use formulas::{FormulaResult, SymmetryShares, formula_result, formula_section};
 pub use friction::{
     FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
 };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
 use super::first_look::FirstLook;
-use cft_ident_core::motion::{Stretch, Summary, ZeroOrderHold};
+use cft_ident_core::motion::{MotionError, RunError, Stretch, Summary, ZeroOrderHold};
 use cft_ident_core::number::{self, clock};
 use cft_ident_core::robot::Robot;
 use cft_ident_logs::inspect::Cutter;
@@ -120,6 +120,15 @@ impl OpenLog<'_> {
     }
 
     fn costs_and_places(&self, too_short: u64) -> Vec<String> {
+        let mut out: Vec<String> = self.costs(too_short).into_iter().collect();
+        out.extend(self.reader.warnings());
+        let found = self.look.gate.warnings().into_iter();
+        out.extend(found.map(|text| format!("{}: {text}", self.name)));
+        out
+    }
+
+    /// How many rows each cause costs, the most first; `None` where none is left out or mended.
+    fn costs(&self, too_short: u64) -> Option<String> {
         let by_reader = self.reader.left_out();
         let mut costs: Vec<(u64, String)> = (self.look.gate.costs().iter())
             .map(|cost| (cost.rows, cost.text()))
@@ -131,28 +140,38 @@ impl OpenLog<'_> {
             .filter(|(rows, _)| *rows > 0)
             .collect();
         costs.sort_by_key(|(rows, _)| std::cmp::Reverse(*rows));
-        let mut out = Vec::new();
-        if !costs.is_empty() {
-            let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
-            let dropped = dropped + self.reader.not_read();
-            let rows = self.reader.samples() + dropped;
-            let told = match self.cutter.removed() + dropped + too_short {
-                0 => format!("none of {rows} rows is left out in all"),
-                removed => format!(
-                    "{removed} of {rows} rows are left out in all, those next to bad ones included"
-                ),
-            };
-            let causes: Vec<String> = costs.into_iter().map(|(_, text)| text).collect();
-            out.push(format!(
-                "{}: {told}: {}; see `cft-ident inspect`",
-                self.name,
-                causes.join(", ")
-            ));
+        if costs.is_empty() {
+            return None;
         }
-        out.extend(self.reader.warnings());
-        let found = self.look.gate.warnings().into_iter();
-        out.extend(found.map(|text| format!("{}: {text}", self.name)));
-        out
+        let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
+        let dropped = dropped + self.reader.not_read();
+        let rows = self.reader.samples() + dropped;
+        let told = match self.cutter.removed() + dropped + too_short {
+            0 => format!("none of {rows} rows is left out in all"),
+            removed => format!(
+                "{removed} of {rows} rows are left out in all, those next to bad ones included"
+            ),
+        };
+        let causes: Vec<String> = costs.into_iter().map(|(_, text)| text).collect();
+        Some(format!(
+            "{}: {told}: {}; see `cft-ident inspect`",
+            self.name,
+            causes.join(", ")
+        ))
+    }
+
+    /// What ended a run through it, with what was left out where too little remained.
+    pub(super) fn ended(&self, error: RunError<ReadError>) -> IdentifyError {
+        match error {
+            RunError::Source(error) => error.into(),
+            RunError::Motion(error) => IdentifyError::Motion {
+                of: self.name.clone(),
+                left_out: matches!(error, MotionError::NoSegment { .. })
+                    .then(|| self.costs(0).or_else(|| self.reader.warnings().pop()))
+                    .flatten(),
+                error,
+            },
+        }
     }
 
     /// Whether torques come from a zero-order hold and so are means of two rows here.

@@ -195,7 +195,7 @@ impl<'a> Passes<'a> {
                 &settings,
                 &mut |block| open.read(block),
             )
-            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            .map_err(|e| open.ended(e))?;
             let samples = open.provenance()?.samples;
             if first {
                 // what cannot be fitted is reported by the fit itself
@@ -314,7 +314,7 @@ impl<'a> Passes<'a> {
                 grid,
                 &mut |block| open.read(block),
             )
-            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            .map_err(|e| open.ended(e))?;
             all.extend(sums.map(|sums| sums.in_one_block()));
             self.work.advance(1);
         }

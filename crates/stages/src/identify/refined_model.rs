@@ -3,6 +3,7 @@
 use super::consistent::project_by;
 use super::diagnose::Diagnosed;
 use super::error::IdentifyError;
+use super::formulas::written_sections;
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
@@ -167,7 +168,9 @@ impl Diagnosed {
         }
         self.put_effects(machine, file, &mut model);
         let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
+        let formulas = written_sections(self);
         let known = file.candidates.iter().chain(&self.candidates);
+        let known = known.chain(&formulas);
         for candidate in known.filter(of_model) {
             if !model.candidates.contains(candidate) {
                 model.candidates.push(candidate.clone());

@@ -145,7 +145,7 @@ fn sampled(
             },
             &mut |row| thinner.add(index, row.t, row.filtered),
         );
-        run.map_err(|error| IdentifyError::of_run(&log.name(), error))?;
+        run.map_err(|error| open.ended(error))?;
     }
     Ok((channels.ok_or(IdentifyError::NoLog)?, thinner.finish()))
 }

@@ -357,7 +357,7 @@ fn reconstruct(
                 .add(&settings, &mut |block| open.read(block), &mut |r| {
                     row(r, origin)
                 })
-                .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+                .map_err(|e| open.ended(e))?;
             warnings.extend(open.in_words(&summary));
             inputs.push(open.provenance()?);
             last = Some(summary);

@@ -3,7 +3,8 @@
 //! A row is compared with the median of the seven rows about it (Hampel 1974): on a slope or a step
 //! that difference is nothing, at a spike of one to three rows it is the spike's height. At a turn
 //! of smooth motion it is small but not nothing: what stands out there as well must also be off the
-//! cubic through the rows four and five away.
+//! cubic through the rows four and five away, or through the next ones that do not stand out
+//! themselves.
 //!
 //! A peak of a torque is none where the speed of its joint changes at the same rows by more than the position's noise:
 //! an inertia explains it.
@@ -37,6 +38,9 @@ pub(in crate::inspect) const SPIKE_SHARE: f64 = 0.1;
 const SPEED_CHANGES: f64 = 6.0;
 const MIN_RATIO_TO_NEIGHBOURS: f64 = 3.0;
 
+/// Rows of two sources by turns: the squared steps over two rows are less than this share of those over one.
+const ALTERNATES: f64 = 0.5;
+
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::inspect) struct Spike {
@@ -55,18 +59,23 @@ impl Spike {
         let before = self.around[..REACH].iter().rev().filter(good).take(2);
         let after = self.around[REACH + 1..].iter().filter(good).take(2);
         let nodes: Vec<[f64; 2]> = before.chain(after).copied().collect();
-        let sides = nodes.iter().filter(|node| node[0] < self.t).count();
-        if (sides, nodes.len()) != (2, 4) {
-            return None;
-        }
-        let weight = |i: usize| -> f64 {
-            let others = (0..4).filter(|j| *j != i);
-            others
-                .map(|j| (self.t - nodes[j][0]) / (nodes[i][0] - nodes[j][0]))
-                .product()
-        };
-        Some((0..4).map(|i| weight(i) * nodes[i][1]).sum())
+        cubic(&nodes, self.t)
     }
+}
+
+/// The cubic through two points on each side of a place, there; `None` where there are fewer.
+fn cubic(nodes: &[[f64; 2]], at: f64) -> Option<f64> {
+    let before = nodes.iter().filter(|node| node[0] < at).count();
+    if (before, nodes.len()) != (2, 4) {
+        return None;
+    }
+    let weight = |i: usize| -> f64 {
+        let others = (0..4).filter(|j| *j != i);
+        others
+            .map(|j| (at - nodes[j][0]) / (nodes[i][0] - nodes[j][0]))
+            .product()
+    };
+    Some((0..4).map(|i| weight(i) * nodes[i][1]).sum())
 }
 
 /// Looks for the spikes of one channel.
@@ -89,6 +98,8 @@ pub(in crate::inspect) struct Spikes {
     found: Vec<Spike>,
     /// Height of the lowest spike that is kept, once there are too many.
     lowest: f64,
+    /// Sums over the rows: of each step times the one before, of the squared steps, of the squared steps over two rows.
+    steps: [f64; 3],
 }
 
 impl Default for Spikes {
@@ -105,6 +116,7 @@ impl Default for Spikes {
             suspect: 0.0,
             found: Vec::new(),
             lowest: 0.0,
+            steps: [0.0; 3],
         }
     }
 }
@@ -121,6 +133,14 @@ impl Spikes {
         if self.count < WIDTH {
             return;
         }
+        let [before, last] = [k - 2, k - 1].map(|k| self.values[k % RING]);
+        let step = value - last;
+        let sums = [
+            step * (last - before),
+            step * step,
+            (value - before).powi(2),
+        ];
+        (self.steps.iter_mut().zip(sums)).for_each(|(sum, x)| *sum += x);
         let centre = k - HALF_WIDTH;
         let window = std::array::from_fn(|i| self.values[(k - i) % RING]);
         let difference = self.values[centre % RING] - median(window);
@@ -180,6 +200,16 @@ impl Spikes {
         }
         let hidden = aside as f64 > (1.0 - NEARLY_ALL) * rows;
         apart(if hidden { aside } else { 0 })
+    }
+
+    /// Whether steps mostly take back the step before, as noise does and no motion.
+    pub(in crate::inspect) fn goes_to_and_fro(&self) -> bool {
+        self.steps[0] < 0.0
+    }
+
+    /// Whether every other row belongs together more than neighbours do: of noise, both differ alike.
+    pub(in crate::inspect) fn alternates(&self) -> bool {
+        self.steps[2] < ALTERNATES * self.steps[1]
     }
 
     /// Change of the joint's speed at a row, less half of those six rows before and after.
@@ -256,12 +286,17 @@ impl Spikes {
     /// How far a row is off the cubic through rows beside it, or `height` where that is less; `None`
     /// where it is as good as on it, or rows are missing.
     fn off_cubic(&self, row: usize, height: f64) -> Option<f64> {
-        if row < 5 || row + 5 >= self.count {
-            return None;
-        }
-        let value = |k: usize| self.values[k % RING];
-        let mean = |away: usize| 0.5 * (value(row - away) + value(row + away));
-        let off = value(row) - (25.0 * mean(4) - 16.0 * mean(5)) / 9.0;
+        let quiet = |k: &usize| self.differences[k % RING].abs() <= 0.25 * height.abs();
+        let before = (row.saturating_sub(AROUND)..(row + 1).saturating_sub(REACH - 1)).rev();
+        let after = row + REACH - 1..self.count.min(row + AROUND);
+        let nodes = before
+            .filter(quiet)
+            .take(2)
+            .chain(after.filter(quiet).take(2));
+        let nodes: Vec<[f64; 2]> = nodes
+            .map(|k| [k as f64 - row as f64, self.values[k % RING]])
+            .collect();
+        let off = self.values[row % RING] - cubic(&nodes, 0.0)?;
         let agrees = off * height > 0.0 && off.abs() > 0.5 * height.abs();
         agrees.then(|| off.abs().min(height.abs()).copysign(height))
     }

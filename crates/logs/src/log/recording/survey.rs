@@ -388,6 +388,16 @@ fn missing(
     let index = lacking.map_or(0, |index| index - range.start);
     let joint = layout.name_in_messages(index).unwrap_or_default();
     let column = channels.get(index).map_or("", |c| c.column.as_str());
+    if lacking.is_some() && best.names.iter().any(|name| name == joint) {
+        return (
+            format!(
+                "messages of {} name {}, and hold no number as its {what}",
+                escape(&best.name),
+                escape(joint)
+            ),
+            "see what publishes them: NaN and null are no numbers; record again".to_owned(),
+        );
+    }
     let near = nearest(joint, best.names.iter().map(String::as_str));
     let near = near.map(|name| format!("the nearest is `{}`; ", escape(name)));
     let problem = match lacking {

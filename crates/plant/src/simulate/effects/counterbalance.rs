@@ -20,7 +20,12 @@ const NEAR_POINT_M: f64 = 0.1;
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| {
-        let mut defaults = vec![0.4 * site.scale / (FAR_POINT_M * NEAR_POINT_M), 0.5 * FAR_POINT_M, FAR_POINT_M, NEAR_POINT_M];
+        let mut defaults = vec![
+            0.4 * site.scale / (FAR_POINT_M * NEAR_POINT_M),
+            0.5 * FAR_POINT_M,
+            FAR_POINT_M,
+            NEAR_POINT_M,
+        ];
         let (from, to) = site.travel;
         defaults.extend([site.middle() - std::f64::consts::FRAC_PI_2, from, to]);
         defaults.extend([0.0; COUNT]);

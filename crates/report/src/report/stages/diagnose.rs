@@ -3,7 +3,7 @@
 use super::diagnose_words::errors as errors_of;
 pub use super::diagnose_words::words;
 use super::step_words::{alternatives, grade, in_words, worsened};
-use super::{first_screen, found_effects, what_is_left};
+use super::{first_screen, formulas, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
 use crate::report::sections::{
@@ -47,6 +47,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut page = report.page();
     first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
+    formulas::told(&mut page, of.machine, of.found);
     free_run::section(&mut page, of.found.free_run.as_ref());
     report
 }
@@ -123,6 +124,7 @@ pub fn diagnosed(
             .into_iter()
             .skip(MAX_CHANGES_ON_SCREEN),
     );
+    formulas::told(&mut report.terminal(), machine, found);
     let mut terminal = report.terminal();
     terminal.line("");
     terminal.note("", &first_screen::next(machine, found, written.1), 2);
@@ -132,7 +134,7 @@ pub fn diagnosed(
 /// Errors joint by joint, those of a screen.
 fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
     let (_, before) = errors_of(&d.before);
-    let (data, after) = errors_of(&d.after);
+    let (data, after) = errors_of(d.errors_now());
     let changed = d.written().next().is_some();
     let mut columns = vec![
         ("joint", Align::Left),
