@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // signs, units and zeros of the robot file against the torques
     let setup = check_setup(&arm, &fitted, &control)?;
     for finding in setup.report.refusals() {
-        eprintln!("{robot}: {}", finding.told());
+        eprintln!("{robot}: {}", finding.in_words());
     }
 
     let settings = LsqSettings {

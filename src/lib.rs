@@ -52,7 +52,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | stage in [`identify`] | from | to | room | source |
+//! | stage in [`identify`] | from | to | module | source |
 //! |---|---|---|---|---|
 //! | [`friction`](identify::friction()) | one-joint logs | theta 13..32 with covariance | [`friction`] | eq. (30)-(38) |
 //! | [`lsq`](identify::lsq()) | logs of all joints, friction | theta 1..12, or base parameters of a tree | [`inertia`] | eq. (39)-(42) |
@@ -68,7 +68,7 @@
 //! rows of q, v, a and tau; [`robot`] holds the physics, [`effect`] what a plain model lacks, [`math`]
 //! what is small and general, [`config`] the files. Beside them: [`simulate`] is a plant to test
 //! against, [`excite`] designs motions, [`export`] writes a model as C, Rust or URDF, [`replay`] runs
-//! models along logs for the figures of a report, [`report`] tells results as text, page and JSON, and [`cli`] is the command line.
+//! models along logs for the figures of a report, [`report`] writes results as text, page and JSON, and [`cli`] is the command line.
 
 #![forbid(unsafe_code)]
 

@@ -11,12 +11,19 @@ before it is grouped into them.
 """
 
 import json
+import os
 import subprocess
 import sys
 import time
 import tomllib
 
-began = time.perf_counter()
+
+def processor():
+    """Processor time of this process and of those it waited for [s]."""
+    own = os.times()
+    return own.user + own.system, own.children_user + own.children_system
+
+
 import numpy as np  # noqa: E402
 import pinocchio as pin  # noqa: E402
 from scipy.signal import butter, sosfiltfilt  # noqa: E402
@@ -100,14 +107,20 @@ stacked = columns.transpose(1, 0, 2).reshape(-1, p + 3 * n)
 target = tau.T.reshape(-1)
 scale = np.linalg.norm(stacked, axis=0)
 theta = np.linalg.lstsq(stacked / scale, target, rcond=None)[0] / scale
-whole = time.perf_counter() - began
+whole = processor()[0]
 
 model_file = f"{build}/pinocchio_fit.toml"
 command = [f"{build}/release/cft-ident", "lsq", f"{log}@0..7.4s", "-r", "benches/pinocchio/tx40.toml"]
-command += ["--estimator", "ols", "-q", "--threads", "1", "-o", model_file]
-began = time.perf_counter()
-subprocess.run(command, check=True, capture_output=True)
-ours = time.perf_counter() - began
+command += ["--estimator", "ols", "--unconstrained", "-q", "--threads", "1", "-o", model_file]
+
+
+def tool(*more):
+    before = processor()[1]
+    subprocess.run([*command, *more], check=True, capture_output=True)
+    return processor()[1] - before
+
+
+alone, ours = tool("--as-declared"), tool()
 
 found = {}
 for parameter in tomllib.load(open(model_file, "rb"))["parameter"]:
@@ -133,6 +146,7 @@ result = {
     "largest_relative_difference": relative,
     "python_s": whole,
     "tool_s": ours,
+    "tool_alone_s": alone,
     "python_regressor_s_per_sample": per_sample_python,
 }
 
@@ -158,13 +172,17 @@ def line(what, beside, theirs, mine, unit):
 python = f"Pinocchio {pin.__version__} in Python, numpy {np.__version__}"
 regressor = "regressor of six joints, a sample"
 result["rows"] = [
-    line("log of 37 thousand rows to 58 parameters, whole process, one thread", python, whole, ours, "s"),
+    line("log of 37 thousand rows to 58 parameters, whole process", python, whole, ours, "s"),
+    line("the same without the check of the set-up (`--as-declared`)", python, whole, alone, "s"),
     line(regressor, python, per_sample_python, result["tool_regressor_s_per_sample"], "us"),
 ]
 if "cpp_regressor_s_per_sample" in result:
     cpp, mine = result["cpp_regressor_s_per_sample"], result["tool_regressor_s_per_sample"]
     result["rows"].append(line(regressor, f"Pinocchio {pin.__version__} in C++", cpp, mine, "us"))
-result["study"] = f"the TX40 fit beside Pinocchio's; the parameters differ by at most {relative:.1e} of themselves"
+result["study"] = (
+    "the TX40 fit beside Pinocchio's, processor time on one thread; rows of joints at rest, which `lsq` leaves out, "
+    f"move the torques by {100 * off:.2f} % of their size at most"
+)
 result["command"] = "benches/pinocchio/run.sh"
 json.dump(result, open(result_file, "w"), indent=1)
 print(json.dumps(result, indent=1))

@@ -31,4 +31,5 @@ fi
 cargo build --locked --release --quiet
 cargo bench --locked --quiet --bench pipeline -- "regressor of six joints"
 build=${CARGO_TARGET_DIR:-target}
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 "$python" benches/pinocchio/compare.py "$data" "$build" docs/results/pinocchio.json "${cpp[@]}"

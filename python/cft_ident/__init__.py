@@ -249,7 +249,11 @@ class Model:
         return weight[0] if one else weight
 
     def friction(self, v: Any) -> Array:
-        """Friction of each joint by its declared law at the velocities ``v``: (N, n) or (n,), in N or N m."""
+        """Friction of each joint at the velocities ``v``: (N, n) or (n,), in N or N m.
+
+        The declared law with the effects that depend on a joint's speed alone, as exported code has it: none where it
+        would drive the joint.
+        """
         (v,), one = _motion(v)
         found = _native.joint_friction(self._native, v)
         return found[0] if one else found

@@ -3,6 +3,7 @@
 use cft_ident::effect::AugmentedModel;
 use cft_ident::effect::as_code::EffectsCode;
 use cft_ident::export::Program;
+use cft_ident::export::dissipative::joint_friction as friction_of;
 use cft_ident::identify::refined;
 use cft_ident::motion::Stretch;
 use numpy::{
@@ -45,6 +46,19 @@ fn together(lengths: &[usize]) -> PyResult<usize> {
     }
 }
 
+/// The columns of rows of `n` joints.
+fn by_joint(x: &[f64], n: usize) -> Vec<Vec<f64>> {
+    let column = |j: usize| x.iter().skip(j).step_by(n).copied().collect();
+    (0..n).map(column).collect()
+}
+
+/// Rows of columns.
+fn by_row(columns: &[Vec<f64>], rows: usize) -> Vec<f64> {
+    (0..rows)
+        .flat_map(|k| columns.iter().map(move |column| column[k]))
+        .collect()
+}
+
 /// Torques (N x n) with all effects; `dt` is the time between rows where an effect remembers them.
 #[pyfunction]
 #[pyo3(signature = (model, q, v, a, dt))]
@@ -78,8 +92,7 @@ pub fn torque<'py>(
                 ));
             }
         };
-        let column = |x: &[f64], j: usize| x.iter().skip(j).step_by(n).copied().collect();
-        let [q, v, a] = each.map(|x| (0..n).map(|j| column(x, j)).collect());
+        let [q, v, a] = each.map(|x| by_joint(x, n));
         let hat = of.reconstruct(&Stretch {
             dt,
             t: (0..count).map(|k| dt * k as f64).collect(),
@@ -89,9 +102,7 @@ pub fn torque<'py>(
             a,
             ..Stretch::default()
         });
-        (0..count)
-            .flat_map(|k| hat.iter().map(move |tau| tau[k]))
-            .collect()
+        by_row(&hat, count)
     };
     PyArray1::from_vec(py, out).reshape([count, n])
 }
@@ -117,19 +128,19 @@ pub fn regressor<'py>(
     PyArray1::from_vec(py, out).reshape([count, n, p])
 }
 
-/// Friction (N x n) by the declared law of each joint.
+/// Friction (N x n): the declared law of each joint with the effects that depend on its speed alone.
 #[pyfunction]
 pub fn joint_friction<'py>(
     py: Python<'py>,
     model: PyRef<'py, Model>,
     v: Rows<'py>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let of = model_of(&model)?.model;
-    let n = of.robot.joints();
+    let of = model_of(&model)?;
+    let n = of.model.robot.joints();
     let v = rows(&v, n, "v")?;
-    let each = v.iter().enumerate();
-    let out: Vec<f64> = each.map(|(k, v)| of.friction[k % n].torque(*v)).collect();
-    PyArray1::from_vec(py, out).reshape([v.len() / n.max(1), n])
+    let count = v.len() / n.max(1);
+    let found = friction_of(&of, by_joint(v, n)).map_err(of_input)?;
+    PyArray1::from_vec(py, by_row(&found, count)).reshape([count, n])
 }
 
 /// Speed of each joint below which it may be at rest \[m/s or rad/s\].

@@ -47,11 +47,11 @@ fn checked(machine: &LoggedRobot, logs: &[identify::Log], control: &Control) -> 
         return Err(InputError::new_err(format!(
             "{}: the torques contradict the robot file: {}; or go on without by as_declared=True",
             machine.name,
-            finding.told()
+            finding.in_words()
         )));
     }
     let likely = report.findings.iter().filter(|f| !f.sure);
-    let likely = likely.map(|f| format!("the set-up may be wrong: {}", f.told()));
+    let likely = likely.map(|f| format!("the set-up may be wrong: {}", f.in_words()));
     let power = report.friction_power.iter().map(|power| power.sentence());
     Ok(Checked {
         warnings: likely.chain(power).collect(),

@@ -313,7 +313,7 @@ impl RunningBar {
     }
 }
 
-/// The time that is left, where a step has been done from which to tell it.
+/// The time that is left, where a step has been done from which to estimate it.
 fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
     if state.pos() > 0 {
         // what cannot be written is not missed

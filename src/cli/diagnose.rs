@@ -54,6 +54,9 @@ pub struct Args {
     /// Write the midpoint between the given model and the refined one
     #[arg(hide_short_help = true, long)]
     pub cautious: bool,
+    /// Search a formula for what is left of each joint; --accept formula:JOINT writes it
+    #[arg(long)]
+    pub search: bool,
     /// Write this effect whatever the data say, as NAME or NAME:JOINT; may be given more than once
     #[arg(hide_short_help = true, long, value_name = "EFFECT:JOINT")]
     pub accept: Vec<String>,
@@ -108,6 +111,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         hold_friction: args.hold_friction,
         wishes: Wishes {
             cautious: args.cautious,
+            search: args.search,
             accepted: args.accept.iter().map(|text| accepted(text)).collect(),
         },
     };

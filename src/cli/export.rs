@@ -115,9 +115,9 @@ struct Beyond {
     file: String,
     /// What it is.
     what: String,
-    /// Joint where it is largest; null where no log tells.
+    /// Joint where it is largest; null where no log determines.
     joint: Option<String>,
-    /// Its rms over that of the joint's torque along the logs, in percent; null where no log tells.
+    /// Its rms over that of the joint's torque along the logs, in percent; null where no log determines.
     percent_of_torque: Option<f64>,
 }
 

@@ -306,7 +306,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
             guesses.extend(checked.report.refusals().map(|found| {
                 format!(
                     "the torques contradict the names of the columns, and were followed: {}",
-                    found.told()
+                    found.in_words()
                 )
             }));
             write((folder, context), "robot.toml", text, &mut files)?;

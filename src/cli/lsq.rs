@@ -195,7 +195,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
 /// Logs as a shell takes them; of many, and of reduced ones, which hold no rows to diagnose, a word.
 fn typed_logs(logs: &[LogSpec]) -> String {
-    if logs.len() > FEW || logs.iter().any(|log| identify::is_reduced(&log.path)) {
+    if logs.len() > MAX_LOGS_ON_LINE || logs.iter().any(|log| identify::is_reduced(&log.path)) {
         return "LOG".to_owned();
     }
     let typed = logs.iter().map(|log| typed::quoted(&log.to_string()));
@@ -203,4 +203,4 @@ fn typed_logs(logs: &[LogSpec]) -> String {
 }
 
 /// Logs that a line has room for.
-const FEW: usize = 3;
+const MAX_LOGS_ON_LINE: usize = 3;

@@ -64,7 +64,7 @@ pub use error::{CliError, with_sources};
 pub use exit::Exit;
 pub use outcome::Outcome;
 
-/// Names of logs, as they are told.
+/// Names of logs, as they are reported.
 fn names_of(specs: &[LogSpec]) -> Vec<String> {
     specs.iter().map(LogSpec::name).collect()
 }

@@ -1,4 +1,4 @@
-//! How a finished command is told: tables or the JSON document on standard output, warnings and
+//! How a finished command is reported: tables or the JSON document on standard output, warnings and
 //! missed limits on standard error. Commands return an [`Outcome`] and print nothing themselves, so
 //! `--json -` cannot be spoilt by one of them.
 
@@ -35,13 +35,13 @@ impl Outcome {
 }
 
 /// Warnings that are shown before a result.
-const MOST: usize = 8;
+const MAX_WARNINGS: usize = 8;
 /// Those of them about one log or joint.
 const ABOUT_ONE: usize = 2;
 
 /// Shows `outcome` and returns the status that it stands for.
 ///
-/// The files get their names once everything else is told: a document that nobody could be given leaves none.
+/// The files get their names once everything else is reported: a document that nobody could be given leaves none.
 /// `stdout` receives either the tables or, for `--json -`, the document, and nothing else.
 pub(super) fn show(
     outcome: &Outcome,
@@ -53,7 +53,7 @@ pub(super) fn show(
     let all: Vec<&str> = outcome.document.warnings().collect();
     let most = match detail {
         Detail::Full => usize::MAX,
-        _ => MOST,
+        _ => MAX_WARNINGS,
     };
     let (shown, more) = grouped(&all, detail);
     for warning in shown.iter().take(most) {
@@ -205,7 +205,10 @@ mod tests {
             show(&many, None, (&files, detail), &mut out, &mut err).unwrap();
             String::from_utf8(err).unwrap().lines().count()
         };
-        assert_eq!((lines(Detail::Usual), lines(Detail::Full)), (MOST + 1, 40));
+        assert_eq!(
+            (lines(Detail::Usual), lines(Detail::Full)),
+            (MAX_WARNINGS + 1, 40)
+        );
     }
 
     #[test]

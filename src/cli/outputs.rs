@@ -1,4 +1,4 @@
-//! Outputs are looked at before the long run: an unwritable folder, or a name used twice, is told
+//! Outputs are looked at before the long run: an unwritable folder, or a name used twice, is reported
 //! at once and not after the work.
 
 use std::path::{Path, PathBuf};

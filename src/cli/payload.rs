@@ -7,7 +7,9 @@ use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, LoggedRobot, Number95, Payload, PayloadReading, refined};
+use cft_ident_stages::identify::{
+    self, LoggedRobot, Number95, Payload, PayloadReading, PayloadVerdict, refined,
+};
 
 const EXAMPLE: &str = "\
 Example:
@@ -17,7 +19,7 @@ Example:
 /// Find mass, centre of gravity and inertia of what the last link carries, with 95 % intervals.
 ///
 /// The model is that of the arm without the load. Friction and offsets of the joints are free, and the body is one
-/// that can exist. It is told twice: with the gains of the torque channels as the model has them, and with a gain
+/// that can exist. It is found twice: with the gains of the torque channels as the model has them, and with a gain
 /// error of each joint free, for currents.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE, override_usage = "cft-ident payload [OPTIONS] -m MODEL.toml LOG...")]
@@ -28,7 +30,8 @@ pub struct Args {
     /// Model file of the arm without the load
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// Model file to write, with the load as an effect
+    /// Model file to write, with the load as an effect: the given model, byte for byte, where no load is seen, where
+    /// free gains contradict it, or where it makes the error of a joint larger
     #[arg(short, long, value_name = "LOADED.toml")]
     pub output: Option<PathBuf>,
 }
@@ -49,12 +52,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = logs_of(&args.logs);
     let of_model = (name.as_str(), &file, &model);
     let found = identify::payload(&machine, of_model, &logs, context.control())?;
-    let mut text = told(&found, &names_of(&args.logs).join(", "));
-    if let Some(path) = &args.output {
-        context.write_text(path, &found.loaded(&file).to_toml()?)?;
-        text += &format!("written: {}\n", path.display());
-    }
     let brief = sentences(&found).join("\n");
+    let tables = text_of(&found, &names_of(&args.logs).join(", "));
+    let mut text = format!("{brief}\n\n{tables}");
+    if let Some(path) = &args.output {
+        let (model, how) = match found.loaded(&file) {
+            Some(loaded) => (loaded.to_toml()?, ""),
+            None => (files::text(&args.model)?, ", the given model byte for byte"),
+        };
+        context.write_text(path, &model)?;
+        text += &format!("written: {}{how}\n", path.display());
+    }
     Ok(Outcome {
         text: context.text(text, &brief),
         document: Document::new("payload", &found.inputs, &found.warnings, &found)?,
@@ -73,23 +81,57 @@ fn shown(x: &Number95) -> String {
     }
 }
 
-/// The mass by each reading.
+/// What a person has to know first.
 fn sentences(found: &Payload) -> Vec<String> {
-    let of = |reading: &PayloadReading| {
-        let how = match reading.gains_free {
-            false => "with the gains of the torque channels as the model has them",
-            true => "with a gain error of every joint free",
-        };
-        match reading.mass.value {
-            Some(_) => format!("{how}: {} kg", shown(&reading.mass)),
-            None => format!("{how}: this log does not determine the mass"),
-        }
+    let mass = |gains_free: bool| {
+        let reading = found.readings.iter().find(|of| of.gains_free == gains_free);
+        reading.map_or(number::ABSENT.to_owned(), |of| {
+            format!("{} kg", shown(&of.mass))
+        })
     };
-    found.readings.iter().map(of).collect()
+    let (held, free) = (mass(false), mass(true));
+    let said = match found.verdict {
+        PayloadVerdict::Seen => format!(
+            "payload: {held} with the gains of the torque channels as the model has them, {free} with a gain error of every joint free"
+        ),
+        PayloadVerdict::NotApartFromGains => format!(
+            "payload: {held} if the gains of the torque channels are those of the model\nthese data cannot tell the mass apart from the gains: {free} with a gain error of every joint free; a log of wider motion of all joints, the arm stretched out and folded, lifted against gravity, does"
+        ),
+        PayloadVerdict::GainsContradict => format!(
+            "the gains of the torque channels are not those of the model, or the log is not of this arm: {held} with them, {free} with a gain error of every joint free"
+        ),
+        PayloadVerdict::NoneSeen => format!(
+            "no payload seen: {held}; with a gain error of every joint free: {free}"
+        ),
+        PayloadVerdict::NotDetermined => "these data do not determine the mass: log a motion that lifts the last link against gravity, or moves it fast".to_owned(),
+    };
+    let worse = found.readings.iter().filter_map(made_worse);
+    worse.chain(said.lines().map(str::to_owned)).collect()
+}
+
+/// A warning where the body of a reading makes the error of a joint larger.
+fn made_worse(reading: &PayloadReading) -> Option<String> {
+    let worse: Vec<String> = reading
+        .worse()
+        .map(|of| {
+            let (before, after) = (number::percent(of.before), number::percent(of.after));
+            format!("{} {before} -> {after}", escape(&of.joint))
+        })
+        .collect();
+    let how = match reading.gains_free {
+        false => "",
+        true => " beside free gains",
+    };
+    (!worse.is_empty()).then(|| {
+        format!(
+            "warning: the body{how} makes errors larger: {}. The model is not that of this arm without a load, or its gains changed: do not use the mass before `validate` on a log without a load is as good as it was",
+            worse.join(", ")
+        )
+    })
 }
 
 /// Both readings, for a person.
-fn told(found: &Payload, logs: &str) -> String {
+fn text_of(found: &Payload, logs: &str) -> String {
     let caption = format!(
         "body on {} by {}, in the frame of that link, with 95 % intervals",
         escape(&found.link),

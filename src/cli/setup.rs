@@ -70,7 +70,7 @@ pub fn checked(
         .map(likely)
         .collect();
     let hints = (report.findings.iter()).filter(|f| f.severity == FindingSeverity::Hint);
-    hints.for_each(|hint| context.note(&format!("hint: {}", hint.told())));
+    hints.for_each(|hint| context.note(&format!("hint: {}", hint.in_words())));
     for power in &report.friction_power {
         warnings.push(power.sentence());
     }
@@ -98,7 +98,7 @@ pub fn checked(
     warnings.extend(
         refusals
             .iter()
-            .map(|f| format!("put right in {}: {}", path.display(), f.told())),
+            .map(|f| format!("put right in {}: {}", path.display(), f.in_words())),
     );
     Ok(Checked {
         machine: LoggedRobot::new(&path.to_string_lossy(), corrected),
@@ -108,7 +108,7 @@ pub fn checked(
     })
 }
 
-/// The check; logs that cannot be checked are told by the fit itself.
+/// The check; logs that cannot be checked are reported by the fit itself.
 fn check(machine: &LoggedRobot, logs: &[Log], context: &Context) -> Result<CheckedSetup, CliError> {
     match check_setup(machine, logs, context.control()) {
         Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
@@ -116,7 +116,7 @@ fn check(machine: &LoggedRobot, logs: &[Log], context: &Context) -> Result<Check
     }
 }
 
-/// What the check says of these logs, for a command that only tells it.
+/// What the check says of these logs, for a command that only reports it.
 ///
 /// # Errors
 /// Interruption.
@@ -154,7 +154,7 @@ fn new_text(
 fn likely(finding: &Finding) -> String {
     format!(
         "the set-up may be wrong: {}; the set-up as declared is possible too, and the fit goes on with it",
-        finding.told()
+        finding.in_words()
     )
 }
 

@@ -40,7 +40,7 @@ pub struct ShownModel {
     effects: Vec<EffectSection>,
     /// What the errors mean in use; empty where the file does not hold what it left of data set aside.
     in_use: Vec<JointInUse>,
-    /// The point that forces are told at.
+    /// The point that forces are reported at.
     point: Option<String>,
 }
 

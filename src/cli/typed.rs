@@ -1,4 +1,4 @@
-//! The command line as a report tells it: what was typed, without what belongs to one machine only.
+//! The command line as a report says it: what was typed, without what belongs to one machine only.
 
 use std::ffi::OsString;
 use std::path::Path;

@@ -224,7 +224,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     let verdict = verdict(&found);
-    let text = context.text(told(&found, &args.log.name()), &verdict);
+    let text = context.text(text_of(&found, &args.log.name()), &verdict);
     let document = Document::new("watch", &found.inputs, &found.warnings, &found)?;
     if let Some(error) = found.error.take() {
         let error = CliError::from(error).hint("the results before it are printed above");
@@ -290,7 +290,7 @@ fn verdict(found: &Watched) -> String {
 }
 
 /// What was seen, for a person.
-fn told(found: &Watched, log: &str) -> String {
+fn text_of(found: &Watched, log: &str) -> String {
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("threshold", Align::Left),

@@ -202,6 +202,7 @@ fn a_log_that_is_too_short_and_a_robot_of_two_joints_are_refused_with_what_to_do
 }
 
 #[test]
+#[ignore = "measured logs, up to a minute; `cargo test -- --ignored`"]
 fn the_emps_moves_as_its_torques_say_on_blocks_that_were_set_aside() {
     let Some(log) = shared("emps/emps_id.csv") else {
         return;

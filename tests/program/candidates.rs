@@ -164,6 +164,53 @@ fn a_formula_that_is_in_the_logs_is_found_kept_in_the_model_and_predicts_unseen_
     assert!(header.contains("* (cos(q[0] + q[1]) * v[0]);"), "{header}");
 }
 
+#[test]
+fn a_search_finds_the_formula_and_writes_it_where_the_user_accepts_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    write(at, ASKEW, "");
+    simulate(at, "plain.csv", &["--seconds", "40"]);
+    simulate(at, "plain_2.csv", &["--seconds", "20", "--seed", "5"]);
+    with_drag(at, "plain.csv", "id.csv", 0.0);
+    with_drag(at, "plain_2.csv", "unseen.csv", 0.0);
+    let search = "diagnose id.csv -m truth.toml --holdout unseen.csv --search -o refined.toml";
+    let search: Vec<&str> = search.split(' ').collect();
+    let found = done(at, &search);
+    let formulas = found["formulas"].as_array().unwrap();
+    let formula = formulas.iter().find(|f| f["joint"] == "shoulder");
+    let formula = formula.unwrap_or_else(|| panic!("{formulas:?}"));
+    assert_eq!(formula["end"], "found", "{formula}");
+    let signals = formula["signals"].to_string();
+    let own = ["\"speed\"", "\"position\"", "\"position of elbow\""];
+    assert!(own.iter().all(|s| signals.contains(s)), "{formula}");
+    assert!(formula["kind"].as_str().unwrap().starts_with("friction"));
+    // nothing of it stands in the model without the user's word
+    let text = fs::read_to_string(at.join("refined.toml")).unwrap();
+    assert!(!text.contains("formula-shoulder"), "{text}");
+    done(
+        at,
+        &[&search[..], &["--accept", "formula:shoulder"]].concat(),
+    );
+    let text = fs::read_to_string(at.join("refined.toml")).unwrap();
+    assert!(text.contains("formula-shoulder"), "{text}");
+    let error = |model: &str| -> f64 {
+        let document = done(at, &["validate", "unseen.csv", "-m", model]);
+        document["joints"][0]["relative_error"].as_f64().unwrap()
+    };
+    let (before, after) = (error("truth.toml"), error("refined.toml"));
+    assert!(after < 0.3 * before, "{before} {after}");
+    // what it prints is a file that is taken as it is
+    let file = formula["candidate"].as_str().unwrap();
+    fs::write(at.join("own.toml"), file).unwrap();
+    let words = "diagnose id.csv -m truth.toml --holdout unseen.csv --candidates own.toml";
+    done(at, &words.split(' ').collect::<Vec<_>>());
+    let (status, message, _) = run(at, &[&search[..], &["--accept", "formula:wrist"]].concat());
+    assert!(
+        status == 3 && message.contains("no formula was found there"),
+        "{status} {message}"
+    );
+}
+
 /// One effect in every signal of the plant, also those that its own torque decides.
 const ALL_SIGNALS: &str = r#"
 [[candidate]]

@@ -310,13 +310,13 @@ fn a_motion_whose_torques_nobody_foresees_says_so_in_every_file() {
     );
 }
 
-/// A log with a body of 1.5 kg at (0.1, 0.05, 0) of the last link, whose torque channels show `gain` times the torque.
-fn loaded(seed: u64, gain: f64) -> String {
+/// A log with a body of `mass` at (0.1, 0.05, 0) of the last link, whose torque channels show `gains` times the torque.
+fn loaded(seed: u64, mass: f64, gains: [f64; 2]) -> String {
     let truth = truth(0.8);
     let body = Body {
-        mass: 1.5,
+        mass,
         centre: [0.1, 0.05, 0.0],
-        inertia: [0.004, 0.0, 0.0, 0.004, 0.0, 0.004],
+        inertia: [0.003, 0.0, 0.0, 0.003, 0.0, 0.003].map(|x| mass * x),
     };
     let mut loaded = truth.clone();
     let mut standard = vec![0.0; truth.robot.standard_parameters()];
@@ -332,7 +332,14 @@ fn loaded(seed: u64, gain: f64) -> String {
     let text = log(&loaded, 0.13 * seed as f64, 1.0);
     let row = |line: &str| {
         let x: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
-        format!("{},{},{},{},{}", x[0], x[1], x[2], gain * x[3], gain * x[4])
+        format!(
+            "{},{},{},{},{}",
+            x[0],
+            x[1],
+            x[2],
+            gains[0] * x[3],
+            gains[1] * x[4]
+        )
     };
     let mut lines = text.lines();
     let head = lines.next().unwrap().to_owned();
@@ -349,7 +356,7 @@ fn a_payload_is_found_with_intervals_that_hold_it_and_stands_in_the_loaded_model
     let path = folder.path();
     let (mut inside, mut logs) = ([0; 2], 0);
     for seed in 1..=12 {
-        fs::write(path.join("loaded.csv"), loaded(seed, 1.0)).unwrap();
+        fs::write(path.join("loaded.csv"), loaded(seed, 1.5, [1.0; 2])).unwrap();
         good(
             path,
             "payload loaded.csv -m model.toml -o loaded.toml --json p.json",
@@ -383,7 +390,7 @@ fn a_payload_is_found_with_intervals_that_hold_it_and_stands_in_the_loaded_model
 fn gains_that_are_off_are_told_apart_from_the_payload() {
     let folder = fitted(0.8);
     let path = folder.path();
-    fs::write(path.join("loaded.csv"), loaded(3, 1.1)).unwrap();
+    fs::write(path.join("loaded.csv"), loaded(3, 1.5, [1.1; 2])).unwrap();
     good(path, "payload loaded.csv -m model.toml --json p.json");
     let json: serde_json::Value =
         serde_json::from_slice(&fs::read(path.join("p.json")).unwrap()).unwrap();
@@ -391,4 +398,51 @@ fn gains_that_are_off_are_told_apart_from_the_payload() {
         .as_f64()
         .unwrap();
     assert!((gain - 0.1).abs() < 0.05, "{gain}");
+}
+
+#[test]
+fn a_log_without_a_load_says_that_none_is_seen_and_leaves_the_model_as_it_was() {
+    let folder = fitted(0.8);
+    let path = folder.path();
+    let mut none = 0;
+    for seed in 1..=6 {
+        fs::write(path.join("empty.csv"), loaded(seed, 0.0, [1.0; 2])).unwrap();
+        let out = good(path, "payload empty.csv -m model.toml -o loaded.toml");
+        if out.starts_with("no payload seen: ") {
+            let text = |name: &str| fs::read(path.join(name)).unwrap();
+            assert!(text("loaded.toml") == text("model.toml"), "{out}");
+            none += 1;
+        }
+    }
+    // one interval of 95 % in forty lies above zero
+    assert!(none >= 5, "{none} of 6");
+}
+
+#[test]
+fn a_body_that_spoils_a_joint_is_announced_first_and_is_not_written() {
+    let folder = fitted(0.8);
+    let path = folder.path();
+    // no body makes one joint carry more and leaves the other as it was
+    fs::write(path.join("odd.csv"), loaded(5, 0.0, [1.6, 1.0])).unwrap();
+    let out = good(
+        path,
+        "payload odd.csv -m model.toml -o loaded.toml --json p.json",
+    );
+    assert!(
+        out.starts_with("warning: the body makes errors larger: "),
+        "{out}"
+    );
+    let json: serde_json::Value =
+        serde_json::from_slice(&fs::read(path.join("p.json")).unwrap()).unwrap();
+    let joints = json["readings"][0]["joints"].as_array().unwrap().iter();
+    let worse: Vec<&serde_json::Value> = joints.filter(|joint| joint["worse"] == true).collect();
+    assert!(!worse.is_empty());
+    for joint in worse {
+        assert!(
+            joint["after"].as_f64() > joint["before"].as_f64(),
+            "{joint}"
+        );
+    }
+    let text = |name: &str| fs::read(path.join(name)).unwrap();
+    assert!(text("loaded.toml") == text("model.toml"), "{out}");
 }

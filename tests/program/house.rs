@@ -72,7 +72,7 @@ const DOORS: &[(&str, &str)] = &[
     ("clap_mangen", "cli/generate/man.rs"),
     ("indicatif", "cli/context.rs"),
     ("ctrlc", "cli/mod.rs"),
-    ("csv", "log/text/csv.rs"),
+    ("csv_core", "log/text/records.rs"),
     ("exmex", "math/formula.rs"),
     ("fast_float2", "log/text/number.rs"),
     // one to read, one to write

@@ -44,6 +44,7 @@ fn assert_at_most(errors: &[f64], limits: &[f64]) {
 }
 
 #[test]
+#[ignore = "measured logs, up to a minute; `cargo test -- --ignored`"]
 fn the_tx40_is_as_others_have_it_without_and_with_the_coupling_of_its_wrist() {
     let Some(log) = shared("tx40/tx40_joint.csv") else {
         return;

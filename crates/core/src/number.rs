@@ -11,7 +11,7 @@ pub const LARGEST: f64 = 1e30;
 /// Smallest of a number that is given and must be above 0: one over it is usable too.
 pub const SMALLEST: f64 = 1e-30;
 
-/// Lengths below so many metres are told in millimetres.
+/// Lengths below so many metres are reported in millimetres.
 pub const MILLIMETRES: f64 = 0.01;
 
 /// Whether a number that is given can be worked with: neither inf nor nan, nor beyond [`LARGEST`].
@@ -21,7 +21,7 @@ pub fn is_usable(value: f64) -> bool {
     value.abs() <= LARGEST
 }
 
-/// What is wrong with a number that [`is_usable`] refuses, to be told behind it.
+/// What is wrong with a number that [`is_usable`] refuses, to be reported behind it.
 pub fn beyond(value: f64) -> &'static str {
     match value.is_finite() {
         true => ", beyond 1e30 in SI units",

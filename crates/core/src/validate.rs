@@ -246,7 +246,7 @@ pub struct Reconstruction<'a> {
     traces: TorqueTraces,
     /// Time of the log's own clock where the times of its rows are 0 [s].
     zero: f64,
-    /// Rows of which sums alone are known: nothing is told then of single ones.
+    /// Rows of which sums alone are known: nothing is reported then of single ones.
     summed: bool,
 }
 
@@ -263,7 +263,7 @@ pub struct SummedRows {
 
 impl<'a> Reconstruction<'a> {
     /// Nothing yet. `rest_speed`: the speed up to which each joint rests [m/s or rad/s], none where rests are
-    /// not told; joints without friction never rest. `band` is that of the model, where it has one.
+    /// not reported; joints without friction never rest. `band` is that of the model, where it has one.
     pub fn new(model: &'a Model, rest_speed: &[f64], band: Option<HalfWidths<'a>>) -> Self {
         let speed = |(j, law): (usize, &JointFriction)| match (law, rest_speed.get(j)) {
             (JointFriction::None, _) | (_, None) => -1.0,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::chain::Joints;
+use crate::uncatalogued::{Seen, Uncatalogued};
 
 /// Shape of an addition; `size` scales it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -43,6 +43,8 @@ pub enum Shape {
     Drift,
     /// Outside every catalogue: a torque that follows the square of the position's swing and the speed's sign.
     Stray,
+    /// Those of the study of formulas.
+    Uncatalogued(Uncatalogued),
 }
 
 /// One addition at one joint.
@@ -62,9 +64,10 @@ pub struct Share {
 }
 
 impl Added {
-    /// `load` is the torque that the bodies asked for a step before.
-    pub fn share(&self, t: f64, q: &Joints, v: &Joints, load: f64, friction: f64) -> Share {
-        let (k, q_own, v_own) = (self.size, q[self.joint], v[self.joint]);
+    /// `friction` is viscous over Coulomb.
+    pub fn share(&self, seen: &Seen, friction: f64) -> Share {
+        let Seen { t, v, load, .. } = *seen;
+        let (k, q_own, v_own) = (self.size, seen.q[self.joint], v[self.joint]);
         let torque = |torque: f64| Share { torque, level: 0.0 };
         let level = |level: f64| Share { torque: 0.0, level };
         match self.shape {
@@ -86,6 +89,7 @@ impl Added {
                 }
             }
             Shape::Drift => torque(k * t),
+            Shape::Uncatalogued(law) => law.share(k, self.joint, seen),
             Shape::Stray => torque(k * (3.0 * q_own).sin() * (2.5 * v_own).cos()),
         }
     }

@@ -31,6 +31,28 @@ pub struct Link {
     pub drive_inertia: f64,
 }
 
+impl Link {
+    /// This link with another body that is fixed to it, in the same frame.
+    pub fn joined(&self, other: &Self) -> Self {
+        let mass = self.mass + other.mass;
+        let both = add(
+            scaled(self.centre, self.mass),
+            scaled(other.centre, other.mass),
+        );
+        let centre = scaled(both, 1.0 / mass);
+        let about_centre = |body: &Self| {
+            let away = add(body.centre, scaled(centre, -1.0));
+            sum(&body.inertia, &of_point(body.mass, away))
+        };
+        Self {
+            mass,
+            centre,
+            inertia: sum(&about_centre(self), &about_centre(other)),
+            ..self.clone()
+        }
+    }
+}
+
 /// A chain with the acceleration of free fall in the frame of its base [m/s^2].
 #[derive(Debug, Clone)]
 pub struct Chain {
@@ -259,6 +281,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn two_bodies_on_a_link_have_the_sum_of_their_standard_parameters() {
+        let links = arms::arm6().links;
+        let (one, other) = (&links[2], &links[4]);
+        let numbers = |link: &Link| standard(link).map(|(_, x)| x);
+        let (a, b, both) = (numbers(one), numbers(other), numbers(&one.joined(other)));
+        for k in 0..10 {
+            assert!((a[k] + b[k] - both[k]).abs() < 1e-12, "{k}");
+        }
+        assert_eq!(both[10], a[10]);
     }
 
     #[test]

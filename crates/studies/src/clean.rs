@@ -7,17 +7,17 @@ use std::path::Path as File;
 
 use serde_json::{Value, json};
 
+use crate::campaign::{Campaign, is_done};
 use crate::chance::Chance;
 use crate::cover::pairwise;
 use crate::coverage::word;
 use crate::drive::Controller;
 use crate::judge::{LIMITS, Share};
-use crate::lab::{Lab, errors};
+use crate::lab::Lab;
 use crate::machine::{Drive, Kind, LawKind, Machine};
-use crate::model::Model;
 use crate::path::{MOTIONS, Motion};
 use crate::study::{Rows, StudyError};
-use crate::tool::{ENDED, Tool};
+use crate::tool::Tool;
 
 const MACHINES: [(Kind, Drive); 5] = [
     (Kind::Single, Drive::Direct),
@@ -97,7 +97,7 @@ impl Cell {
         let other = MOTIONS
             [(MOTIONS.iter().position(|m| *m == self.motion).unwrap_or(0) + 1) % MOTIONS.len()];
         lab.record(folder, "unseen.csv", other, &mut chance)?;
-        let mut row = diagnosed(tool, folder)?;
+        let mut row = Campaign::simulated().diagnosed(tool, folder)?;
         if row["unseen_before"].is_array() && self.law == LawKind::Coulomb {
             row["unseen_truth"] = json!(lab.errors_of_truth(tool, folder, "unseen.csv")?);
         }
@@ -108,81 +108,6 @@ impl Cell {
     fn true_name(&self, effect: &str) -> bool {
         self.law == LawKind::Smooth && effect == "smooth-coulomb"
     }
-}
-
-/// Fits two logs, diagnoses with the third, and tells what was written and what it did to the fourth.
-pub fn diagnosed(tool: &Tool, folder: &File) -> Result<Value, StudyError> {
-    let lsq = [
-        "lsq",
-        "a.csv",
-        "b.csv",
-        "-r",
-        "robot.toml",
-        "-o",
-        "model.toml",
-    ];
-    let fit = tool.run(folder, &lsq)?;
-    if fit.exit != 0 {
-        return Ok(json!({ "exit": fit.exit, "said": fit.last_words() }));
-    }
-    let words = [
-        "diagnose",
-        "a.csv",
-        "b.csv",
-        "-m",
-        "model.toml",
-        "--holdout",
-        "held.csv",
-        "-o",
-        "refined.toml",
-    ];
-    let answer = tool.run(folder, &words)?;
-    let steps: Vec<Value> = answer
-        .list("steps")
-        .iter()
-        .map(|s| {
-            json!([
-                s["effect"],
-                s["family"],
-                s["joint"],
-                s["status"],
-                s["alternatives"]
-            ])
-        })
-        .collect();
-    let mut row = json!({ "exit": answer.exit, "steps": steps });
-    let refined = folder.join("refined.toml");
-    if answer.exit != 0 || !refined.exists() {
-        row["said"] = json!(answer.last_words());
-        if answer.exit != ENDED {
-            row["written"] = json!([]);
-        }
-        return Ok(row);
-    }
-    let names = |model: &Model| -> Vec<(String, String)> {
-        let text = |effect: &toml::Value, key: &str| {
-            let value = effect.get(key).and_then(toml::Value::as_str);
-            value.unwrap_or_default().to_owned()
-        };
-        let both = |effect: &toml::Value| (text(effect, "name"), text(effect, "joint"));
-        model.effect.iter().map(both).collect()
-    };
-    let before = names(&Model::read(&folder.join("model.toml"))?);
-    let mut after = names(&Model::read(&refined)?);
-    for name in &before {
-        if let Some(at) = after.iter().position(|n| n == name) {
-            after.remove(at);
-        }
-    }
-    row["written"] = json!(after);
-    row["unseen_before"] = json!(errors(tool, folder, "unseen.csv", "model.toml")?);
-    row["unseen_after"] = json!(errors(tool, folder, "unseen.csv", "refined.toml")?);
-    Ok(row)
-}
-
-/// Whether the diagnosis came to its end.
-pub fn is_done(row: &Value) -> bool {
-    row["written"].is_array() && row["exit"] != ENDED
 }
 
 /// Largest ratio over the joints of two lists of errors.

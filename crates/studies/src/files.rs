@@ -11,6 +11,7 @@ use crate::machine::{Drive, Kind, Machine};
 use crate::plant::Bodies;
 use crate::space::Matrix;
 use crate::study::StudyError;
+use crate::uncatalogued::temperature;
 
 pub fn write(path: &Path, text: &str) -> Result<(), StudyError> {
     std::fs::write(path, text).map_err(|source| StudyError::File {
@@ -28,6 +29,9 @@ pub fn log_text(machine: &Machine, run: &Run) -> String {
             let _ = write!(text, ",{kind}_{name}");
         }
     }
+    for name in machine.names.iter().filter(|_| machine.is_warm()) {
+        let _ = write!(text, ",warmth_{name}");
+    }
     text.push('\n');
     for (row, t) in run.t.iter().enumerate() {
         let _ = write!(text, "{t:.4}");
@@ -35,6 +39,9 @@ pub fn log_text(machine: &Machine, run: &Run) -> String {
             for value in &values[..n] {
                 let _ = write!(text, ",{value:.8e}");
             }
+        }
+        for _ in (0..n).filter(|_| machine.is_warm()) {
+            let _ = write!(text, ",{:.3}", temperature(*t));
         }
         text.push('\n');
     }
@@ -106,9 +113,13 @@ pub fn robot_text(machine: &Machine, rate_hz: f64, urdf: &str, more: &str) -> St
          [log]\ntime = \"time\"\ntorque_is = \"joint\"\ntorque_held = false\n\n[log.joint]\n",
     );
     for name in &machine.names {
+        let warm = match machine.is_warm() {
+            true => format!(", temperature = \"warmth_{name}\""),
+            false => String::new(),
+        };
         let _ = writeln!(
             text,
-            "{name} = {{ position = \"q_{name}\", torque = \"tau_{name}\" }}"
+            "{name} = {{ position = \"q_{name}\", torque = \"tau_{name}\"{warm} }}"
         );
     }
     let cutoff = (rate_hz / 12.5).min(20.0);

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::added::{Added, Shape};
 use crate::arms;
 use crate::cft::Cft;
 use crate::chain::{Chain, JOINTS, Joints};
@@ -114,6 +115,12 @@ impl Machine {
         self.ranges
             .get(joint)
             .map_or(0.0, |range| 2.0 * range.half / counts)
+    }
+
+    /// Whether its drives' temperatures are logged.
+    pub fn is_warm(&self) -> bool {
+        let warm = |a: &Added| matches!(a.shape, Shape::Uncatalogued(law) if law.is_warm());
+        self.plant.added.iter().any(warm)
     }
 
     /// Whether the robot file's law of friction is the plant's.

@@ -1,4 +1,4 @@
-//! `studies coverage|clean|planted|setup|next [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]`
+//! `studies coverage|clean|planted|formula|nulls|rotations|setup|next|payload [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]`
 //! makes the runs of a study that are not yet in FOLDER/independent_STUDY.jsonl: a study goes on where it was stopped.
 //! `--keep FOLDER` records nothing and leaves the files of the last run there. `studies tables` writes the tables of
 //! docs/independent.md anew from all runs; `studies speed` says how long the plants take.
@@ -9,7 +9,8 @@ use std::process::ExitCode;
 use cft_ident_studies::study::{Rows, StudyError};
 use cft_ident_studies::tool::Tool;
 use cft_ident_studies::{
-    clean, coverage, drive, files, machine, next_motion, page, path, planted, setup,
+    clean, coverage, drive, files, formula, machine, next_motion, nulls, page, path, payload,
+    planted, rotations, setup,
 };
 use serde_json::Value;
 
@@ -113,6 +114,18 @@ fn run(asked: &Asked) -> Result<(), StudyError> {
                 c.0.run(&tool, folder, c.1, k)
             })
         }
+        ["formula"] => {
+            let cells: Vec<_> = formula::subjects()
+                .into_iter()
+                .flat_map(|s| s.cells())
+                .collect();
+            let named = cells
+                .iter()
+                .map(|c| (c.0.cell(c.1), c, formula::USUAL_RUNS));
+            all(asked, &tool, "formula", named, |c, folder, k| {
+                c.0.run(&tool, folder, c.1, k)
+            })
+        }
         ["setup"] => {
             let cells = setup::cells();
             let named = cells
@@ -131,6 +144,31 @@ fn run(asked: &Asked) -> Result<(), StudyError> {
                 cell.run(&tool, folder, k)
             })
         }
+        ["rotations"] => {
+            let cells = rotations::cells();
+            let named = cells.iter().map(|cell| (cell.name(), cell, 1));
+            all(asked, &tool, "rotations", named, |cell, folder, _| {
+                cell.run(&tool, folder)
+            })
+        }
+        ["nulls"] => {
+            let cells = nulls::cells();
+            let named = cells
+                .iter()
+                .map(|cell| (cell.name(), cell, nulls::USUAL_RUNS));
+            all(asked, &tool, "nulls", named, |cell, folder, k| {
+                cell.run(&tool, folder, k)
+            })
+        }
+        ["payload"] => {
+            let cells = payload::cells();
+            let named = cells
+                .iter()
+                .map(|cell| (cell.name(), cell, payload::USUAL_RUNS));
+            all(asked, &tool, "payload", named, |cell, folder, k| {
+                cell.run(&tool, folder, k)
+            })
+        }
         ["tables"] => tables(&asked.results),
         ["speed"] => {
             speed();
@@ -138,7 +176,7 @@ fn run(asked: &Asked) -> Result<(), StudyError> {
         }
         _ => {
             eprintln!(
-                "usage: studies coverage|clean|planted|setup|next|tables|speed [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]"
+                "usage: studies coverage|clean|planted|formula|nulls|rotations|setup|next|payload|tables|speed [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]"
             );
             Ok(())
         }

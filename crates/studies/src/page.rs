@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::study::{Rows, StudyError};
-use crate::{clean, coverage, next_motion, planted, setup};
+use crate::{clean, coverage, formula, next_motion, nulls, payload, planted, rotations, setup};
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
@@ -16,8 +16,12 @@ pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
         ("coverage", coverage::table as fn(&Rows) -> String),
         ("clean", clean::table),
         ("planted", planted::table),
+        ("nulls", nulls::table),
+        ("rotations", rotations::table),
+        ("formula", formula::table),
         ("setup", setup::table),
         ("next", next_motion::table),
+        ("payload", payload::table),
     ] {
         let rows = Rows::open(results, &format!("independent_{name}"))?;
         if !rows.rows.is_empty() {

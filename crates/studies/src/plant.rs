@@ -8,6 +8,7 @@ use crate::added::{Added, Share};
 use crate::cft::Cft;
 use crate::chain::{Chain, JOINTS, Joints, Square};
 use crate::friction::Friction;
+use crate::uncatalogued::{Memory, Seen};
 
 /// What moves.
 #[derive(Debug, Clone)]
@@ -65,7 +66,10 @@ pub struct State {
     pub link_v: Joints,
     pub bristle: Joints,
     pub contact: [Contact; JOINTS],
+    /// Torque of the bodies and acceleration a step before.
     load: Joints,
+    a: Joints,
+    memory: [Memory; JOINTS],
 }
 
 struct Rates {
@@ -88,15 +92,27 @@ impl Plant {
             bristle: [0.0; JOINTS],
             contact: [Contact::Holds; JOINTS],
             load: [0.0; JOINTS],
+            a: [0.0; JOINTS],
+            memory: q.map(Memory::at),
         }
     }
 
     /// A step of `h` seconds under torques of the drives.
     pub fn step(&self, s: &mut State, u: &Joints, h: f64) {
+        let from = s.q;
+        self.go(s, u, h);
+        if !self.added.is_empty() {
+            for (i, memory) in s.memory.iter_mut().enumerate().take(self.joints) {
+                memory.goes(from[i], s.q[i], h);
+            }
+        }
+    }
+
+    fn go(&self, s: &mut State, u: &Joints, h: f64) {
         let mut left = h;
         for _ in 0..8 {
             let first = self.settled(s, u);
-            s.load = first.load;
+            (s.load, s.a) = (first.load, first.v);
             let middle = self.moved(s, &first, 0.5 * left, None);
             let second = self.rates(&middle, u);
             let end = self.moved(s, &second, left, Some(&middle));
@@ -135,7 +151,15 @@ impl Plant {
         let mut all = Share::default();
         for added in self.added.iter().filter(|a| a.joint == joint) {
             let by_law = self.friction[joint].viscous / self.friction[joint].coulomb.max(1e-12);
-            let one = added.share(s.t, &s.q, &s.v, s.load[joint], by_law);
+            let seen = Seen {
+                t: s.t,
+                q: &s.q,
+                v: &s.v,
+                a: s.a[joint],
+                load: s.load[joint],
+                memory: &s.memory[joint],
+            };
+            let one = added.share(&seen, by_law);
             all.torque += one.torque;
             all.level += one.level;
         }

@@ -9,8 +9,9 @@ use std::path::Path as File;
 use serde_json::{Value, json};
 
 use crate::added::{Added, Shape};
+use crate::campaign::{Campaign, is_done};
 use crate::chance::Chance;
-use crate::clean::{diagnosed, is_done, worst};
+use crate::clean::worst;
 use crate::drive::{Controller, Run};
 use crate::friction::Law;
 use crate::judge::{LIMITS, Share};
@@ -131,7 +132,7 @@ impl Member {
         }
         let along = &mut chance.clone();
         lab.record(folder, "unseen.csv", Motion::PointToPoint, &mut chance)?;
-        let mut row = diagnosed(tool, folder)?;
+        let mut row = Campaign::simulated().diagnosed(tool, folder)?;
         row["own_share"] = json!(own_share);
         row["joint"] = json!(lab.machine.names[self.joint]);
         if row["unseen_before"].is_array() {
@@ -159,25 +160,7 @@ impl Member {
         let noise = band(&run, |r, k| r.tau[k][joint] - r.clean[k][joint]);
         match self.what {
             What::Torque(shape) => {
-                // so small that it does not change the motion
-                let unit = 1e-6;
-                lab.machine.plant.added = vec![Added {
-                    joint,
-                    shape,
-                    size: unit,
-                }];
-                let with = lab.course(Motion::SlowSines, chance).logged(
-                    &lab.machine,
-                    &lab.sensing,
-                    chance,
-                );
-                let effect = band(&with, |r, k| r.planted[k][joint]);
-                let scale = size * rms(&noise) / rms(&effect);
-                lab.machine.plant.added = vec![Added {
-                    joint,
-                    shape,
-                    size: unit * scale,
-                }];
+                let (with, effect) = put_in(lab, (joint, shape), size, &noise, chance);
                 (self.kind == Kind::Single)
                     .then(|| rms(&beside(&effect, &declared(&with))) / rms(&effect))
             }
@@ -220,8 +203,28 @@ impl Member {
     }
 }
 
+/// Adds a torque of a size over the noise to a machine; gives a log of it that is small, and its torque there.
+pub fn put_in(
+    lab: &mut Lab,
+    (joint, shape): (usize, Shape),
+    size: f64,
+    noise: &[f64],
+    chance: &mut Chance,
+) -> (Run, Vec<f64>) {
+    // so small that it does not change the motion
+    let unit = 1e-6;
+    let added = |size| vec![Added { joint, shape, size }];
+    lab.machine.plant.added = added(unit);
+    let with = lab
+        .course(Motion::SlowSines, chance)
+        .logged(&lab.machine, &lab.sensing, chance);
+    let effect = band(&with, |r, k| r.planted[k][joint]);
+    lab.machine.plant.added = added(unit * size * rms(noise) / rms(&effect));
+    (with, effect)
+}
+
 /// A series of the log through the low-pass.
-fn band(run: &Run, of: impl Fn(&Run, usize) -> f64) -> Vec<f64> {
+pub fn band(run: &Run, of: impl Fn(&Run, usize) -> f64) -> Vec<f64> {
     let rate = 1.0 / (run.t[1] - run.t[0]);
     let series: Vec<f64> = (0..run.t.len()).map(|k| of(run, k)).collect();
     low_passed(&series, BAND_HZ, rate)

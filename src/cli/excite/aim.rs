@@ -1,4 +1,4 @@
-//! What the next motion is for: weak parameters of a model, or an effect that the logs do not tell from its like.
+//! What the next motion is for: weak parameters of a model, or an effect that the logs do not distinguish from its like.
 
 use super::{Bench, FUNDAMENTAL_HZ};
 use crate::cli::error::CliError;

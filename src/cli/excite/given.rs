@@ -34,7 +34,7 @@ pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut ForeseenRobot
     }
 }
 
-/// Adds what a log or a trajectory tells.
+/// Adds what a log or a trajectory says.
 pub(super) fn add(
     bench: &mut Bench,
     name: &str,
@@ -63,7 +63,7 @@ pub(super) fn add(
         &mut |block| log.read(block),
     )
     .map_err(|error| IdentifyError::of_run(&spec.name(), error))?;
-    warnings.extend(log.told(&summary));
+    warnings.extend(log.in_words(&summary));
     bench.inputs.push(log.provenance()?);
     given.add_log(&sums, summary.samples as f64);
     Ok(())

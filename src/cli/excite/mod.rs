@@ -62,7 +62,7 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
     /// What the next motion is for: the weak parameters of the model, whose intervals it narrows together with the
-    /// logs that there are, or an effect that the logs do not tell from its like. Limits that the robot file does not
+    /// logs that there are, or an effect that the logs do not distinguish from its like. Limits that the robot file does not
     /// give are the positions, speeds and torques of the model's logs
     #[arg(long = "for", value_name = "weak|EFFECT:JOINT", requires = "model",
           conflicts_with_all = ["check", "joint", "criterion", "parameters"])]

@@ -340,7 +340,7 @@ pub(super) fn describe(
     if let (Some(spec), Some(_)) = (&args.log, &args.urdf)
         && mapping.torque_is == "joint"
         && mapping.joints.iter().all(torques)
-        && let Some(text) = weights::told(&file, spec, context)?
+        && let Some(text) = weights::warning(&file, spec, context)?
     {
         warnings.push(text);
     }

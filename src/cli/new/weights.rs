@@ -68,7 +68,7 @@ fn parameters(file: &RobotFile, robot: &Robot) -> Option<Vec<f64>> {
 ///
 /// # Errors
 /// Interruption. A log that cannot be read says nothing.
-pub(super) fn told(
+pub(super) fn warning(
     file: &RobotFile,
     spec: &LogSpec,
     context: &Context,

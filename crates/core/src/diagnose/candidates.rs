@@ -17,11 +17,11 @@ pub fn exclude(a: &Added, b: &Added) -> bool {
 }
 
 /// Part by which two orders differ at least.
-const APART: f64 = 0.02;
+const MIN_ORDER_DIFFERENCE: f64 = 0.02;
 
 fn close(a: &[f64], b: &[f64]) -> bool {
     let mut pairs = a.iter().zip(b);
-    pairs.all(|(a, b)| (a - b).abs() < APART * b.abs())
+    pairs.all(|(a, b)| (a - b).abs() < MIN_ORDER_DIFFERENCE * b.abs())
 }
 
 /// Whether an effect is of a joint's declared friction law: its shape, or what stands beside it.
@@ -31,7 +31,7 @@ pub fn is_friction_law(effect: &Added) -> bool {
 }
 
 /// A law that these data cannot show at a place, with what they lack.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct NotTried {
     pub law: &'static Law,
     pub place: Place,

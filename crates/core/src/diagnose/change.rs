@@ -9,10 +9,10 @@ use super::searched::SearchedCase;
 use super::watch::UNWATCHED;
 use crate::judge::BlocksLeftOut;
 
-/// Standard errors from which on a change is told: there are as many places as blocks and joints.
+/// Standard errors from which on a change is reported: there are as many places as blocks and joints.
 const TOLD: f64 = 3.0;
 
-/// The greatest change of each joint, where it is beyond doubt. It is told as a change, and no law of it is fitted.
+/// The greatest change of each joint, where it is beyond doubt. It is reported as a change, and no law of it is fitted.
 pub fn friction_changes(prepared: &PreparedCase, searched: &SearchedCase) -> Vec<FrictionChange> {
     let field = prepared.field(&searched.candidates, &searched.summed, UNWATCHED);
     let declared = &searched.summed.declared;

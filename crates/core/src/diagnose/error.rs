@@ -1,5 +1,6 @@
 //! Why no diagnosis comes out.
 
+use crate::effect::formula::FormulaError;
 use crate::motion::MotionError;
 
 /// Why no diagnosis came out.
@@ -20,6 +21,8 @@ pub enum DiagnoseError {
     NoTorque { joint: String },
     #[error("no effect {name} can be accepted: {why}")]
     Accept { name: String, why: String },
+    #[error(transparent)]
+    Formula(#[from] FormulaError),
     #[error("interrupted")]
     Interrupted,
 }

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! What decides is the [judge](crate::judge): blocks of time left out screen, the agreement of an amplitude between
-//! parts of the data tests and shrinks it. What fits best and is not confirmed is told, and nothing weaker is put in
+//! parts of the data tests and shrinks it. What fits best and is not confirmed is reported, and nothing weaker is put in
 //! its place. Held-out data are looked at once, at the end.
 //!
 //! | room | does |
@@ -21,11 +21,13 @@
 //! | `unexplained` | errors, the noise floor, and what is above it |
 //! | `prepared` | the declared model fitted, and the data divided |
 //! | `searched`, `polish` | what is chosen of the candidates, in its best shape |
+//! | `formula` | a formula of what is left, where the user asks for it |
 //! | `run` | the loop over all of these |
 
 mod candidates;
 mod change;
 mod error;
+mod formula;
 mod held_out;
 mod memory;
 mod orders;
@@ -42,9 +44,13 @@ mod unexplained;
 mod watch;
 
 pub use error::DiagnoseError;
-pub use outcome::{Diagnosis, FoundEffect, FrictionChange, LeftCandidate, SplitErrors, StepStatus};
+pub use outcome::{
+    Diagnosis, FormulaEnd, FormulaPicture, FoundEffect, FoundFormula, FrictionChange,
+    LeftCandidate, SplitErrors, StepStatus, Symmetry,
+};
 pub use problem::case::{Case, Wishes};
 pub use problem::data_split::{LogRole, SetAside};
+pub use problem::formula_numbers::{FORMULA_NUMBERS, FormulaNumbers};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown};
 pub use run::{diagnose, errors_of};

@@ -13,7 +13,7 @@ const SPACING: f64 = 0.25;
 /// Peaks kept of each spectrum.
 const PEAKS: usize = 6;
 /// Least waves over the travel.
-const LEAST: f64 = 1.5;
+const MIN_WAVES: f64 = 1.5;
 
 /// Fills the orders of a cover from the raw residuals of a model, `[stretch][joint][sample]`.
 ///
@@ -125,7 +125,7 @@ fn peaks(sums: &[f64], count: &[f64]) -> Vec<f64> {
         .flat_map(|first| powers(&free, first))
         .take(last)
         .collect();
-    let first = (LEAST / SPACING) as usize;
+    let first = (MIN_WAVES / SPACING) as usize;
     let mut found: Vec<(f64, f64)> = (first.max(1)..last.saturating_sub(1))
         .filter(|&i| power[i] >= power[i - 1] && power[i] >= power[i + 1] || i == first)
         .map(|i| (power[i], i as f64 * SPACING))

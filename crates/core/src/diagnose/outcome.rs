@@ -9,8 +9,11 @@ use super::problem::unknowns::Unknown;
 use super::unexplained::Unexplained;
 use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::{Errors, JointChange};
+use super::unexplained::signal::Signal;
+use crate::effect::formula::Definition;
 use crate::effect::{Added, AugmentedModel, Law, Place};
 use crate::judge::ErrorGain;
+use crate::robot::FormulaSignal;
 
 /// How firm an effect is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -95,6 +98,63 @@ pub struct FrictionChange {
     pub certainty: f64,
 }
 
+/// What becomes of a formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FormulaEnd {
+    /// It gains on blocks left out, all parts agree, no joint gets worse, and chance makes none as good.
+    Found,
+    /// Searches where whole parts have another sign find as much.
+    Chance,
+    /// The parts of the data do not agree on it, or it gains too little beside the rest.
+    Parts,
+    /// A joint gets worse by it on data set aside.
+    Worse,
+}
+
+/// The formula of a joint.
+#[derive(Debug, Clone)]
+pub struct FoundFormula {
+    pub joint: usize,
+    pub end: FormulaEnd,
+    /// As an effect of the user's own.
+    pub definition: Definition,
+    /// Its numbers, with what the judge says of it.
+    pub step: FoundEffect,
+    /// Chance of a gain as large where whole parts of the residual have another sign.
+    pub p_value: f64,
+    /// Part of the squared error of blocks left out that it takes off.
+    pub share: f64,
+    pub symmetry: Symmetry,
+    /// What its terms are functions of.
+    pub signals: Vec<(FormulaSignal, usize)>,
+    /// None where the parts do not agree, or nothing is held out.
+    pub picture: Option<FormulaPicture>,
+    /// Effects of the catalogue at the joint in whose place it stands.
+    pub in_place_of: Vec<Added>,
+}
+
+/// Parts of what a formula adds, by its terms' squares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Symmetry {
+    /// It flips where the motion is reversed: friction.
+    pub odd: f64,
+    /// It goes round with the joint's position: a transmission.
+    pub periodic: f64,
+    /// It goes by an acceleration: an inertia.
+    pub inertial: f64,
+    /// It takes a signal of another joint: a coupling.
+    pub coupled: f64,
+}
+
+/// What a formula is drawn over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FormulaPicture {
+    pub over: Signal,
+    /// Signal, residual without the formula, torque of the formula.
+    pub rows: Vec<[f64; 3]>,
+}
+
 /// The outcome.
 pub struct Diagnosis {
     /// The model that is written: the given one where nothing is.
@@ -135,6 +195,8 @@ pub struct Diagnosis {
     pub parts_needed: usize,
     /// Whether the declared model explains more of blocks left out than no torque does.
     pub determined: bool,
+    /// Formulas of what is left, where they were looked for.
+    pub formulas: Vec<FoundFormula>,
 }
 
 impl Diagnosis {
@@ -159,6 +221,39 @@ impl Diagnosis {
     /// Whether held-out data took an effect out of what is written.
     pub fn holdout_had_a_say(&self) -> bool {
         self.steps.iter().any(FoundEffect::vetoed)
+    }
+
+    /// Errors of the judge's model; of the given one where all that was found was taken out again.
+    pub fn errors_now(&self) -> &SplitErrors {
+        match self.selected.is_some() && self.written().next().is_none() {
+            true => &self.before,
+            false => &self.after,
+        }
+    }
+
+    /// Leaves the model as it was `given`, for with what was found it is worse on held-out data, or on all data where
+    /// none are held out: whether it was so.
+    pub fn withdraw_worse(&mut self, given: &AugmentedModel) -> bool {
+        let after = self.selected.as_ref().unwrap_or(&self.after);
+        let sides = [&self.before, after];
+        let errors = match sides.map(|s| s.holdout.as_ref()) {
+            [Some(before), Some(after)] => [before, after],
+            _ => sides.map(|s| &s.train),
+        };
+        let [before, after] = errors.map(|e| e.overall.mean_relative_error);
+        let wanted = self.written().any(|step| step.accepted_by_user);
+        if wanted || self.written().next().is_none() || after <= before {
+            return false;
+        }
+        for step in &mut self.steps {
+            step.written = None;
+            if step.status == StepStatus::Confirmed {
+                step.status = StepStatus::Indicated;
+            }
+        }
+        self.selected = Some(self.before.clone());
+        self.model = given.clone();
+        true
     }
 
     /// Whether there is data enough for the parts to confirm anything.

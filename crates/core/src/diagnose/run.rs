@@ -40,7 +40,15 @@ pub fn diagnose(case: &Case, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
     unless_stopped(watch)?;
     let judged = judge(&prepared, &searched)?;
     unless_stopped(watch)?;
-    prepared.evaluate(searched, judged)
+    let mut found = prepared.evaluate(&searched, judged.clone())?;
+    if case.wishes.search {
+        let formulas = prepared.formulas((&searched, &judged), &found, watch)?;
+        if let Some((searched, judged)) = formulas.accepted {
+            found = prepared.evaluate(&searched, judged)?;
+        }
+        found.formulas = formulas.formulas;
+    }
+    Ok(found)
 }
 
 /// Errors of another model on the rows of a diagnosis, pieces drawn together as it had them.
@@ -88,7 +96,11 @@ fn check(case: &Case, split: &DataSplit) -> Result<(), DiagnoseError> {
 }
 
 impl PreparedCase<'_> {
-    fn evaluate(self, searched: SearchedCase, judged: Judged) -> Result<Diagnosis, DiagnoseError> {
+    fn evaluate(
+        &self,
+        searched: &SearchedCase,
+        judged: Judged,
+    ) -> Result<Diagnosis, DiagnoseError> {
         let case = self.case;
         let before = self.split_errors(&case.given)?;
         let refitted = self.split_errors(&self.fitted.model)?.train;
@@ -133,8 +145,8 @@ impl PreparedCase<'_> {
             dependence: dependences(&left_of, &structured, self.together),
             part_unexplained: part_unexplained(&floor, &given, &found),
             unexplained: left,
-            changes: friction_changes(&self, &searched),
-            candidates: left_candidates(&searched, numbers),
+            changes: friction_changes(self, searched),
+            candidates: left_candidates(searched, numbers),
             determined: searched.determined,
             model: judged.written,
             estimates: judged.estimates,
@@ -153,6 +165,7 @@ impl PreparedCase<'_> {
             parts: self.blocks.parts,
             block_s: self.blocks.least_s,
             parts_needed: numbers.parts,
+            formulas: Vec::new(),
         })
     }
 }

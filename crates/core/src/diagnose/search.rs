@@ -42,7 +42,7 @@ pub struct Looked {
     pub gain: ErrorGain,
 }
 
-/// Most alternatives that are told.
+/// Most alternatives that are reported.
 const ALTERNATIVES: usize = 3;
 
 impl Field<'_> {

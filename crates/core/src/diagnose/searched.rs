@@ -36,6 +36,8 @@ pub struct SearchedCase {
     pub looked: Vec<Looked>,
     /// Squared error of blocks left out by all that was chosen, in the weights of the joints.
     pub error: f64,
+    /// Friction laws by whose direction friction goes.
+    pub directions: Vec<Added>,
     /// Whether the declared model explains more of blocks left out than no torque does.
     pub determined: bool,
 }
@@ -131,6 +133,7 @@ impl PreparedCase<'_> {
             summed,
             chosen,
             looked,
+            directions,
         })
     }
 
@@ -161,7 +164,8 @@ impl PreparedCase<'_> {
         chosen: &mut Vec<Chosen>,
     ) -> Result<(), DiagnoseError> {
         let robot = &self.case.given.model.robot;
-        for wanted in &self.case.wishes.accepted {
+        let wishes = &self.case.wishes;
+        for wanted in wishes.accepted.iter().filter(|w| !wishes.is_formula(w)) {
             let is = |c: usize| {
                 let effect = &candidates[c].effect;
                 effect.name() == wanted.0 && effect.place.name(robot) == wanted.1
@@ -187,7 +191,8 @@ fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
     let place = joint.as_ref().map_or(String::new(), |j| format!(" of {j}"));
     DiagnoseError::Accept {
         name: format!("{name}{place}"),
-        why: "it was not among the candidates: see `candidates` in the JSON document for those that there are"
+        why: "it was not among the candidates: see `candidates` in the JSON document for those that there are; a \
+              formula is there with --search"
             .to_owned(),
     }
 }

@@ -6,6 +6,7 @@ use super::error::DiagnoseError;
 use super::held_out::EffectChange;
 use super::outcome::{FoundEffect, StepStatus};
 use super::prepared::{PreparedCase, moved};
+use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, value};
 use super::search::{Chosen, Field};
@@ -16,6 +17,7 @@ use crate::effect::{Added, AugmentedModel};
 use crate::judge::{Numbers, Terms};
 
 /// What is made of the effects that were chosen.
+#[derive(Clone)]
 pub struct Judged {
     pub steps: Vec<FoundEffect>,
     /// With every effect whose parts agree.
@@ -60,7 +62,7 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
         false => judge.clone(),
     };
     let written = work.halfway(written);
-    work.told(&ways, judge, written)
+    work.described(&ways, judge, written)
 }
 
 struct Judging<'a> {
@@ -85,6 +87,11 @@ impl Judging<'_> {
         let is = |effect: &Added, (name, joint): &(String, Option<String>)| {
             effect.name() == name && effect.place.name(robot) == *joint
         };
+        let formula_wanted = |effect: &Added| {
+            let joint = effect.place.name(robot);
+            let own = |name: &String| effect.name().starts_with(name);
+            joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
+        };
         let verified = tables::verified(
             &self.field,
             self.declared,
@@ -94,7 +101,8 @@ impl Judging<'_> {
         let way = |verified: Verified| {
             let effect = &searched.candidates[verified.chosen.candidate].effect;
             Way {
-                accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted)),
+                accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted))
+                    || effect.law.formula.is_some() && formula_wanted(effect),
                 verified,
                 amplitude: None,
                 change: None,
@@ -197,14 +205,15 @@ impl Judging<'_> {
     }
 
     /// Compares held-out errors with and without every effect, the others kept and refitted, and takes out what makes a
-    /// joint worse: the worst first.
+    /// joint worse, the worst first; then the one that gains least, for as long as the model as it would be written is
+    /// worse on held-out data than the given one.
     fn look(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
         let roles = &self.prepared.case.roles;
         let vetoing = match roles.contains(&LogRole::Veto) {
             true => LogRole::Veto,
             false => LogRole::Holdout,
         };
-        // blocks that are set aside are as the rest of their log: they measure
+        // blocks that are set aside are as the rest of their log: of single joints they measure
         let given = roles.contains(&vetoing);
         loop {
             let in_it = |w: &Way| w.amplitude.is_some() && !w.vetoed;
@@ -219,13 +228,24 @@ impl Judging<'_> {
                 let change = |role| self.prepared.held_out(role).change([&without, &with]);
                 found.push((*i, change(LogRole::Holdout)?, change(vetoing)?));
             }
-            let worst = |c: &Option<EffectChange>| c.as_ref().and_then(EffectChange::worst);
+            let given_model = &self.prepared.case.given;
+            let whole = self
+                .prepared
+                .held_out(vetoing)
+                .change([given_model, &with])?;
+            let rises = whole.is_some_and(|c| c.mean[1] > c.mean[0]);
             let mut worse: Vec<(usize, f64)> = Vec::new();
+            let mut costs: Vec<(usize, f64)> = Vec::new();
             for (i, holdout, veto) in found {
-                if let Some(by) = worst(&veto).filter(|_| given && !ways[i].accepted) {
-                    worse.push((i, by));
-                }
                 ways[i].change = holdout;
+                let Some(veto) = veto.filter(|_| !ways[i].accepted) else {
+                    continue;
+                };
+                worse.extend(veto.worst().filter(|_| given).map(|by| (i, by)));
+                costs.push((i, veto.mean[1] - veto.mean[0]));
+            }
+            if worse.is_empty() && rises {
+                worse = costs;
             }
             match worse.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some((i, _)) => ways[i].vetoed = true,
@@ -250,7 +270,7 @@ impl Judging<'_> {
         model
     }
 
-    fn told(
+    fn described(
         &self,
         ways: &[Way],
         judge: AugmentedModel,

@@ -1,6 +1,6 @@
-//! What a diagnosis tells while it works, and whether it is to end.
+//! What a diagnosis says while it works, and whether it is to end.
 
-/// What a diagnosis tells.
+/// What a diagnosis says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Heard<'a> {
     /// A part of the search begins: its name, and how many steps it takes. How many parts will follow is not known
@@ -12,14 +12,14 @@ pub enum Heard<'a> {
     End,
 }
 
-/// Who is told, from any thread, and who says whether to end.
+/// Who is informed, from any thread, and who says whether to end.
 #[derive(Clone, Copy)]
 pub struct Watch<'a> {
     pub tell: &'a (dyn Fn(Heard) + Sync),
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Nobody is told, and nothing ends the search.
+/// Nobody is informed, and nothing ends the search.
 pub const UNWATCHED: Watch = Watch {
     tell: &|_| {},
     stop: &|| false,

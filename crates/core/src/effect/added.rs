@@ -17,7 +17,7 @@ pub struct EffectNumber {
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
-    /// Held at a bound, for these data do not tell it.
+    /// Held at a bound, for these data do not determine it.
     pub bound: bool,
 }
 
@@ -28,7 +28,7 @@ pub struct Added {
     pub place: Place,
     pub shape: Vec<f64>,
     pub linear: Vec<f64>,
-    /// Which of (shape, linear) a fit leaves where they are: what the data do not tell, at a bound.
+    /// Which of (shape, linear) a fit leaves where they are: what the data do not determine, at a bound.
     pub held: Vec<bool>,
 }
 

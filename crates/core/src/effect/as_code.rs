@@ -75,6 +75,9 @@ fn formula(site: &mut CodeSite, effect: &Added) -> bool {
             FormulaSignal::Direction => directions.get(j)?.clone(),
             FormulaSignal::Temperature => format!("temperature[{j}]"),
             FormulaSignal::Time => "state.t".to_owned(),
+            FormulaSignal::SinceReversal | FormulaSignal::Play | FormulaSignal::Dahl => {
+                return None;
+            }
         })
     };
     let numbers = (effect.shape.as_slice(), effect.linear.as_slice());

@@ -1,5 +1,5 @@
 //! `payload` of a serial robot: a ball on the last link, its centre somewhere in that link's frame. All of
-//! what a body does to its link would be ten numbers, which few logs tell; mass, centre and one moment of
+//! what a body does to its link would be ten numbers, which few logs determine; mass, centre and one moment of
 //! inertia, the same about every axis, are five.
 //!
 //! Files and tables have first moments in the place of the centre: mx = mass x.
@@ -11,19 +11,25 @@ use crate::robot::standard::Body;
 use crate::robot::tree::MOST_JOINTS;
 
 /// Distance from the link's origin at which the search begins, along each axis \[m\].
-const NEAR: f64 = 0.1;
+const START_DISTANCE_M: f64 = 0.1;
 /// Farthest that a centre is looked for, along each axis \[m\].
-const FAR: f64 = 1.0;
+const MAX_DISTANCE_M: f64 = 1.0;
 
 pub static LAW: Law = Law {
     fits: |robot, _, _| !robot.tool_stays_level(),
     shape: &["x", "y", "z"],
     starts: |_, _| {
-        let corner = |k: usize, axis: usize| if k >> axis & 1 == 0 { NEAR } else { -NEAR };
+        let corner = |k: usize, axis: usize| {
+            if k >> axis & 1 == 0 {
+                START_DISTANCE_M
+            } else {
+                -START_DISTANCE_M
+            }
+        };
         let corners = (0..8).map(|k| (0..3).map(|axis| corner(k, axis)).collect());
         Ok(corners.collect())
     },
-    limits: |_, _| vec![[-FAR, FAR]; 3],
+    limits: |_, _| vec![[-MAX_DISTANCE_M, MAX_DISTANCE_M]; 3],
     reparametrised: Some(Reparametrisation {
         of_keys: |values| {
             let [mass, moments @ ..] = body(values)?;

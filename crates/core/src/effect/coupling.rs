@@ -2,7 +2,7 @@
 //! coulomb sgn(v_i + r v_j), inertia a_j.
 //!
 //! Where both joints turn one motor, as in the wrist of many arms, what it asks of joint i it asks of
-//! joint j too: power is kept, so that both rows have the same three numbers. That place is told by
+//! joint j too: power is kept, so that both rows have the same three numbers. That place is named by
 //! `both`.
 
 use super::entry::{Entry, Family, Key, Ladder, Search};

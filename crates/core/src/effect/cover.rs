@@ -163,7 +163,7 @@ fn slowest(stretches: &[Stretch]) -> f64 {
 
 /// Travel below which a joint counts as stationary, over its travel in all logs or its full range: what a
 /// controller gives way, which friction at rest hides.
-const SMALL: f64 = 0.01;
+const STATIONARY_SHARE: f64 = 0.01;
 
 /// Whether each joint is stationary along each stretch, `[stretch][joint]`: one-joint logs are recognised
 /// by it. A torque at rest is anything up to static friction, and no law of v says which.
@@ -186,7 +186,12 @@ pub fn stationary_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>>
         seen.max(robot.transmission().full_travel(j).unwrap_or(0.0))
     };
     let widest: Vec<f64> = (0..n).map(widest).collect();
-    let small = |t: &Vec<f64>| t.iter().zip(&widest).map(|(t, w)| *t < SMALL * w).collect();
+    let small = |t: &Vec<f64>| {
+        t.iter()
+            .zip(&widest)
+            .map(|(t, w)| *t < STATIONARY_SHARE * w)
+            .collect()
+    };
     travels.iter().map(small).collect()
 }
 

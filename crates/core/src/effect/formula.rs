@@ -1,5 +1,6 @@
 //! Effects of a user's own: torques linear in some coefficients, each of which has a formula in the motion.
 
+use super::formula_state::FormulaState;
 use super::law_text::exact;
 use super::place::Place;
 use super::scene::Scene;
@@ -49,8 +50,8 @@ pub enum FormulaError {
         why: String,
     },
     #[error(
-        "candidate `{name}`, `{coefficient}`: `{variable}` is not known; known are q, v, a, load, direction and \
-         temperature of the joint, the same of others (q_{joint}), t{shapes}"
+        "candidate `{name}`, `{coefficient}`: `{variable}` is not known; known are q, v, a, load, direction, \
+         temperature, since_reversal, play and dahl of the joint, the same of others (q_{joint}), t{shapes}"
     )]
     Variable {
         name: String,
@@ -58,6 +59,15 @@ pub enum FormulaError {
         variable: String,
         joint: String,
         shapes: String,
+    },
+    #[error(
+        "candidate `{name}`, `{coefficient}`: `{variable}` needs its scale in m or rad: give it in `shapes` as `{scale}`"
+    )]
+    Scale {
+        name: String,
+        coefficient: String,
+        variable: String,
+        scale: &'static str,
     },
 }
 
@@ -79,6 +89,8 @@ struct Column {
 enum Input {
     /// Of a joint, or of the effect's own.
     Signal(FormulaSignal, Option<usize>),
+    /// Of a joint, with the shape that is its scale.
+    Remembered(FormulaSignal, Option<usize>, Option<usize>),
     Shape(usize),
 }
 
@@ -124,6 +136,18 @@ impl Formulas {
                 })
             });
             let inputs: Vec<Input> = inputs.collect::<Result<_, _>>()?;
+            for (input, variable) in inputs.iter().zip(compiled.names()) {
+                if let Input::Remembered(signal, _, None) = input
+                    && let Some(scale) = signal.scale()
+                {
+                    return Err(FormulaError::Scale {
+                        name: name.clone(),
+                        coefficient: coefficient.clone(),
+                        variable: variable.clone(),
+                        scale,
+                    });
+                }
+            }
             Ok(Column {
                 formula: compiled,
                 inputs,
@@ -200,20 +224,48 @@ impl Formulas {
     /// Adds the columns of joint `joint` along a scene. What a formula does not give, as a root of what is negative,
     /// is no number.
     pub(super) fn fill(&self, scene: &Scene, shape: &[f64], joint: usize, out: &mut [Vec<f64>]) {
-        let mut values = [0.0; MOST_NAMES];
-        for (column, out) in self.columns.iter().zip(out) {
-            let count = column.inputs.len();
-            for (k, out) in out.iter_mut().enumerate() {
-                for (value, input) in values.iter_mut().zip(&column.inputs) {
-                    *value = match input {
-                        Input::Signal(signal, of) => {
-                            signal_at(scene, *signal, of.unwrap_or(joint), k)
-                        }
-                        Input::Shape(i) => shape[*i],
-                    };
-                }
-                *out += column.formula.value(&values[..count]);
+        let mut kept = vec![f64::NAN; self.remembered()];
+        let mut row = vec![0.0; self.columns.len()];
+        for k in 0..scene.len() {
+            row.fill(0.0);
+            self.at((scene, k), (shape, joint), &mut kept, &mut row);
+            for (out, x) in out.iter_mut().zip(&row) {
+                out[k] += x;
             }
+        }
+    }
+
+    /// How many numbers it keeps from sample to sample; NaN at the begin of a stretch.
+    pub(super) fn remembered(&self) -> usize {
+        let inputs = self.columns.iter().flat_map(|column| &column.inputs);
+        let own = inputs.filter(|input| matches!(input, Input::Remembered(..)));
+        FormulaState::SIZE * own.count()
+    }
+
+    /// Adds its columns at sample k of a scene to `out`.
+    pub(super) fn at(
+        &self,
+        (scene, k): (&Scene, usize),
+        (shape, joint): (&[f64], usize),
+        kept: &mut [f64],
+        out: &mut [f64],
+    ) {
+        let mut values = [0.0; MOST_NAMES];
+        let mut kept = kept.chunks_exact_mut(FormulaState::SIZE);
+        for (column, out) in self.columns.iter().zip(out) {
+            for (value, input) in values.iter_mut().zip(&column.inputs) {
+                *value = match input {
+                    Input::Signal(signal, of) => signal.at(scene, of.unwrap_or(joint), k),
+                    Input::Remembered(signal, of, scale) => {
+                        let scale = scale.map_or(1.0, |i| shape[i]);
+                        let of = of.unwrap_or(joint);
+                        let next = |kept| FormulaState(kept).next(*signal, scale, scene, (of, k));
+                        kept.next().map_or(f64::NAN, next)
+                    }
+                    Input::Shape(i) => shape[*i],
+                };
+            }
+            *out += column.formula.value(&values[..column.inputs.len()]);
         }
     }
 }
@@ -234,6 +286,8 @@ impl Formulas {
         let mut term = |(column, coefficient): (&Column, &f64)| {
             let inputs = column.inputs.iter().map(|input| match input {
                 Input::Shape(i) => Some(exact(shape[*i])),
+                // no program remembers it yet
+                Input::Remembered(..) => None,
                 Input::Signal(of, other) => {
                     timed |= *of == FormulaSignal::Time;
                     signal(*of, other.unwrap_or(joint))
@@ -255,23 +309,9 @@ fn input(variable: &str, definition: &Definition, joints: &[String]) -> Option<I
         return Some(Input::Shape(i));
     }
     let (signal, of) = FormulaSignal::read(variable, joints)?;
-    Some(Input::Signal(signal, of))
-}
-
-/// A signal of a joint at sample k.
-fn signal_at(scene: &Scene, signal: FormulaSignal, joint: usize, k: usize) -> f64 {
-    let s = scene.stretch;
-    match signal {
-        FormulaSignal::Position => s.q[joint][k],
-        FormulaSignal::Speed => s.v[joint][k],
-        FormulaSignal::Acceleration => s.a[joint][k],
-        FormulaSignal::Load => scene.load[joint][k],
-        FormulaSignal::Direction => scene.direction(joint, k),
-        FormulaSignal::Temperature => {
-            let known = s.temperature.get(joint).and_then(|x| x.get(k));
-            known.copied().unwrap_or(f64::NAN)
-        }
-        // since the begin of the log, whatever its clock shows
-        FormulaSignal::Time => s.began + k as f64 * s.dt,
-    }
+    let scale = |name| definition.shapes.iter().position(|s| s.name == name);
+    Some(match signal.remembers() {
+        true => Input::Remembered(signal, of, signal.scale().and_then(scale)),
+        false => Input::Signal(signal, of),
+    })
 }

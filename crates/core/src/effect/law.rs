@@ -66,7 +66,7 @@ pub type Step = fn(&Scene, Place, &[f64], usize, &mut [f64], &mut [f64]);
 pub struct Reparametrisation {
     /// Shape and coefficients of the keys in a file.
     pub of_keys: fn(&Values) -> Result<[Vec<f64>; 2], EffectError>,
-    /// The keys, in the order in which they are told, of shape and coefficients.
+    /// The keys, in the order in which they are reported, of shape and coefficients.
     pub to_keys: fn(&[f64], &[f64]) -> Vec<KeyValue>,
 }
 

@@ -12,6 +12,7 @@ mod cover;
 pub(crate) mod entry;
 mod facts;
 pub mod formula;
+mod formula_state;
 mod law;
 pub mod law_text;
 mod order;

@@ -106,6 +106,29 @@ impl Law {
         }
     }
 
+    /// How many numbers it keeps from sample to sample.
+    pub fn remembered(&self) -> usize {
+        match (&self.formula, &self.memory) {
+            (Some(formula), _) => formula.remembered(),
+            (None, memory) => memory.as_ref().map_or(0, |m| m.size),
+        }
+    }
+
+    /// Its columns at a scene of one sample, by what it keeps.
+    pub(super) fn step(
+        &self,
+        scene: &Scene,
+        place: Place,
+        (shape, joint): (&[f64], usize),
+        (kept, out): (&mut [f64], &mut [f64]),
+    ) {
+        match (&self.formula, &self.memory) {
+            (Some(formula), _) => formula.at((scene, 0), (shape, joint), kept, out),
+            (None, Some(memory)) => (memory.step)(scene, place, shape, joint, kept, out),
+            (None, None) => {}
+        }
+    }
+
     /// Adds the columns of joint `joint`, one for each linear coefficient, zero before.
     pub fn fill(
         &self,
@@ -206,8 +229,9 @@ mod tests {
             ("cos(q_q2)", "`q_q2` is not known"),
             ("t_q1", "`t_q1` is not known"),
             ("temperature_q2", "`temperature_q2` is not known"),
-            ("temp", "direction and temperature of"),
+            ("temp", "play and dahl of the joint"),
             ("", "no formula"),
+            ("play * w", "`play` needs its scale"),
         ] {
             let error = told(formula).unwrap();
             assert!(error.contains("own") && error.contains(says), "{error}");

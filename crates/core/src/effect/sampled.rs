@@ -32,7 +32,7 @@ impl Sampled {
             .map(|e| vec![vec![0.0]; e.law.linear.len()])
             .collect();
         let kept = effects
-            .map(|e| vec![f64::NAN; n * e.law.memory.as_ref().map_or(0, |m| m.size)])
+            .map(|e| vec![f64::NAN; n * e.law.remembered()])
             .collect();
         let most = model.effects.iter().map(|e| e.law.linear.len()).max();
         Self {
@@ -112,13 +112,13 @@ impl Sampled {
                 }
                 let out = &mut self.out[..effect.linear.len()];
                 out.fill(0.0);
-                if let Some(memory) = &effect.law.memory {
-                    let kept = &mut self.kept[i][j * memory.size..(j + 1) * memory.size];
-                    (memory.step)(&scene, effect.place, &effect.shape, j, kept, out);
+                let (law, size) = (effect.law, effect.law.remembered());
+                if size > 0 {
+                    let kept = &mut self.kept[i][j * size..(j + 1) * size];
+                    law.step(&scene, effect.place, (&effect.shape, j), (kept, out));
                 } else {
                     let columns = &mut self.columns[i];
                     columns.iter_mut().for_each(|column| column[0] = 0.0);
-                    let law = effect.law;
                     law.fill(&scene, effect.place, (&effect.shape, j), columns);
                     for (x, column) in out.iter_mut().zip(columns) {
                         *x = column[0];
@@ -138,10 +138,38 @@ impl Sampled {
 mod tests {
     use super::*;
     use crate::effect;
+    use crate::effect::Added;
+    use crate::effect::formula::{Definition, Shape};
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
     use crate::robot::{JointKind, Robot};
     use std::collections::BTreeMap;
+
+    /// A formula of the user's own in all that hangs on the way before.
+    fn remembers(robot: &Robot) -> Added {
+        let of = |name: &str, unit: &str, text: &str| [name, unit, text].map(str::to_owned);
+        let scale = |name: &str| Shape {
+            name: name.to_owned(),
+            unit: "rad".to_owned(),
+            range: [0.001, 1.0],
+        };
+        let definition = Definition {
+            name: "remembers".to_owned(),
+            coefficients: vec![
+                of("c1", "Nm", "play * abs(q) + exp(-since_reversal / 0.1)"),
+                of("c2", "Nm", "dahl - play"),
+            ],
+            shapes: vec![scale("way"), scale("width")],
+            ..Definition::default()
+        };
+        let law = effect::own::law(&definition, robot).unwrap();
+        Added::new(
+            law,
+            effect::Place::Joint(0),
+            vec![0.05, 0.1],
+            vec![0.3, 0.2],
+        )
+    }
 
     #[test]
     fn sample_by_sample_effects_give_the_torques_of_whole_stretches() {
@@ -175,6 +203,7 @@ mod tests {
                     &[("mu_c", 0.1), ("mu_v", 0.02), ("w", 50.0)],
                 ),
                 add("gain", &[("k", 0.05)]),
+                remembers(&robot),
             ],
         };
         let dt = 1e-3;

@@ -10,7 +10,7 @@ struct Limits {
     lowest: f64,
     /// Classes in each octave of speed and direction.
     per_octave: f64,
-    /// Least passes through a class of which a mean is told from chance.
+    /// Least passes through a class of which a mean is distinguished from chance.
     passes: usize,
 }
 

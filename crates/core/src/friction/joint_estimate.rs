@@ -42,7 +42,7 @@ pub struct Nuisance {
 /// Normalised innovations squared with their 95 % bounds.
 ///
 /// The noise levels are estimated, so that single innovations have about their own variance under
-/// any model. What tells a wrong one is that its innovations are alike: so the mean is over windows
+/// any model. What shows a wrong one is that its innovations are alike: so the mean is over windows
 /// of 50 samples, each the square of the window's summed normalised innovations over their number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Nis {

@@ -32,7 +32,7 @@ const FOLLOWS: f64 = 0.03;
 /// Speeds within this share of one another are one speed.
 const ONE_SPEED: f64 = 0.05;
 /// Standard errors that a mean must be off by before it counts.
-const SURE: f64 = 3.0;
+const SIGNIFICANT_ERRORS: f64 = 3.0;
 
 /// The curve at a speed whose plateaus it misses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +60,7 @@ pub fn missed(plateaus: &[Plateau], curve: &dyn Fn(f64) -> f64) -> Vec<Missed> {
             // what each says of itself, and what they say of one another
             let within = mean(&|p| p.std * p.std) / n;
             let between = mean(&|p| (off(p) - difference).powi(2)) / n;
-            let sure = difference.abs() > SURE * within.max(between).sqrt();
+            let sure = difference.abs() > SIGNIFICANT_ERRORS * within.max(between).sqrt();
             (sure && difference.abs() > FOLLOWS * torque.abs()).then_some(Missed {
                 v,
                 torque,

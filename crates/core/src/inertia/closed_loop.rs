@@ -15,9 +15,9 @@ const FASTEST: f64 = 0.1;
 /// Frequency of the loop over the cut-off of the rows.
 const ABOVE_CUTOFF: f64 = 3.0;
 /// A joint this far from its reference [m or rad] is put back there.
-const ASTRAY: f64 = 0.5;
+const MAX_REFERENCE_ERROR: f64 = 0.5;
 /// Least inertia of a joint, as a share of the largest.
-const LEAST: f64 = 1e-6;
+const MIN_INERTIA_SHARE: f64 = 1e-6;
 
 /// Gains of the loop.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -76,7 +76,7 @@ impl<'a> ClosedLoop<'a> {
             .map(|i| mass[i][i].abs())
             .fold(f64::MIN_POSITIVE, f64::max);
         for (i, row) in mass.iter().enumerate().take(n) {
-            let inertia = row[i].abs().max(LEAST * largest);
+            let inertia = row[i].abs().max(MIN_INERTIA_SHARE * largest);
             new.gains.proportional.push(inertia * frequency * frequency);
             new.gains.derivative.push(2.0 * inertia * frequency);
         }
@@ -182,7 +182,7 @@ impl<'a> ClosedLoop<'a> {
             self.q[j] += h * self.v[j];
         }
         // not a number counts as astray
-        let near = |j: usize| (self.q[j] - q_ref[j]).abs() < ASTRAY;
+        let near = |j: usize| (self.q[j] - q_ref[j]).abs() < MAX_REFERENCE_ERROR;
         if !(0..n).all(near) {
             self.indefinite += 1;
             self.place(q_ref, v_ref);

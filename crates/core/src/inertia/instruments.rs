@@ -34,7 +34,7 @@ const REFERENCE_SHARE: f64 = 0.5;
 /// Largest change of a parameter, in its standard deviations, of an iteration that has settled.
 const SETTLED: f64 = 0.05;
 /// Most iterations.
-const MOST: usize = 12;
+const MAX_ITERATIONS: usize = 12;
 /// Directions of Z'X, columns scaled, below this share of the largest are open.
 const OPEN: f64 = 1e-11;
 
@@ -395,7 +395,7 @@ pub fn iterate<E: From<FitError>>(
     pass: &mut dyn FnMut(&DVector<f64>) -> Result<BlockFactors, E>,
 ) -> Result<Instrumental, E> {
     let mut fit = plain.clone();
-    for iterations in 1..=MOST {
+    for iterations in 1..=MAX_ITERATIONS {
         let next = solve(&pass(&fit.theta)?, columns, &fit)?;
         let moved = |i: usize| {
             let std = next.covariance[(i, i)].max(0.0).sqrt();
@@ -403,7 +403,7 @@ pub fn iterate<E: From<FitError>>(
         };
         let settled = !(0..next.theta.len()).any(moved);
         fit = next;
-        if settled || iterations == MOST {
+        if settled || iterations == MAX_ITERATIONS {
             return Ok(Instrumental {
                 fit,
                 ending: if settled {
@@ -418,7 +418,7 @@ pub fn iterate<E: From<FitError>>(
     Ok(Instrumental {
         fit,
         ending: Ending::IterationLimit,
-        iterations: MOST,
+        iterations: MAX_ITERATIONS,
     })
 }
 

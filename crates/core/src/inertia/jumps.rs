@@ -16,7 +16,7 @@ struct Limits {
     times: f64,
     /// So long at least \[s\]: a reversal is over sooner.
     seconds: f64,
-    /// Of fewer blocks none is told from the others.
+    /// Of fewer blocks none is distinguished from the others.
     blocks: usize,
 }
 

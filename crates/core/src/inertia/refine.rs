@@ -21,7 +21,7 @@ use crate::robot::friction::DoubleTanh;
 /// one independent row is worth.
 const SETTLED: f64 = 1e-6;
 /// Most passes over the logs.
-const MOST: usize = 40;
+const MAX_PASSES: usize = 40;
 /// Damping of the steps.
 const DAMPING: StepControl = StepControl::damping(10.0, 10.0, [1e-9, 1e6]);
 /// A slope may change by this factor in one step.
@@ -286,7 +286,7 @@ pub fn refine<E: From<FitError>>(
     let known = prior(&start, &columns, strength)?;
     let begun = DescentPoint::of(columns, factors, known, &first)?;
     let mut iterations = 1;
-    let (at, ending, _) = descend(begun, &DAMPING, MOST - 1, &mut |at, damping| {
+    let (at, ending, _) = descend(begun, &DAMPING, MAX_PASSES - 1, &mut |at, damping| {
         let Some(step) = at.step(damping)? else {
             return Ok::<_, E>(Trial::Settled);
         };

@@ -24,11 +24,11 @@ const BISQUARE: f64 = 4.685;
 /// From the median absolute deviation to the standard deviation of a normal law.
 const NORMAL: f64 = 1.4826;
 /// A row below this weight counts as weighted down: 1.1 % of normal residuals under the bisquare.
-const HALF: f64 = 0.5;
+const LIGHT_WEIGHT: f64 = 0.5;
 /// Largest change of a parameter, in its standard deviations, of an iteration that has settled.
 const SETTLED: f64 = 0.03;
 /// Most iterations under each loss.
-const MOST: usize = 30;
+const MAX_ITERATIONS: usize = 30;
 /// Bins of a histogram of absolute residuals, each 1 % wider than the one before.
 const BINS: usize = 2400;
 const RATIO: f64 = 1.01;
@@ -114,7 +114,7 @@ impl Tally {
         };
         self.bins[bin.min(BINS - 1)] += 1;
         self.rows += 1;
-        self.down += u64::from(weight < HALF);
+        self.down += u64::from(weight < LIGHT_WEIGHT);
         self.weight += weight;
         self.slope += slope;
         self.square += residual * residual;
@@ -279,7 +279,7 @@ pub fn irls<E: From<FitError>>(
     let mut last = None;
     for loss in [Loss::Huber, Loss::Bisquare] {
         ending = Ending::IterationLimit;
-        for _ in 0..MOST {
+        for _ in 0..MAX_ITERATIONS {
             seen = Weigher::new(loss, fit.theta.clone(), scale, &rms);
             let factors = pass(Some(&mut seen))?;
             let next = seen.solve(&factors)?;

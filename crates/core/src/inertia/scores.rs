@@ -9,7 +9,7 @@
 //! where g is the score of the whole log and s the ratio of the log's residual at theta to that at theta_0, joint by
 //! joint. It is exact in the sum over the log and at theta_0: what another fit moves is taken as spread evenly over the
 //! log's rows, and what it leaves as correlated like the rest. Scores are whole numbers of steps, 32767 to
-//! the largest of each unknown: far finer than a covariance can tell, and a quarter of the room.
+//! the largest of each unknown: far finer than a covariance can determine, and a quarter of the room.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -57,7 +57,7 @@ impl Scores {
             .map(move |b| &b.of_joint[j] * grown + &evenly * (b.rows as f64 / all.max(1.0)))
     }
 
-    /// Merges neighbours, as few as leave at most `most` blocks, and tells how many became one. Those of two stretches
+    /// Merges neighbours, as few as leave at most `most` blocks, and returns how many became one. Those of two stretches
     /// merge only where there are more stretches than that.
     pub fn in_groups(&mut self, most: usize) -> usize {
         let stretches: Vec<usize> = self

@@ -34,7 +34,7 @@ pub struct ConditionNumbers {
     pub normalised: Option<f64>,
 }
 
-/// A combination of unknowns that the data do not tell apart: coefficients of the scaled columns.
+/// A combination of unknowns that the data do not distinguish: coefficients of the scaled columns.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Confounded {
     /// Index of the unknown and its coefficient, largest first.

@@ -93,17 +93,16 @@ impl<'a> BlocksLeftOut<'a> {
     pub fn new(sums: &'a BlockSums, judging: usize, terms: &'a Terms) -> Option<Self> {
         let fitted = sums.blocks.len() - judging;
         let total = sums.over(0..fitted);
-        let (all, right) = terms.normal(&total);
-        let diagonal: Vec<f64> = all.diagonal().iter().map(|x| x.max(1e-300)).collect();
-        let own: Vec<_> = (0..total.len()).map(|j| terms.own(j)).collect();
+        let all = terms.normal(&total);
+        let diagonal: Vec<f64> = all.0.diagonal().iter().map(|x| x.max(1e-300)).collect();
+        let own = terms.own_of_all();
         let mut without = Vec::new();
         for (b, block) in sums.blocks.iter().enumerate() {
-            let (mut normal, mut side) = (all.clone(), right.clone());
+            let mut others = all.clone();
             if b < fitted {
-                let (of_block, right) = terms.normal(block);
-                normal -= of_block;
-                side -= right;
+                terms.add_normal(&own, block, -1.0, &mut others);
             }
+            let (mut normal, mut side) = others;
             terms.firm(&mut normal, &mut side, &diagonal);
             let factor = normal.cholesky()?;
             let values = factor.solve(&side);

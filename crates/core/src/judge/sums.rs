@@ -96,18 +96,35 @@ impl Terms {
     /// Weighted normal matrix and right side of joints' sums, without prior and ridge.
     pub(super) fn normal(&self, sums: &[DMatrix<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let u = self.len();
-        let (mut normal, mut right) = (DMatrix::zeros(u, u), DVector::zeros(u));
-        for (j, (sums, w)) in sums.iter().zip(&self.weights).enumerate() {
-            let own = self.own(j);
-            let tau = sums.nrows() - 1;
-            for &(i, a) in &own {
-                right[i] += w * sums[(a, tau)];
-                for &(l, b) in &own {
-                    normal[(i, l)] += w * sums[(a, b)];
+        let mut all = (DMatrix::zeros(u, u), DVector::zeros(u));
+        self.add_normal(&self.own_of_all(), sums, 1.0, &mut all);
+        all
+    }
+
+    /// Adds the same so many times; `own` is [`Terms::own_of_all`].
+    pub(super) fn add_normal(
+        &self,
+        own: &[Vec<(usize, usize)>],
+        sums: &[DMatrix<f64>],
+        times: f64,
+        (normal, right): &mut (DMatrix<f64>, DVector<f64>),
+    ) {
+        for ((own, sums), w) in own.iter().zip(sums).zip(&self.weights) {
+            let w = times * w;
+            let torque = sums.column(sums.ncols() - 1);
+            for &(l, b) in own {
+                right[l] += w * torque[b];
+                let (mut to, from) = (normal.column_mut(l), sums.column(b));
+                for &(i, a) in own {
+                    to[i] += w * from[a];
                 }
             }
         }
-        (normal, right)
+    }
+
+    /// Places and columns of the terms of each joint.
+    pub(super) fn own_of_all(&self) -> Vec<Vec<(usize, usize)>> {
+        (0..self.weights.len()).map(|j| self.own(j)).collect()
     }
 
     /// Places and columns of the terms that a joint's rows have.
@@ -181,8 +198,9 @@ impl Terms {
             let tau = sums.nrows() - 1;
             let mut square = sums[(tau, tau)];
             for &(i, a) in &own {
-                let through: f64 = own.iter().map(|&(l, b)| sums[(a, b)] * values[l]).sum();
-                square += values[i] * (through - 2.0 * sums[(a, tau)]);
+                let products = sums.column(a);
+                let through: f64 = own.iter().map(|&(l, b)| products[b] * values[l]).sum();
+                square += values[i] * (through - 2.0 * products[tau]);
             }
             square.max(0.0)
         };

@@ -28,7 +28,7 @@ impl Formula {
         if names > MOST_NAMES {
             return Err(format!("more than {MOST_NAMES} names in it"));
         }
-        // what cannot be reckoned at all is told here
+        // what cannot be reckoned at all is reported here
         let tried = compiled.eval(&[0.5; MOST_NAMES][..names]);
         tried.map_err(|error| error.to_string())?;
         Ok(Self {

@@ -125,7 +125,7 @@ pub fn lbfgs(
     }
 }
 
-/// What `argmin` is told when it asks beyond the limit.
+/// The answer to `argmin` when it asks beyond the limit.
 #[derive(Clone, Copy, PartialEq)]
 enum Refusal {
     Error,

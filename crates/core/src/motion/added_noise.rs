@@ -1,5 +1,5 @@
 //! What biased the positions, done to them again: the filter that smoothed them, or added noise of their own level
-//! (SIMEX). What estimates make of it tells their bias.
+//! (SIMEX). What estimates make of it shows their bias.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

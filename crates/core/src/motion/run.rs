@@ -25,7 +25,7 @@ pub enum RunError<E> {
     Motion(#[from] MotionError),
 }
 
-/// What was done to a log. A document tells its filters.
+/// What was done to a log. A document names its filters.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Rows of the log.

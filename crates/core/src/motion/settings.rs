@@ -37,7 +37,7 @@ pub struct FilterSettings {
     /// A step longer than this many sampling steps splits the log ..
     pub gap_factor: f64,
     /// .. unless rows of a steady clock are missing for no longer than this (s): what lasts an eighth of a period of the
-    /// highest frequency that is kept is told by its neighbours. 0: only steps count.
+    /// highest frequency that is kept follows from its neighbours. 0: only steps count.
     pub bridge_s: f64,
     /// Dropped at each end of a segment before the parallel filter (s), where the position filter
     /// has nothing to look ahead to; left out, ten of that filter's time constants.

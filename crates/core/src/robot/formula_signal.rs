@@ -17,10 +17,16 @@ pub enum FormulaSignal {
     Temperature,
     /// Time since the begin of the log \[s\].
     Time,
+    /// Time since the joint last turned \[s\].
+    SinceReversal,
+    /// Where the joint stands in a play of some width, -1 to 1: it goes from one end to the other after a reversal.
+    Play,
+    /// Dahl's bristle, -1 to 1: after a reversal it goes to the other end as the way by some way.
+    Dahl,
 }
 
 impl FormulaSignal {
-    const ALL: [(&'static str, Self); 7] = [
+    const ALL: [(&'static str, Self); 10] = [
         ("q", Self::Position),
         ("v", Self::Speed),
         ("a", Self::Acceleration),
@@ -28,7 +34,30 @@ impl FormulaSignal {
         ("direction", Self::Direction),
         ("temperature", Self::Temperature),
         ("t", Self::Time),
+        ("since_reversal", Self::SinceReversal),
+        ("play", Self::Play),
+        ("dahl", Self::Dahl),
     ];
+
+    /// As formulas name it.
+    pub fn name(self) -> &'static str {
+        let own = Self::ALL.iter().find(|(_, signal)| *signal == self);
+        own.map_or("", |(name, _)| name)
+    }
+
+    /// Name of the shape that is its scale, where it has one [m or rad].
+    pub fn scale(self) -> Option<&'static str> {
+        match self {
+            Self::Play => Some("width"),
+            Self::Dahl => Some("way"),
+            _ => None,
+        }
+    }
+
+    /// Whether it hangs on what was before.
+    pub fn remembers(self) -> bool {
+        matches!(self, Self::SinceReversal | Self::Play | Self::Dahl)
+    }
 
     /// The signal that a name stands for, and the joint where it names one: `q` of the formula's own joint, `q_NAME`
     /// of another. The time is nobody's.

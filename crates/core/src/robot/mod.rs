@@ -269,7 +269,7 @@ impl Robot {
         }
     }
 
-    /// Inertial parameters that the torque of each joint holds, by their places: the last joints of an arm are told
+    /// Inertial parameters that the torque of each joint holds, by their places: the last joints of an arm are reported
     /// nothing of its first links.
     pub fn parameters_by_joint(&self) -> Vec<Vec<usize>> {
         let (n, p) = (self.joints(), self.parameters().len());

@@ -3,6 +3,8 @@
 //! A coefficient of a fitted law may be negative where its terms together take power over the speeds of
 //! the logs; damping below zero alone drives a simulated joint away, and formats do not allow it.
 
+use super::error::ExportError;
+use cft_ident_core::effect::as_code::EffectsCode;
 use cft_ident_core::effect::{AugmentedModel, Scene};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
@@ -31,21 +33,18 @@ pub(super) fn dissipative(model: &Model, j: usize) -> Option<[f64; 2]> {
 const PER_DECADE: i32 = 20;
 const DECADES: [i32; 2] = [-6, 2];
 
-/// Speeds from and to which the friction of each joint drives it, its effects among those of a speed alone
-/// (`of_friction`, by their place in the model) included.
-pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Option<[f64; 2]>> {
-    let n = refined.model.robot.joints();
-    let [first, last] = DECADES.map(|decade| decade * PER_DECADE);
-    let speeds = (first..=last).map(|k| 10f64.powf(f64::from(k) / f64::from(PER_DECADE)));
-    let speeds: Vec<f64> = speeds.flat_map(|v| [v, -v]).collect();
-    let rest = || vec![vec![0.0; speeds.len()]; n];
+/// Friction of each joint at its speeds `v`, joint by joint and as many of each, with its effects among those of a
+/// speed alone (`of_friction`, by their place in the model).
+fn friction_at(refined: &AugmentedModel, of_friction: &[usize], v: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let rows = v.first().map_or(0, Vec::len);
+    let rest = || vec![vec![0.0; rows]; v.len()];
     let along = Stretch {
         dt: 1.0,
-        t: (0..speeds.len()).map(|k| k as f64).collect(),
+        t: (0..rows).map(|k| k as f64).collect(),
         q: rest(),
-        v: vec![speeds.clone(); n],
         a: rest(),
         tau: rest(),
+        v,
         ..Stretch::default()
     };
     let torques = refined.torques(&along);
@@ -59,9 +58,9 @@ pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Op
         direction: &torques.direction,
         tilt: None,
     };
-    let mut of_effect = vec![0.0; speeds.len()];
-    let each = refined.model.friction.iter().enumerate();
-    each.map(|(j, law)| {
+    let mut of_effect = vec![0.0; rows];
+    let each = refined.model.friction.iter().zip(&along.v).enumerate();
+    each.map(|(j, (law, speeds))| {
         let mut friction: Vec<f64> = speeds.iter().map(|v| law.torque(*v)).collect();
         for effect in of_friction.iter().filter_map(|i| refined.effects.get(*i)) {
             effect.torque(&scene, j, &mut of_effect);
@@ -69,6 +68,44 @@ pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Op
                 *sum += x;
             }
         }
+        friction
+    })
+    .collect()
+}
+
+/// Friction of each joint at its speeds `v`, joint by joint and as many of each, as exported code has it: the law with
+/// the effects of the speed alone, and none where it would drive.
+///
+/// # Errors
+/// An effect that has no code.
+pub fn joint_friction(
+    refined: &AugmentedModel,
+    v: Vec<Vec<f64>>,
+) -> Result<Vec<Vec<f64>>, ExportError> {
+    let of_friction = EffectsCode::of(refined)?.of_friction;
+    let drives = driving(refined, &of_friction);
+    let mut out = friction_at(refined, &of_friction, v.clone());
+    for ((friction, v), _) in out
+        .iter_mut()
+        .zip(&v)
+        .zip(&drives)
+        .filter(|of| of.1.is_some())
+    {
+        for (x, v) in friction.iter_mut().zip(v) {
+            *x = if *x * v > 0.0 { *x } else { 0.0 };
+        }
+    }
+    Ok(out)
+}
+
+/// Speeds from and to which the friction of each joint drives it, its effects among those of a speed alone included.
+pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Option<[f64; 2]>> {
+    let [first, last] = DECADES.map(|decade| decade * PER_DECADE);
+    let speeds = (first..=last).map(|k| 10f64.powf(f64::from(k) / f64::from(PER_DECADE)));
+    let speeds: Vec<f64> = speeds.flat_map(|v| [v, -v]).collect();
+    let all = vec![speeds.clone(); refined.model.robot.joints()];
+    let each = friction_at(refined, of_friction, all).into_iter();
+    each.map(|friction| {
         // what is the same both ways is a constant torque, and no friction
         let pairs = friction.chunks_exact(2).zip(speeds.chunks_exact(2));
         let drives = pairs.filter(|(f, _)| f[0] - f[1] < 0.0);

@@ -16,10 +16,10 @@ use cft_ident_core::robot::friction::sign;
 pub struct LeftOut {
     /// What it is.
     pub what: String,
-    /// Joint where it is largest; absent where no log tells.
+    /// Joint where it is largest; absent where no log determines.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// Its rms over that of the joint's torque, in percent; absent where no log tells.
+    /// Its rms over that of the joint's torque, in percent; absent where no log determines.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub percent_of_torque: Option<f64>,
 }

@@ -12,7 +12,7 @@ use cft_ident_files::config::serial_section::LinkSection;
 
 /// Name of the link.
 const LINK: &str = "link";
-/// Mass of a link that turns, of which nothing tells \[kg\].
+/// Mass of a link that turns, of which nothing says \[kg\].
 const TURNING_MASS: f64 = 1.0;
 /// Square of the radius of gyration of a link that slides, likewise \[m^2\].
 const SLIDING_SIZE: f64 = 1e-3;

@@ -22,10 +22,10 @@ pub enum Identifiability {
     Nothing,
 }
 
-/// Mass that is taken for a link whose mass nothing tells [kg].
+/// Mass that is taken for a link whose mass nothing says [kg].
 pub(crate) const UNTOLD_MASS: f64 = 1.0;
 
-/// Standard parameters of every link, then of the drives, and whether torques tell them.
+/// Standard parameters of every link, then of the drives, and whether torques determine them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standard {
     pub values: Vec<f64>,
@@ -35,7 +35,7 @@ pub struct Standard {
 }
 
 /// A change below this share of the largest number is rounding.
-const SAME: f64 = 1e-9;
+const ROUNDING: f64 = 1e-9;
 
 /// The standard parameters nearest to the priors of the links and drives that give these base
 /// parameters. Without a prior a link is 1 kg in its origin, and a drive has no inertia.
@@ -89,6 +89,6 @@ pub fn nearest(
     Standard {
         values: x.iter().copied().collect(),
         identifiability: told,
-        is_prior: moved < SAME,
+        is_prior: moved < ROUNDING,
     }
 }

@@ -9,7 +9,7 @@ use cft_ident_core::robot::tree::{Coordinate, Link};
 use cft_ident_files::config::{RobotFile, UrdfReplacement};
 
 /// Numbers of frames that differ by less are one: URDFs have six digits.
-const SAME: f64 = 2e-5;
+const SIX_DIGITS: f64 = 2e-5;
 
 /// What replaces inertials and friction in the URDF that `source` was read from; `file` names it in errors.
 /// `names` are what a controller calls the joints of the model, where it calls them otherwise. Joints are
@@ -99,7 +99,7 @@ fn difference(link: &ArmLink, there: &Link, parent: Option<usize>) -> Option<Str
     if there.kind != link.kind {
         return Some("the one joint slides and the other turns".to_owned());
     }
-    let off = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > SAME);
+    let off = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > SIX_DIGITS);
     if off(&link.origin, &there.origin) {
         let [a, b] = [words(&there.origin), words(&link.origin)];
         return Some(format!("its origin is {a} m and not {b} m"));

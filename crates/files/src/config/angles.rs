@@ -1,7 +1,7 @@
 //! Angles and axes as people write them: 1.5708 for pi/2, 0.866 for the cosine of 30 degrees.
 //!
 //! An angle that is off by 4e-6 rad makes axes that are parallel in the machine cross far away, and the
-//! model a base parameter that no motion can tell: so what is written as a rounded multiple of pi/12 is
+//! model a base parameter that no motion can determine: so what is written as a rounded multiple of pi/12 is
 //! taken as that multiple. 1.5704391 of a calibrated arm is no rounded multiple and stays.
 
 use std::f64::consts::PI;
@@ -55,7 +55,7 @@ impl Changes {
     }
 
     /// What happened to the angles of `file`, where anything did.
-    pub(super) fn told(&self, file: &str) -> Option<String> {
+    pub(super) fn in_words(&self, file: &str) -> Option<String> {
         let more = match self.count {
             0 => return None,
             1 => String::new(),
@@ -232,11 +232,11 @@ mod tests {
         let mut changes = Changes::default();
         let mut read = |text: &str, place| changes.angle(text.parse().unwrap(), text, place);
         read("1.57079632679", "rpy of joint a");
-        assert_eq!(changes.told("r.urdf"), None);
+        assert_eq!(changes.in_words("r.urdf"), None);
         let mut read = |text: &str, place| changes.angle(text.parse().unwrap(), text, place);
         read("1.5708", "rpy of joint a");
         read("-2.356", "rpy of joint b");
-        let told = changes.told("r.urdf").unwrap();
+        let told = changes.in_words("r.urdf").unwrap();
         assert!(
             told.contains("rpy of joint a 1.5708 as pi/2 and 1 more;"),
             "{told}"

@@ -11,7 +11,7 @@ use super::document::Document;
 use cft_ident_core::robot::FormulaSignal;
 
 /// Most effects of one file.
-const MOST: usize = 100;
+const MAX_EFFECTS: usize = 100;
 /// Most columns of one effect, and most shapes.
 const MOST_COLUMNS: usize = 12;
 const MOST_SHAPES: usize = 3;
@@ -70,7 +70,7 @@ fn is_one(unit: &String) -> bool {
 }
 
 /// A file of candidates.
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CandidatesToml {
     candidate: Vec<CandidateSection>,
@@ -87,12 +87,22 @@ pub fn parse(file: &str, text: &str) -> Result<Vec<CandidateSection>, ConfigErro
     Ok(raw.candidate)
 }
 
+/// The text of a file of candidates.
+///
+/// # Errors
+/// [`toml::ser::Error`] for what TOML cannot hold.
+pub fn to_toml(candidates: &[CandidateSection]) -> Result<String, toml::ser::Error> {
+    toml::to_string(&CandidatesToml {
+        candidate: candidates.to_vec(),
+    })
+}
+
 /// Checks what needs no robot.
 pub(super) fn check(
     candidates: &[CandidateSection],
     document: &Document,
 ) -> Result<(), ConfigError> {
-    if candidates.len() > MOST {
+    if candidates.len() > MAX_EFFECTS {
         let problem = format!("has {} tables", candidates.len());
         return Err(document.value(&["candidate"], &problem, "give at most 100"));
     }

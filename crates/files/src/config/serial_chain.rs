@@ -323,7 +323,7 @@ pub(super) fn take_as_meant(
             *axis = changes.axis(*axis, written, &format!("axis of {of}"));
         }
     }
-    changes.told(file)
+    changes.in_words(file)
 }
 
 /// Refuses rows that `new` wrote and nobody filled in.

@@ -1,4 +1,4 @@
-//! Configuration files: what comes with the tool is right, and what is wrong is told with its line.
+//! Configuration files: what comes with the tool is right, and what is wrong is reported with its line.
 
 use std::path::Path;
 

@@ -167,7 +167,7 @@ fn absurd_depth_and_length_end_in_errors_and_soon() {
     assert!(error(&deep).contains("nested more than 64 deep"));
     let wide = format!("<robot>{}</robot>", "<x/>".repeat(300_000));
     assert!(error(&wide).contains("more than 200000 elements"));
-    // a chain of ten thousand fixed joints is no harm, one of moving joints is told
+    // a chain of ten thousand fixed joints is no harm, one of moving joints is reported
     for (kind, wanted) in [
         ("fixed", "has no moving joint"),
         ("revolute", "more than 200 that move"),

@@ -45,16 +45,16 @@ pub(super) struct Found {
 }
 
 /// Most changes of one course.
-const MOST: usize = 3;
+const MAX_CHANGES: usize = 3;
 /// Least number of logs before a change.
 const BEFORE: usize = 6;
 /// Least number of logs from a change on: one log in ten may carry a payload, and some of these follow each other.
 const AFTER: usize = 6;
 /// Largest share of the logs on one side of a change that are not of that side: where more are, the robot carries
 /// something now and then.
-const ASTRAY: f64 = 0.2;
+const OUTLYING_SHARE: f64 = 0.2;
 /// Deviations from the level of its side, from which on a log that is nearer to the other is not of its side.
-const FAR: f64 = 3.0;
+const OUTLYING_DEVIATIONS: f64 = 3.0;
 /// Most times that walk and scatter are sized anew with a change taken out.
 const REFINED: usize = 3;
 /// What is estimated of each parameter besides the changes: level, walk and scatter.
@@ -92,10 +92,10 @@ struct Clearest {
 /// larger than the variances say. Of several parameters the likelihood ratio is tested, with the correlation of their
 /// innovations (Basseville and Nikiforov 1993, section 7.2).
 pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
-    let (count, told) = (about.members.len(), about.told());
+    let (count, told) = (about.members.len(), about.determined());
     let mut found: Vec<Found> = Vec::new();
     let mut sizes = likeliest(about, &[], sizes).0;
-    while found.len() < MOST && told > count * (OTHERS + found.len() + 2) {
+    while found.len() < MAX_CHANGES && told > count * (OTHERS + found.len() + 2) {
         let freedom = (told - count * (OTHERS + found.len() + 1)) as f64;
         let Ok(law) = FisherSnedecor::new(count as f64, freedom) else {
             break;
@@ -120,14 +120,14 @@ pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
     (sizes, found)
 }
 
-/// The size from which on a step of each parameter alone, in the middle of the course, is told at `level`; none where
-/// there are too few logs to tell any. That size itself is told in one course of two.
+/// The size from which on a step of each parameter alone, in the middle of the course, is reported at `level`; none where
+/// there are too few logs to report any. That size itself is reported in one course of two.
 pub(super) fn least_seen(about: About, sizes: &[Sizes], level: f64) -> Vec<Option<f64>> {
     let count = about.members.len();
     let told: Vec<usize> = (0..about.times.len())
         .filter(|k| about.members.iter().any(|m| m.estimate[*k].is_finite()))
         .collect();
-    let freedom = about.told().saturating_sub(count * (OTHERS + 1));
+    let freedom = about.determined().saturating_sub(count * (OTHERS + 1));
     let law = FisherSnedecor::new(count as f64, freedom.max(1) as f64);
     let (true, Ok(law)) = (told.len() >= BEFORE + AFTER && freedom > 0, law) else {
         return vec![None; count];
@@ -203,7 +203,7 @@ fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Clearest> 
         .collect();
     let known = orthonormal(columns.iter());
     let freedom = about
-        .told()
+        .determined()
         .saturating_sub(count * (OTHERS + found.len() + 1));
     let freedom = freedom.max(1) as f64;
     let residual = without(&white.signals(), &known);
@@ -254,7 +254,7 @@ fn carries(about: About, sizes: &[Sizes], found: &[Found], change: &Found) -> bo
     let members = about.members.iter().zip(sizes).zip(&rests).enumerate();
     members.into_iter().any(|(i, ((member, own), rest))| {
         let variances = own.variances(member.estimate, about.spacings);
-        let (level, _) = smooth(&member.told(rest), &variances);
+        let (level, _) = smooth(&member.determined(rest), &variances);
         let [size, _] = change.sizes[i];
         let off = |k: usize| rest[k] - level[k];
         let before = member.alone.iter().filter(|k| **k < change.at);
@@ -265,7 +265,7 @@ fn carries(about: About, sizes: &[Sizes], found: &[Found], change: &Found) -> bo
             let since = *k >= change.at;
             let old = if since { own + size * shape[*k] } else { own };
             let other = if since { old } else { own - size };
-            let far = FAR * variances.estimate[*k].sqrt();
+            let far = OUTLYING_DEVIATIONS * variances.estimate[*k].sqrt();
             let again = |carried: f64| old.abs() > far && (old - carried).abs() < far;
             member.alone.contains(k)
                 || (own.abs() > far && other.abs() < own.abs())
@@ -273,7 +273,7 @@ fn carries(about: About, sizes: &[Sizes], found: &[Found], change: &Found) -> bo
         };
         let often = |side: std::ops::Range<usize>| {
             let logs = side.len() as f64;
-            side.filter(astray).count() as f64 > ASTRAY * logs
+            side.filter(astray).count() as f64 > OUTLYING_SHARE * logs
         };
         often(0..change.at) || often(change.at..about.times.len())
     })
@@ -288,7 +288,9 @@ fn fit(about: About, sizes: &[Sizes], found: &mut [Found]) {
         .collect();
     let signals = white.signals();
     let left = without(&signals, &orthonormal(columns.iter()));
-    let freedom = about.told().saturating_sub(count * (OTHERS + found.len()));
+    let freedom = about
+        .determined()
+        .saturating_sub(count * (OTHERS + found.len()));
     let scale = (dot(&left, &left) / freedom.max(1) as f64).max(1.0);
     let fitted = fitted(&columns, &signals, scale);
     for (change, sizes) in found.iter_mut().zip(fitted.chunks_exact(count)) {

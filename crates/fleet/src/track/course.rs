@@ -12,7 +12,7 @@ pub struct LogEstimate {
     pub time: f64,
     /// Estimate \[unit\].
     pub value: f64,
-    /// Its variance; infinite where the log tells nothing of the parameter.
+    /// Its variance; infinite where the log says nothing of the parameter.
     pub variance: f64,
 }
 
@@ -30,14 +30,14 @@ pub struct Course {
     pub scatter: f64,
     /// Logs whose estimate stands alone, far from those before and after.
     pub outliers: Vec<usize>,
-    /// The size from which on a step in the middle of the course is told; none where there are too few logs.
+    /// The size from which on a step in the middle of the course is reported; none where there are too few logs.
     pub least_seen: Option<f64>,
 }
 
 /// A step in the variance by which the level is forgotten, over the square of a change.
-const FORGET: f64 = 100.0;
+const FORGETTING: f64 = 100.0;
 /// Deviations from its neighbours at which an estimate stands alone.
-const ALONE: f64 = 5.0;
+const OUTLIER_DEVIATIONS: f64 = 5.0;
 /// Neighbours on each side: a payload may stay for some logs.
 const NEIGHBOURS: usize = 5;
 
@@ -49,7 +49,7 @@ pub fn follow(estimates: &[LogEstimate], level: f64) -> Course {
 }
 
 /// Courses of parameters that change together, as the friction of a joint does: a change is sought in all of them at
-/// once, `level` is the probability that one is told where there is none, and each course has its own size of it.
+/// once, `level` is the probability that one is reported where there is none, and each course has its own size of it.
 /// `parameters` are estimates of the same logs `[parameter][log]`, `correlation` is that of the errors of one log's
 /// estimates, row by row, where their fits say it.
 pub fn follow_together(
@@ -98,7 +98,7 @@ pub fn follow_together(
 /// Estimates of one parameter, as they are followed.
 struct Signal {
     values: Vec<f64>,
-    /// Infinite where a log tells nothing, or stands alone.
+    /// Infinite where a log says nothing, or stands alone.
     variances: Vec<f64>,
     outliers: Vec<usize>,
 }
@@ -129,7 +129,7 @@ impl Signal {
         let mut all: Variances = sizes.variances(&self.variances, spacings);
         for change in &changes {
             match change.kind {
-                ChangeKind::Step => all.walk[change.at] += FORGET * change.size * change.size,
+                ChangeKind::Step => all.walk[change.at] += FORGETTING * change.size * change.size,
                 // the walk has to follow the slope
                 ChangeKind::Ramp => {
                     let logs = (self.values.len() - change.at).max(1) as f64;
@@ -209,7 +209,7 @@ fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
     };
     let far = |place: usize| {
         let std = (1.4826 * scale).max(variances[told[place]].sqrt());
-        off[place].abs() > ALONE * std
+        off[place].abs() > OUTLIER_DEVIATIONS * std
     };
     (0..told.len())
         .filter(|p| far(*p))

@@ -29,7 +29,7 @@ pub struct RobotApart {
 }
 
 /// Least number of robots that are compared: of fewer nobody can say which one differs.
-const LEAST: usize = 5;
+const MIN_ROBOTS: usize = 5;
 
 /// Robots that differ from the others at `level`, all comparisons together; the clearest first. Robots that are alike
 /// differ by what their own parameters vary, which is taken from the middle of the fleet.
@@ -41,7 +41,8 @@ pub fn apart(levels: &[Level], level: f64) -> Vec<RobotApart> {
     for parameter in parameters {
         let of_parameter = levels.iter().filter(|l| l.parameter == parameter);
         let known: Vec<&Level> = of_parameter.filter(|l| l.std.is_finite()).collect();
-        let Some(usual) = median(known.iter().map(|l| l.value)).filter(|_| known.len() >= LEAST)
+        let Some(usual) =
+            median(known.iter().map(|l| l.value)).filter(|_| known.len() >= MIN_ROBOTS)
         else {
             continue;
         };

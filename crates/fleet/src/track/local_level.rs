@@ -15,7 +15,7 @@ pub(super) struct Variances {
 /// Gains and variances of the innovations, which depend on the variances alone.
 #[derive(Debug, Clone)]
 pub(super) struct Whitener {
-    /// Kalman gain and standard deviation of each innovation; none where an estimate tells nothing or starts the
+    /// Kalman gain and standard deviation of each innovation; none where an estimate says nothing or starts the
     /// filter.
     steps: Vec<Step>,
 }
@@ -160,7 +160,7 @@ mod tests {
 
     const SIGNAL: [f64; 5] = [1.0, 2.5, 0.0, 2.0, 4.0];
 
-    /// Covariance of the estimates that tell something, about an unknown level at the first.
+    /// Covariance of the estimates that say something, about an unknown level at the first.
     fn dense() -> (DMatrix<f64>, DVector<f64>) {
         let v = variances();
         let known = [0, 1, 3, 4];

@@ -9,15 +9,15 @@ use super::walk::{Sizes, median};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Member<'a> {
     pub signal: &'a [f64],
-    /// Variances of the estimates; infinite where a log tells nothing, or stands alone.
+    /// Variances of the estimates; infinite where a log says nothing, or stands alone.
     pub estimate: &'a [f64],
     /// Logs that stand alone.
     pub alone: &'a [usize],
 }
 
 impl Member<'_> {
-    /// A signal of this course with 0 where no log tells it.
-    pub(super) fn told(&self, signal: &[f64]) -> Vec<f64> {
+    /// A signal of this course with 0 where no log determines it.
+    pub(super) fn determined(&self, signal: &[f64]) -> Vec<f64> {
         let pairs = signal.iter().zip(self.estimate);
         pairs
             .map(|(x, r)| if r.is_finite() { *x } else { 0.0 })
@@ -37,8 +37,8 @@ pub(super) struct About<'a> {
 }
 
 impl About<'_> {
-    /// Number of estimates that tell something.
-    pub(super) fn told(&self) -> usize {
+    /// Number of estimates that say something.
+    pub(super) fn determined(&self) -> usize {
         let all = self.members.iter().flat_map(|member| member.estimate);
         all.filter(|r| r.is_finite()).count()
     }

@@ -22,7 +22,7 @@ pub struct InspectedChannel {
     /// What a 0 of the column stands for.
     pub zero: f64,
     /// Unit of its numbers per unit of the column, so that what is to be written into a robot file
-    /// can be told in the column's.
+    /// can be given in the column's.
     pub factor: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Faults as they are told: of a whole channel, or of stretches of it.
+//! Faults as they are reported: of a whole channel, or of stretches of it.
 
 use super::fault::{Episodes, FaultKind, LogFault, Severity};
 use super::judge::Track;
@@ -88,7 +88,7 @@ impl FaultList {
         effect: &dyn Fn(u64, usize) -> String,
         remedy: &str,
     ) {
-        for (episode, count) in episodes.told() {
+        for (episode, count) in episodes.merged() {
             let effect = effect(episode.rows, count);
             self.faults.push(LogFault {
                 channel: channel.map(str::to_owned),
@@ -99,7 +99,7 @@ impl FaultList {
         }
     }
 
-    /// Leaves the rows of some stretches out, which were told as this fault of this channel, unless
+    /// Leaves the rows of some stretches out, which were reported as this fault of this channel, unless
     /// the robot file keeps them.
     pub(super) fn cut(&mut self, kind: FaultKind, channel: Option<&str>, episodes: &Episodes) {
         if self.acts(kind, channel) {
@@ -108,7 +108,7 @@ impl FaultList {
         }
     }
 
-    /// Marks what was told as this fault of this channel as acted upon; false, and told so, where
+    /// Marks what was reported as this fault of this channel as acted upon; false, and told so, where
     /// the robot file keeps it.
     pub(super) fn acts(&mut self, kind: FaultKind, channel: Option<&str>) -> bool {
         let kept = kind.kept(&self.keep);

@@ -53,6 +53,8 @@ pub enum FaultKind {
     IrregularClock,
     /// Rows that show the positions of the row before while the robot moves.
     RepeatedRows,
+    /// A stretch that stands in the log before it, number for number.
+    RepeatedPart,
     /// A channel that stands still while what it measures does not.
     StuckChannel,
     /// Flat tops of a torque, current or voltage.
@@ -107,6 +109,7 @@ impl FaultKind {
             Self::Dropout => "dropout",
             Self::IrregularClock => "irregular-clock",
             Self::RepeatedRows => "repeated-rows",
+            Self::RepeatedPart => "repeated-part",
             Self::StuckChannel => "stuck-channel",
             Self::Saturation => "saturation",
             Self::Clipping => "clipping",
@@ -226,14 +229,14 @@ pub(super) struct FaultEpisode {
 }
 
 /// Stretches that are kept; what comes after them lengthens the last.
-const MOST: usize = 1 << 18;
+const MAX_STRETCHES: usize = 1 << 18;
 /// Stretches that are faults of their own; more are one fault from the first to the last.
 const LISTED: usize = 12;
 
 impl Episodes {
     /// Adds rows from `from` to `to`; joined to the last stretch where at most `join` s lie between.
     pub(super) fn add(&mut self, from: f64, to: f64, rows: u64, join: f64) {
-        let full = self.list.len() >= MOST;
+        let full = self.list.len() >= MAX_STRETCHES;
         match self.list.last_mut() {
             Some(last) if full || (from >= last.from && from - last.to <= join) => {
                 last.to = last.to.max(to);
@@ -256,8 +259,8 @@ impl Episodes {
         self.list.iter()
     }
 
-    /// As they are told: one by one, or all as one where there are many.
-    pub(super) fn told(&self) -> Vec<(FaultEpisode, usize)> {
+    /// As they are reported: one by one, or all as one where there are many.
+    pub(super) fn merged(&self) -> Vec<(FaultEpisode, usize)> {
         let (Some(first), true) = (self.list.first(), self.list.len() > LISTED) else {
             return self.list.iter().map(|episode| (*episode, 1)).collect();
         };
@@ -281,7 +284,7 @@ mod tests {
         episodes.add(1.0, 1.1, 2, 0.05);
         episodes.add(1.14, 1.2, 1, 0.05);
         episodes.add(2.0, 2.0, 1, 0.05);
-        let found = episodes.told();
+        let found = episodes.merged();
         assert_eq!(found.len(), 2);
         assert_eq!(
             (found[0].0.from, found[0].0.to, found[0].0.rows),
@@ -290,7 +293,7 @@ mod tests {
         for k in 0..20 {
             episodes.add(3.0 + f64::from(k), 3.5 + f64::from(k), 4, 0.0);
         }
-        let found = episodes.told();
+        let found = episodes.merged();
         assert_eq!((found.len(), found[0].1), (1, 22));
         assert_eq!(
             (found[0].0.from, found[0].0.to, found[0].0.rows),

@@ -7,6 +7,7 @@ use super::detectors::excitation::Excitation;
 use super::detectors::failed::FailedReads;
 use super::detectors::flat::Flat;
 use super::detectors::repeats::Repeats;
+use super::detectors::replays::Replays;
 use super::detectors::spike::Spikes;
 use super::detectors::step::{FreshRows, Freshness, Leaps};
 use super::detectors::turn::Turns;
@@ -206,6 +207,7 @@ pub struct LogJudge {
     pub(super) tracks: Vec<Track>,
     pub(super) failed: FailedReads,
     pub(super) repeats: Repeats,
+    pub(super) replays: Replays,
     pub(super) copies: Copies,
     /// Channels whose copies are looked for.
     pub(super) compared: Vec<usize>,
@@ -287,6 +289,7 @@ impl LogJudge {
             messages: false,
             failed: FailedReads::new(positions.len()),
             repeats: Repeats::new(positions.len(), others.len()),
+            replays: Replays::default(),
             copies: Copies::new(compared.len()),
             compared,
             row: [vec![0.0; positions.len()], vec![0.0; others.len()]],
@@ -409,6 +412,7 @@ impl LogJudge {
                 self.repeats.part();
             }
             self.repeats.take(t, positions, others);
+            self.replays.take(t, positions, others);
         }
     }
 

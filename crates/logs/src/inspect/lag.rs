@@ -13,9 +13,9 @@ const STRETCHES: usize = 8;
 /// A delay of fewer rows is none: the time of a torque is not known better than its row.
 const ROWS: f64 = 2.0;
 /// A shorter one is not reported without a model: what other joints do to a joint looks like one [s].
-const SHORTEST: f64 = 0.01;
+const MIN_DELAY_S: f64 = 0.01;
 /// Deviations from 0 at which a delay is believed.
-const SURE: f64 = 6.0;
+const MIN_DEVIATIONS: f64 = 6.0;
 
 /// What to do about a delay.
 pub(super) const REMEDY: &str = "take both from one message or one cycle of the controller; in recordings of two topics `torque_delay_s` in [log] of the robot file takes a delay off";
@@ -37,7 +37,11 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
     let Some(DelayEstimate { delay_s, std_s }) = delay(judge, &pairs) else {
         return;
     };
-    if delay_s.abs() < (ROWS * clock.dt).max(SURE * std_s).max(SHORTEST) {
+    if delay_s.abs()
+        < (ROWS * clock.dt)
+            .max(MIN_DEVIATIONS * std_s)
+            .max(MIN_DELAY_S)
+    {
         return;
     }
     let side = if delay_s > 0.0 { "behind" } else { "ahead of" };

@@ -2,7 +2,7 @@
 //!
 //! The torque that a model gives for the motion as logged is compared with the torque as logged, and
 //! again with each joint turned, and each two joints exchanged, in the positions, in the torques
-//! and in both. Where one such change explains what was not explained without it, it is told.
+//! and in both. Where one such change explains what was not explained without it, it is reported.
 
 use super::draft::seconds;
 use super::fault::{FaultKind, LogFault, Severity};
@@ -298,7 +298,7 @@ mod tests {
         comparison
     }
 
-    fn told(positions: OrderFault, torques: OrderFault) -> Option<String> {
+    fn in_words(positions: OrderFault, torques: OrderFault) -> Option<String> {
         let comparison = compared(positions, torques, 0.0);
         let names = ["a".to_owned(), "b".to_owned()];
         let fault = comparison.fault(&names, 5000, 50.0)?;
@@ -308,7 +308,7 @@ mod tests {
     #[test]
     fn each_single_change_is_told_apart_and_a_right_log_is_not_doubted() {
         use OrderFault::{Exchange, None, Turn};
-        assert_eq!(told(None, None), Option::None);
+        assert_eq!(in_words(None, None), Option::None);
         for (positions, torques, expected) in [
             (Turn(0), None, "positions of a have the other sign"),
             (None, Turn(1), "torques of b have the other sign"),
@@ -320,7 +320,7 @@ mod tests {
                 "positions and torques of a and b are exchanged",
             ),
         ] {
-            assert_eq!(told(positions, torques).as_deref(), Some(expected));
+            assert_eq!(in_words(positions, torques).as_deref(), Some(expected));
         }
     }
 

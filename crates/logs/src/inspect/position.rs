@@ -99,7 +99,14 @@ pub(super) fn leaps(
         )
         .replace("  ", " ")
     };
-    let remedy = "where its zero matters (gravity, other joints' inertias), use the part whose zero is right: LOG@0..12s or LOG@12..s";
+    let at = judge
+        .clock
+        .first
+        .map_or(found[0].at, |first| found[0].at - first);
+    let remedy = &format!(
+        "where its zero matters (gravity, other joints' inertias), use the part whose zero is right: LOG@0..{at:.3}s or LOG@{at:.3}..s",
+        at = at.max(0.0)
+    );
     let name = Some(track.channel.name.as_str());
     let before = draft.faults.len();
     draft.stretches(

@@ -19,7 +19,7 @@ const ABRUPT: f64 = 6.0;
 /// ... and so many times its smallest usual step.
 const GRAINS: f64 = 4.0;
 /// Smallest usual steps that a joint goes from row to row where it moves.
-const SLOW: f64 = 3.0;
+const MIN_STEPS_IN_MOTION: f64 = 3.0;
 /// Levels over its range from which a channel's grain is not worth a word.
 const FINE: f64 = 4096.0;
 /// Acceleration noise by the grain of a position, over the acceleration, that spoils a fit.
@@ -55,7 +55,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     flat.stuck.retain(|run| !stalled(run));
     flat.off(place, draft);
     flat.tell(track, draft);
-    // Where a channel leaps out of a flat stretch it is told already.
+    // Where a channel leaps out of a flat stretch it is reported already.
     let reach = 5.5 * clock.dt;
     let mut told: Vec<[f64; 2]> = (flat.tops.iter().chain(&flat.stuck))
         .map(|run| [run.from - reach, run.to + reach])
@@ -177,7 +177,7 @@ impl<'a> Flatness<'a> {
         Self {
             track,
             abrupt: (ABRUPT * bends).max(GRAINS * grain),
-            slow: SLOW * grain,
+            slow: MIN_STEPS_IN_MOTION * grain,
             leaps: match track.channel.role {
                 ChannelRole::Position => position::places(track, clock),
                 _ => Vec::new(),
@@ -247,7 +247,7 @@ impl<'a> Flatness<'a> {
     }
 
     /// Takes out the runs in which a torque is exactly 0: a motor that is switched off has none, and
-    /// its joint may swing on. A dead channel looks alike; what tells the two apart is the motion.
+    /// its joint may swing on. A dead channel looks alike; what distinguishes the two is the motion.
     fn off(&mut self, place: usize, draft: &mut FaultList) {
         if self.track.channel.role != ChannelRole::Torque {
             return;
@@ -359,7 +359,7 @@ fn spikes(
     draft: &mut FaultList,
 ) {
     let track = &judge.tracks[place];
-    // whose joint's motion is known, pulses of a command are no spikes; of other channels nothing tells them apart
+    // whose joint's motion is known, pulses of a command are no spikes; of other channels nothing distinguishes them
     let known = track.channel.role == ChannelRole::Position || track.position.is_some();
     let usual = match known {
         true => track.spikes.usual(track.deviation()),

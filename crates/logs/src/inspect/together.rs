@@ -25,6 +25,7 @@ const NOISELESS: f64 = 1e-8;
 /// The faults between channels.
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     copies(judge, draft);
+    repeated_parts(judge, draft);
     if judge.depth == Depth::Whole {
         // At the gate the reader has left them out already.
         repeated_rows(judge, clock, draft);
@@ -70,7 +71,7 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     if stale.moving == 0 {
         return;
     }
-    let episodes = stale.episodes.told();
+    let episodes = stale.episodes.merged();
     let (from, to) = match (episodes.first(), episodes.last()) {
         (Some((first, _)), Some((last, _))) => (first.from, last.to),
         _ => return,
@@ -118,6 +119,26 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             .cuts
             .extend(cuts.map(|span| (span, FaultKind::RepeatedRows)));
     }
+}
+
+/// Stretches that stand in the log before.
+fn repeated_parts(judge: &LogJudge, draft: &mut FaultList) {
+    let episodes = judge.replays.found();
+    let effect = |rows: u64, times: usize| {
+        format!(
+            "{} that stand in the log before, number for number: a file was appended to itself, or a buffer written twice. Counted twice, they make intervals too narrow",
+            rows_text(rows, times)
+        )
+    };
+    let remedy = "leave them out of a fit: `--leave-out FROM..TOs`; a simulation without noise repeats itself rightly";
+    draft.stretches(
+        FaultKind::RepeatedPart,
+        Warning,
+        None,
+        &episodes,
+        &effect,
+        remedy,
+    );
 }
 
 fn copies(judge: &LogJudge, draft: &mut FaultList) {

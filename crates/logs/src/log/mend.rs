@@ -22,7 +22,7 @@ impl Unwrap {
     }
 
     /// The next position with the turns that it went through. A step of more than half the range is
-    /// one through its end: nothing tells it from one that is as fast.
+    /// one through its end: nothing distinguishes it from one that is as fast.
     #[inline]
     pub fn take(&mut self, position: f64) -> f64 {
         if !position.is_finite() {

@@ -4,7 +4,7 @@
 //! channels; a [`Reader`] hands out [`Block`]s of at most [`Block::ROWS`] rows, so that memory does not
 //! grow with the log. What comes out is finite, in strictly increasing time, and in SI.
 //!
-//! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are told
+//! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are reported
 //! apart by their first bytes; logs in memory, as [`Arrays`], are read alike.
 
 mod arrays;

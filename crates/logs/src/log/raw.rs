@@ -98,7 +98,7 @@ pub struct RawReader {
 }
 
 impl RawReader {
-    /// Opens a log; `layout` tells the columns of a robot, where there is one.
+    /// Opens a log; `layout` gives the columns of a robot, where there is one.
     ///
     /// # Errors
     /// A file that cannot be read, or is no log; without a robot, a recording of several machines.

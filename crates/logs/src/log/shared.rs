@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::source::sha256_of;
 use super::{Layout, LogError, LogSpec, Provenance, RawBlock, RawReader, Span};
 
-/// Whether rows of one log are rows of the other, by the bytes of their files and by their spans; `layout` tells
+/// Whether rows of one log are rows of the other, by the bytes of their files and by their spans; `layout` says
 /// the time column where a robot is known. Files that cannot be read share nothing: their reader says why.
 pub fn shares_rows(a: &LogSpec, b: &LogSpec, layout: Option<&Layout>) -> bool {
     let same = |(a, b): (Vec<PathBuf>, Vec<PathBuf>)| same_bytes(&a, &b);

@@ -60,7 +60,7 @@ impl Span {
         }
     }
 
-    /// The span that a label tells; the whole log where it tells none.
+    /// The span that a label says; the whole log where it says none.
     pub(super) fn read(label: &str) -> Self {
         let span = label.split_once(WITHOUT).map_or(label, |(span, _)| span);
         Self::parse(span).unwrap_or_default()

@@ -73,7 +73,7 @@ impl Stale {
         held.then(|| rows.round() as usize)
     }
 
-    /// Takes the next row into account; `same` tells whether all but its positions repeats too. How
+    /// Takes the next row into account; `same` says whether all but its positions repeats too. How
     /// many rows before it turn out to be stale.
     #[inline]
     pub(super) fn judge(&mut self, t: f64, q: &[f64], same: impl FnOnce() -> bool) -> usize {

@@ -11,8 +11,8 @@ const USUAL_S: f64 = 2e-3;
 const SECONDS: f64 = 0.5;
 /// Seconds since 1970 of clocks that are set: 2001 to 2096.
 const EPOCH_S: [f64; 2] = [1e9, 4e9];
-/// Rows from which a unit is told.
-const LEAST: usize = 64;
+/// Rows from which a unit is reported.
+const MIN_ROWS: usize = 64;
 
 impl TimeUnit {
     /// The unit of these times, which may be in any order; seconds where nothing speaks for another.
@@ -25,7 +25,7 @@ impl TimeUnit {
             .map(|pair| (pair[1] - pair[0]).abs())
             .collect();
         steps.retain(|step| *step > 0.0 && step.is_finite());
-        if steps.len() < LEAST {
+        if steps.len() < MIN_ROWS {
             return Self::Second;
         }
         steps.sort_by(f64::total_cmp);

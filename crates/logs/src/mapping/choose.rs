@@ -192,7 +192,7 @@ impl Mapping {
         out
     }
 
-    /// The family of measured columns of a role, else that of commanded ones, which is told.
+    /// The family of measured columns of a role, else that of commanded ones, which is reported.
     fn measured<'a>(
         &mut self,
         columns: &'a [LogColumn],
@@ -310,7 +310,7 @@ impl Mapping {
         }
     }
 
-    /// Says that nothing in a log tells where torques were measured, or that efforts are none.
+    /// Says that nothing in a log says where torques were measured, or that efforts are none.
     fn check_torque(&mut self, seen: &SeenColumns) {
         let contract = |joint: &JointColumns| {
             let name = joint.torque.as_deref();

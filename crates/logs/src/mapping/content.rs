@@ -4,12 +4,12 @@ use crate::inspect::ChannelRole;
 
 /// A clock is known from more rows than this, and too coarse where it moves by more than this share of a step at once;
 /// its longer and its shorter steps have at least this share each.
-const FEW: usize = 100;
+const MIN_CLOCK_ROWS: usize = 100;
 const COARSE: f64 = 0.1;
 /// Likeness of a column to the differences of another that makes it its velocity.
-const LIKE: f64 = 0.9;
+const VELOCITY_CORRELATION: f64 = 0.9;
 /// Part of the joints that must show such a velocity.
-const MOST: f64 = 0.6;
+const MIN_SHARE_OF_JOINTS: f64 = 0.6;
 
 /// Whether numbers run as those of a clock do: upward, by steps of one size. A counter of rows is none.
 pub(super) fn is_clock(numbers: &[f64]) -> bool {
@@ -39,7 +39,7 @@ pub(super) fn rounded_step(times: &[f64]) -> Option<f64> {
     // seldom a longer step is a lost row, seldom a shorter one a row too many
     let longer = (step - least) / rounding;
     let longer = longer <= 1.0 - COARSE && (longer >= COARSE || least == 0.0);
-    let coarse = times.len() > FEW && least >= 0.0 && rounding > COARSE * step;
+    let coarse = times.len() > MIN_CLOCK_ROWS && least >= 0.0 && rounding > COARSE * step;
     let coarse = coarse && whole && longer;
     (coarse && times.iter().enumerate().all(even)).then_some(step)
 }
@@ -101,9 +101,11 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
         // the rate of the velocities is no torque
         let rises = |j: &usize| {
             let last = place(*j, 3);
-            last < m && likeness(columns[place(*j, 1)], columns[place(*j, 2)]) > LIKE
+            last < m
+                && likeness(columns[place(*j, 1)], columns[place(*j, 2)]) > VELOCITY_CORRELATION
         };
-        let accelerations = stride == 1 && (0..n).filter(rises).count() as f64 >= MOST * n as f64;
+        let accelerations =
+            stride == 1 && (0..n).filter(rises).count() as f64 >= MIN_SHARE_OF_JOINTS * n as f64;
         for joint in 0..n {
             set(place(joint, 0), p, joint);
             set(place(joint, 1), v, joint);
@@ -132,7 +134,7 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
 /// them.
 fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, usize, usize)> {
     let m = columns.len();
-    let is_rate = |q: usize, dq: usize| likeness(columns[q], columns[dq]) > LIKE;
+    let is_rate = |q: usize, dq: usize| likeness(columns[q], columns[dq]) > VELOCITY_CORRELATION;
     let share = |pairs: &[(usize, usize)]| {
         let like = pairs.iter().filter(|(q, dq)| is_rate(*q, *dq)).count();
         like as f64 / pairs.len() as f64
@@ -150,7 +152,7 @@ fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, 
         let like = share(&pairs);
         // of equal ones the one with more joints
         let score = like + 1e-3 * n as f64;
-        if like >= MOST && best.is_none_or(|(found, _)| score > found) {
+        if like >= MIN_SHARE_OF_JOINTS && best.is_none_or(|(found, _)| score > found) {
             best = Some((score, (first, n, stride)));
         }
     };

@@ -7,7 +7,7 @@ use crate::inspect::ChannelRole;
 use crate::inspect::words::{Word, without_units, words};
 use crate::log::nearest;
 
-/// What tells a member of a family from the others.
+/// What distinguishes a member of a family from the others.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Key {
     Number(u32),

@@ -11,7 +11,7 @@
 //! | `choose` | one family each for positions, velocities and torques |
 //! | `units` | units that names state, or that numbers suggest |
 //!
-//! A guess is a guess: each is told in words, and what is not certain says `CHECK IT`.
+//! A guess is a guess: each is reported in words, and what is not certain says `CHECK IT`.
 
 mod choose;
 mod column;

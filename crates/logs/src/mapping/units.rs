@@ -63,7 +63,8 @@ const TORQUES: [(&str, &[&str]); 10] = [
 ];
 /// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of
 /// axes.
-const SHORT: [(&str, &str); 5] = [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
+const SHORT_UNITS: [(&str, &str); 5] =
+    [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
 
 /// Words that name parts of robots too: units in brackets alone.
 const AMBIGUOUS: [&str; 5] = ["turn", "load", "count", "inc", "tick"];
@@ -96,7 +97,7 @@ fn stated(column: &LogColumn, known: &[(&'static str, &[&str])]) -> Option<&'sta
         Some(all.find(|(_, words)| words.contains(&word))?.0)
     };
     let bracket = column.unit.as_deref().unwrap_or_default().to_lowercase();
-    let short = SHORT.iter().find(|(short, _)| *short == bracket);
+    let short = SHORT_UNITS.iter().find(|(short, _)| *short == bracket);
     let short = short.filter(|(_, unit)| known.iter().any(|(own, _)| own == unit));
     let spoken = words(&column.name);
     // `current_mA` ends with it; in `MACur` it is the motor's actual one

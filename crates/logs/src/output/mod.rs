@@ -131,7 +131,7 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Begins a file. An unwritable place is told here, before the work.
+    /// Begins a file. An unwritable place is reported here, before the work.
     ///
     /// # Errors
     /// A folder that is not there or may not be written to; a name that is a folder's.

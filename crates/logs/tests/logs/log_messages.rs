@@ -132,7 +132,7 @@ fn two_clocks(folder: &TempDir, delay: f64) -> PathBuf {
     path
 }
 
-/// The delay [ms] that a reader tells.
+/// The delay [ms] that a reader says.
 #[track_caller]
 fn told_delay(reader: &Reader) -> f64 {
     let warnings = reader.warnings();
@@ -443,7 +443,7 @@ proptest! {
         let layout = Layout::joint_columns(&names[..3]);
         let (block, reader) = read(&shown(&path), &layout);
         prop_assert_eq!(reader.has_velocities(), velocities);
-        // Rows that stand still in a motion are told and left out; none of these does.
+        // Rows that stand still in a motion are reported and left out; none of these does.
         prop_assert_eq!(block.len(), rows.len());
         prop_assert_eq!(&block.t, &t);
         for (index, (_, q, tau, dq, _, _)) in rows.iter().enumerate() {

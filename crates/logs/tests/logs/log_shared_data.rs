@@ -60,7 +60,7 @@ fn the_bldc_log_is_read_in_spans_that_share_no_row_and_leave_none_out() {
                 .iter()
                 .all(|t| joined.binary_search_by(|x| x.total_cmp(t)).is_ok())
         );
-        // A span that begins inside a motion has less to tell stale rows by.
+        // A span that begins inside a motion has less by which to recognise stale rows.
         assert!(joined.len() - whole.len() < 10, "{}", joined.len());
     }
     let (part, reader) = read(&format!("{path}@15.2..23s"), &layout);

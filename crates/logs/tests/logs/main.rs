@@ -1,6 +1,8 @@
 //! Tests of logs as they are read.
 
 mod log_bad_input;
+#[cfg(feature = "parquet")]
+mod log_datasets;
 mod log_drawn;
 mod log_fixtures;
 mod log_formats;

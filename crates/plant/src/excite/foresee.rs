@@ -71,7 +71,7 @@ pub struct Pair {
     pub correlation: f64,
 }
 
-/// What a motion tells.
+/// What a motion says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Foresight {
     pub condition: Condition,

@@ -10,7 +10,7 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::escape;
 
 use super::ExciteError;
-use super::series::MOST;
+use super::series::MAX_COORDINATES;
 
 /// Where torques come from before the robot moves.
 #[derive(Debug, Clone)]
@@ -86,7 +86,7 @@ impl TorqueSource {
     }
 
     /// How far torques may be off at a motion, 95 % of the time \[N or N m\].
-    pub(super) fn half_widths(&self, motion: [&[f64]; 3], out: &mut [f64; MOST]) {
+    pub(super) fn half_widths(&self, motion: [&[f64]; 3], out: &mut [f64; MAX_COORDINATES]) {
         out.fill(0.0);
         let Self::Model {
             deviation: Some(deviation),

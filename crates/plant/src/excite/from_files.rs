@@ -13,7 +13,7 @@ use super::ExciteError;
 use super::foreseen::TorqueSource;
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
-use super::series::{MOST, Series};
+use super::series::{MAX_COORDINATES, Series};
 use super::space::DesignSpace;
 
 /// Share of the speed limit within which the sign of a Coulomb column is smoothed in a search.
@@ -83,7 +83,7 @@ pub fn machine(
 /// motors could lose hold of a joint.
 fn channels(
     file: &RobotFile,
-    mechanism: &Mechanism<MOST>,
+    mechanism: &Mechanism<MAX_COORDINATES>,
 ) -> Result<Vec<BoundedQuantity>, ExciteError> {
     let robot = &mechanism.robot;
     let mut channels = Vec::new();
@@ -129,7 +129,7 @@ fn channels(
 /// Limits of the coordinate of motor i.
 fn of_coordinate(
     file: &RobotFile,
-    mechanism: &Mechanism<MOST>,
+    mechanism: &Mechanism<MAX_COORDINATES>,
     i: usize,
     channels: &mut Vec<BoundedQuantity>,
 ) {

@@ -1,4 +1,4 @@
-//! What a motion tells about the parameters: the stacked regressor (42), reduced.
+//! What a motion says about the parameters: the stacked regressor (42), reduced.
 
 use nalgebra::DMatrix;
 

@@ -51,7 +51,7 @@ pub struct Judgement {
     pub confounded: Option<Pair>,
     /// The same with what is given besides.
     pub together: Option<GivenTogether>,
-    /// Of a one-joint move: what it tells about the joint's friction.
+    /// Of a one-joint move: what it says about the joint's friction.
     pub friction: Option<LawForeseen>,
     /// The noise that deviations are expected from.
     pub noise: Vec<TorqueNoise>,
@@ -249,7 +249,7 @@ pub fn judge(
         }
         Motion::Path { .. } => (None, None, None),
     };
-    // a one-joint move is not meant to tell the inertias apart
+    // a one-joint move is not meant to separate the inertias
     let warnings = match terms.friction {
         None => cautions(&foresight, machine.unknowns()),
         Some(_) => Vec::new(),
@@ -291,7 +291,7 @@ pub fn judge(
     })
 }
 
-/// What the motion does not tell apart.
+/// What the motion does not distinguish.
 fn cautions(foresight: &Foresight, unknowns: usize) -> Vec<String> {
     let mut warnings = Vec::new();
     if let Some(pair) = &foresight.confounded

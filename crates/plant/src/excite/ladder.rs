@@ -22,7 +22,7 @@ use super::foresee::Expected;
 use super::limits::Quantity;
 use super::machine::ForeseenRobot;
 use super::motion::differentiated;
-use super::series::MOST;
+use super::series::MAX_COORDINATES;
 
 /// Samples per second at which information is gathered: a bend is passed in tens of milliseconds.
 const RATE: f64 = 250.0;
@@ -62,7 +62,7 @@ pub struct LadderTask {
     pub part: f64,
 }
 
-/// A ladder, and what it is expected to tell.
+/// A ladder, and what it is expected to teach.
 #[derive(Debug, Clone)]
 pub struct DesignedLadder {
     pub file: SingleJointMove,
@@ -76,7 +76,7 @@ pub struct DesignedLadder {
 /// Designs the ladder of one joint.
 ///
 /// # Errors
-/// [`ExciteError::NoLaw`] where the joint has no friction to tell, others where the machine has no such
+/// [`ExciteError::NoLaw`] where the joint has no friction to identify, others where the machine has no such
 /// joint or its travel is not known.
 pub fn design_ladder(
     machine: &ForeseenRobot,
@@ -148,7 +148,7 @@ pub fn design_ladder(
     })
 }
 
-/// What a log of a one-joint move tells about the joint's friction law.
+/// What a log of a one-joint move says about the joint's friction law.
 ///
 /// # Errors
 /// As [`design_ladder`].
@@ -173,7 +173,7 @@ fn joint_of(machine: &ForeseenRobot, name: &str) -> Result<usize, ExciteError> {
         })
 }
 
-/// The usual ladder over the widest part of the travel at which the drives keep their limits, and what it tells.
+/// The usual ladder over the widest part of the travel at which the drives keep their limits, and what it says.
 fn widest(
     machine: &ForeseenRobot,
     task: &LadderTask,
@@ -308,7 +308,7 @@ fn reference(
     machine: &ForeseenRobot,
     task: &LadderTask,
     file: &SingleJointMove,
-) -> Result<Reference<MOST>, ExciteError> {
+) -> Result<Reference<MAX_COORDINATES>, ExciteError> {
     let mechanism = &machine.mechanism;
     let ladder = OneJointMove::of(file, &mechanism.robot, task.seconds, task.seed)?;
     Ok(ladder.reference(mechanism)?)
@@ -356,7 +356,7 @@ fn expected(
     machine: &ForeseenRobot,
     task: &LadderTask,
     joint: usize,
-    along: &Reference<MOST>,
+    along: &Reference<MAX_COORDINATES>,
 ) -> Result<(Vec<Expected>, (f64, usize)), ExciteError> {
     let model = &machine.model;
     let law = &model.friction[joint];
@@ -385,7 +385,7 @@ fn information(
     machine: &ForeseenRobot,
     seconds: f64,
     joint: usize,
-    along: &Reference<MOST>,
+    along: &Reference<MAX_COORDINATES>,
 ) -> Result<(DMatrix<f64>, (f64, usize)), ExciteError> {
     let model = &machine.model;
     let (n, p) = (machine.coordinates(), model.theta.len());
@@ -430,7 +430,7 @@ fn information(
 }
 
 /// Variances of the unknowns behind the first `nuisance`, whose values are unknown too; `None` where
-/// nothing tells one from them.
+/// nothing distinguishes one from them.
 fn variances(g: &DMatrix<f64>, nuisance: usize) -> Result<Vec<Option<f64>>, ExciteError> {
     let width = g.nrows();
     let scale: Vec<f64> = (0..width)

@@ -44,7 +44,7 @@ impl Quantity {
         matches!(self, Self::Drive | Self::Torque)
     }
 
-    /// Whether it tells where links are, and so bounds no coordinate alone.
+    /// Whether it says where links are, and so bounds no coordinate alone.
     pub(super) fn is_of_places(self) -> bool {
         matches!(
             self,

@@ -12,7 +12,7 @@ use cft_ident_files::config::trajectory::Coordinates;
 
 use super::foreseen::TorqueSource;
 use super::limits::{BoundedQuantity, Quantity};
-use super::series::{Kinematics, MOST};
+use super::series::{Kinematics, MAX_COORDINATES};
 use super::space::DesignSpace;
 
 /// A robot with the numbers that its torques are foreseen with, and its limits.
@@ -24,7 +24,7 @@ pub struct ForeseenRobot {
     /// What a fit would estimate: inertial parameters, and linear friction where it is fitted too.
     pub columns: RegressorColumns,
     /// Motors and limits, as the simulator knows them.
-    pub mechanism: Mechanism<MOST>,
+    pub mechanism: Mechanism<MAX_COORDINATES>,
     /// Points and links that some of the limits speak of.
     pub space: DesignSpace,
     /// Limits that a motion must keep.
@@ -41,23 +41,23 @@ pub struct State {
     /// Designed coordinates.
     pub k: Kinematics,
     /// Joint positions, velocities, accelerations.
-    pub q: [f64; MOST],
-    pub v: [f64; MOST],
-    pub a: [f64; MOST],
+    pub q: [f64; MAX_COORDINATES],
+    pub v: [f64; MAX_COORDINATES],
+    pub a: [f64; MAX_COORDINATES],
     /// Joint torques \[N or N m\].
-    pub tau: [f64; MOST],
+    pub tau: [f64; MAX_COORDINATES],
     /// Volts (or torques where the motors are at the joints) in the order of the coordinates.
-    pub drive: [f64; MOST],
+    pub drive: [f64; MAX_COORDINATES],
 }
 
 impl State {
     pub(super) const EMPTY: Self = Self {
         k: Kinematics::REST,
-        q: [0.0; MOST],
-        v: [0.0; MOST],
-        a: [0.0; MOST],
-        tau: [0.0; MOST],
-        drive: [0.0; MOST],
+        q: [0.0; MAX_COORDINATES],
+        v: [0.0; MAX_COORDINATES],
+        a: [0.0; MAX_COORDINATES],
+        tau: [0.0; MAX_COORDINATES],
+        drive: [0.0; MAX_COORDINATES],
     };
 }
 
@@ -65,9 +65,9 @@ impl State {
 /// steps wider than their bends may be taken of.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Linearised {
-    friction: [(f64, f64); MOST],
-    sign: [(f64, f64); MOST],
-    v: [f64; MOST],
+    friction: [(f64, f64); MAX_COORDINATES],
+    sign: [(f64, f64); MAX_COORDINATES],
+    v: [f64; MAX_COORDINATES],
 }
 
 impl ForeseenRobot {
@@ -193,7 +193,7 @@ impl ForeseenRobot {
     ///
     /// # Errors
     /// As [`Self::joints`].
-    pub fn drives(&self, q: &[f64], tau: &[f64]) -> Result<[f64; MOST], RobotError> {
+    pub fn drives(&self, q: &[f64], tau: &[f64]) -> Result<[f64; MAX_COORDINATES], RobotError> {
         let mut state = State::EMPTY;
         state.q[..q.len()].copy_from_slice(q);
         state.tau[..tau.len()].copy_from_slice(tau);
@@ -212,8 +212,8 @@ impl ForeseenRobot {
     /// Friction and signs at the velocities of a state.
     pub(super) fn linearised(&self, state: &State) -> Linearised {
         let mut out = Linearised {
-            friction: [(0.0, 0.0); MOST],
-            sign: [(0.0, 0.0); MOST],
+            friction: [(0.0, 0.0); MAX_COORDINATES],
+            sign: [(0.0, 0.0); MAX_COORDINATES],
             v: state.v,
         };
         for (j, law) in self.model.friction.iter().enumerate() {
@@ -312,7 +312,7 @@ pub struct Quantities<'a> {
     /// Of the links, for the first channel that asks where they are and all after it.
     frames: OnceCell<Vec<Frame>>,
     /// How far the torques may be off, and the drives.
-    half_widths: OnceCell<[[f64; MOST]; 2]>,
+    half_widths: OnceCell<[[f64; MAX_COORDINATES]; 2]>,
 }
 
 impl Quantities<'_> {
@@ -329,14 +329,14 @@ impl Quantities<'_> {
         }
     }
 
-    fn widths(&self) -> [[f64; MOST]; 2] {
+    fn widths(&self) -> [[f64; MAX_COORDINATES]; 2] {
         let (machine, n) = (self.machine, self.machine.coordinates());
         let [q, v, a] = [&self.state.q, &self.state.v, &self.state.a].map(|x| &x[..n]);
-        let (mut torques, mut drives) = ([0.0; MOST], [0.0; MOST]);
+        let (mut torques, mut drives) = ([0.0; MAX_COORDINATES], [0.0; MAX_COORDINATES]);
         machine.source.half_widths([q, v, a], &mut torques);
         // a drive carries a share of each torque; as if all were off at once
         for j in (0..n).filter(|j| torques[*j] > 0.0) {
-            let mut one = [0.0; MOST];
+            let mut one = [0.0; MAX_COORDINATES];
             one[j] = torques[j];
             if let Ok(of_one) = machine.drives(q, &one[..n]) {
                 for (sum, x) in drives.iter_mut().zip(of_one) {

@@ -12,7 +12,7 @@ use super::blend::Blend;
 use super::from_files::series_of;
 use super::limits::BoundedQuantity;
 use super::machine::ForeseenRobot;
-use super::series::{Kinematics, MOST, Series};
+use super::series::{Kinematics, MAX_COORDINATES, Series};
 use super::usage::{Interval, Use, along, along_blend, along_period};
 
 /// Step of the differences that give the acceleration of a reference \[s\].
@@ -140,7 +140,7 @@ fn blend_of(file: &FourierSection) -> Blend {
 }
 
 /// Positions, velocities and accelerations of a reference in its own coordinates.
-pub(super) fn differentiated(reference: &Reference<MOST>, t: f64) -> Kinematics {
+pub(super) fn differentiated(reference: &Reference<MAX_COORDINATES>, t: f64) -> Kinematics {
     let here = reference.path.at(t);
     let (before, after) = (
         reference.path.at(t - STEP).velocity,
@@ -154,7 +154,7 @@ pub(super) fn differentiated(reference: &Reference<MOST>, t: f64) -> Kinematics 
 }
 
 /// A reference in the motors' coordinates.
-fn kinematics(reference: &Reference<MOST>, robot: &Robot, t: f64) -> Kinematics {
+fn kinematics(reference: &Reference<MAX_COORDINATES>, robot: &Robot, t: f64) -> Kinematics {
     let own = differentiated(reference, t);
     if reference.frame == ReferenceFrame::Motors {
         return own;

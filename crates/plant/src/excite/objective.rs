@@ -15,7 +15,7 @@ use cft_ident_core::robot::RobotError;
 use super::criterion::{Criterion, Slope};
 use super::limits::BoundedQuantity;
 use super::machine::{ForeseenRobot, Linearised, State};
-use super::series::{Basis, Kinematics, MOST, Series};
+use super::series::{Basis, Kinematics, MAX_COORDINATES, Series};
 use super::usage::along_period;
 use super::variables::Variables;
 
@@ -436,11 +436,11 @@ impl Local<'_> {
     }
 
     /// Derivatives by position, speed and acceleration of every coordinate.
-    fn derivatives(&mut self, state: &State) -> Result<[[f64; 3]; MOST], RobotError> {
+    fn derivatives(&mut self, state: &State) -> Result<[[f64; 3]; MAX_COORDINATES], RobotError> {
         let variables = &self.objective.variables;
         let n = self.objective.machine.coordinates();
         let here = self.value(&state.k)?;
-        let mut by = [[0.0; 3]; MOST];
+        let mut by = [[0.0; 3]; MAX_COORDINATES];
         for (i, by) in by.iter_mut().enumerate().take(n) {
             let mut k = state.k;
             if !self.objective.machine.is_uniform(i) {

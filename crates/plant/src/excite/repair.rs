@@ -7,7 +7,7 @@ use super::usage::{along_period, closely_along_period, roughly_along_period, wor
 
 /// Steps towards the common factor, and how near to it they end.
 const STEPS: usize = 40;
-const NEAR: f64 = 2e-5;
+const FACTOR_TOLERANCE: f64 = 2e-5;
 /// How near a rough look brings a thorough one to it.
 const BAND: f64 = 2e-3;
 /// What is left to rounding.
@@ -93,7 +93,12 @@ fn fitted(
             }
         }
     }
-    let kept = narrowed(&|factor| share(care, factor), kept, broken, NEAR);
+    let kept = narrowed(
+        &|factor| share(care, factor),
+        kept,
+        broken,
+        FACTOR_TOLERANCE,
+    );
     Some(series.scaled(kept.0))
 }
 

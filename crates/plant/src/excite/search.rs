@@ -102,7 +102,7 @@ impl Task {
 
 /// Designs one motion of the machine.
 ///
-/// `progress` is told the evaluations of each step; when `stop` becomes true the search ends with
+/// `progress` receives the evaluations of each step; when `stop` becomes true the search ends with
 /// the best motion that it has. The result does not depend on the number of threads.
 ///
 /// # Errors

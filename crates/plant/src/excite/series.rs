@@ -19,22 +19,22 @@ pub struct Series {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kinematics {
     /// \[m or rad\]
-    pub x: [f64; MOST],
+    pub x: [f64; MAX_COORDINATES],
     /// \[m/s or rad/s\]
-    pub xd: [f64; MOST],
+    pub xd: [f64; MAX_COORDINATES],
     /// \[m/s^2 or rad/s^2\]
-    pub xdd: [f64; MOST],
+    pub xdd: [f64; MAX_COORDINATES],
 }
 
 /// Most coordinates of a robot.
-pub const MOST: usize = cft_ident_core::robot::tree::MOST_JOINTS;
+pub const MAX_COORDINATES: usize = cft_ident_core::robot::tree::MOST_JOINTS;
 
 impl Kinematics {
     /// At rest in the origin.
     pub const REST: Self = Self {
-        x: [0.0; MOST],
-        xd: [0.0; MOST],
-        xdd: [0.0; MOST],
+        x: [0.0; MAX_COORDINATES],
+        xd: [0.0; MAX_COORDINATES],
+        xdd: [0.0; MAX_COORDINATES],
     };
 }
 
@@ -160,7 +160,7 @@ impl Basis {
         &self,
         fundamental: f64,
         m: usize,
-        by: &[[f64; 3]; MOST],
+        by: &[[f64; 3]; MAX_COORDINATES],
         out: &mut [f64],
     ) {
         let width = 1 + 2 * self.harmonics;

@@ -17,7 +17,7 @@ const PARTS: usize = 1024;
 /// The same where a motion is only prepared.
 const ROUGH_PARTS: usize = 96;
 /// The same as [`TOLERANCE`] in a search.
-const CLOSE: f64 = 1e-5;
+const SEARCH_TOLERANCE: f64 = 1e-5;
 const ROUGH: f64 = 1e-3;
 
 /// A channel along a motion.
@@ -57,7 +57,7 @@ pub(super) fn closely_along_period(
     channels: &[BoundedQuantity],
     series: &Series,
 ) -> Vec<Use> {
-    period(machine, channels, series, PARTS, CLOSE)
+    period(machine, channels, series, PARTS, SEARCH_TOLERANCE)
 }
 
 /// [`along_period`], to a thousandth.

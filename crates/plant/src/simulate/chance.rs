@@ -26,7 +26,7 @@ pub enum Purpose {
 }
 
 /// Purposes leave this many streams to the things of one kind that each have their own.
-const APART: u64 = 1 << 32;
+const STREAMS_PER_PURPOSE: u64 = 1 << 32;
 
 /// Generator of the given purpose.
 pub fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
@@ -38,6 +38,6 @@ pub fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
 /// Generator of the given purpose for one of several things, such as joints.
 pub(crate) fn stream_of(seed: u64, purpose: Purpose, number: usize) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
-    generator.set_stream(purpose as u64 + APART * (number as u64 + 1));
+    generator.set_stream(purpose as u64 + STREAMS_PER_PURPOSE * (number as u64 + 1));
     generator
 }

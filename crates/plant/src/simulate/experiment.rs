@@ -206,7 +206,7 @@ fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
 
 /// Own frequency \[rad/s\], damping, and corner frequency \[Hz\] of each joint under the usual gains: of one
 /// joint alone, and of several that push each other.
-const ALONE: [f64; 3] = [45.0, 0.6, 50.0];
+const USUAL_GAINS_ALONE: [f64; 3] = [45.0, 0.6, 50.0];
 const SEVERAL: [f64; 3] = [30.0, 0.8, 100.0];
 /// Corner frequency \[Hz\] with gains that are known.
 const CORNER: f64 = 50.0;
@@ -225,7 +225,7 @@ impl<const J: usize> Plant<J> {
             };
         }
         let [frequency, damping, filter_hz] = match m.joints() {
-            1 => ALONE,
+            1 => USUAL_GAINS_ALONE,
             _ => SEVERAL,
         };
         let stiffness = |j: usize| self.inertia[j] * frequency * frequency / m.gain[j];

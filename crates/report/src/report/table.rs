@@ -46,7 +46,7 @@ impl Table {
         }
     }
 
-    /// A table for a page, which tells numbers from words by itself.
+    /// A table for a page, which distinguishes numbers from words by itself.
     pub(crate) fn of_words(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
         let columns: Vec<(&str, Align)> = head.iter().map(|name| (*name, Align::Left)).collect();
         let mut table = Table::new(&columns).caption(caption);

@@ -1,7 +1,7 @@
 //! The deviation of a model's torque by few directions of its parameters, at the cost of as many torques.
 //!
 //! What an observer calls a deviation is learnt along motions that the parameters were fitted to. On another motion a
-//! combination of parameters may count that those logs hardly told: the few that move the torque most within the
+//! combination of parameters may count that those logs hardly determined: the few that move the torque most within the
 //! robot's reach are kept, each as parameters whose torque is one deviation.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -12,9 +12,9 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::held_out::HeldOut;
 
 /// Directions that are kept at most ..
-const MOST: usize = 8;
+const MAX_DIRECTIONS: usize = 8;
 /// .. and the share of the variance within reach from which on no more are taken.
-const ENOUGH: f64 = 0.98;
+const VARIANCE_SHARE: f64 = 0.98;
 /// States within reach.
 const STATES: usize = 256;
 
@@ -43,7 +43,7 @@ impl Direction {
     }
 }
 
-/// The directions of a model's parameters that its logs tell least of.
+/// The directions of a model's parameters that its logs determine least.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Directions {
     robot: Robot,
@@ -164,8 +164,8 @@ fn least_told(model: &Model, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec
     let whole: f64 = shares.eigenvalues.iter().sum();
     let mut held = 0.0;
     let mut out = Vec::new();
-    for k in order.into_iter().take(MOST) {
-        if held >= ENOUGH * whole {
+    for k in order.into_iter().take(MAX_DIRECTIONS) {
+        if held >= VARIANCE_SHARE * whole {
             break;
         }
         held += shares.eigenvalues[k];
@@ -219,7 +219,7 @@ mod tests {
             + vector(2) * vector(2).transpose() * 9.0
             + DMatrix::identity(u, u) * 1e-4;
         let each = least_told(&model, &covariance, &seen());
-        assert!((2..=MOST).contains(&each.len()), "{}", each.len());
+        assert!((2..=MAX_DIRECTIONS).contains(&each.len()), "{}", each.len());
         let mut few = Directions {
             robot: model.robot,
             friction: model.friction,

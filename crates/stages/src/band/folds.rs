@@ -198,8 +198,9 @@ impl Sums {
         self.rows += 1.0;
         for (i, x) in places.iter().zip(columns) {
             self.gradient[*i] += x * error;
+            let mut normal = self.normal.column_mut(*i);
             for (k, y) in places.iter().zip(columns) {
-                self.normal[(*k, *i)] += x * y;
+                normal[*k] += x * y;
             }
         }
     }

@@ -7,12 +7,12 @@
 //! neighbouring samples are alike: Chernozhukov, Wuthrich and Zhu 2018). They are kept by ranges of speed and
 //! of the model's torque. Half the width at a sample is sqrt(h^2 + 1.96^2 g'Cg), g the torque's gradient by the
 //! parameters, C their covariance: h is the quantile of sqrt(e^2 - 1.96^2 g'Cg), so that the band holds what
-//! it is asked to where data were and widens where parameters are used that the data hardly tell.
+//! it is asked to where data were and widens where parameters are used that the data hardly determine.
 //!
 //! | file | what |
 //! |---|---|
 //! | `folds` | blocks, and models without each |
-//! | `directions` | the deviation by the parameters that logs tell least of, for observers |
+//! | `directions` | the deviation by the parameters that logs determine least, for observers |
 //! | `quantiles` | from errors to [`HeldOut`] |
 //! | this one | the band at a sample; motions that leave what was seen |
 
@@ -73,7 +73,7 @@ pub struct Reach<'a> {
     beyond: Vec<u64>,
 }
 
-/// Share by which a motion may go beyond what was seen before it is told.
+/// Share by which a motion may go beyond what was seen before it is reported.
 const SLACK: f64 = 0.05;
 
 impl<'a> Reach<'a> {
@@ -106,7 +106,7 @@ impl<'a> Reach<'a> {
     }
 
     /// What was left, joint by joint, in sentences.
-    pub fn told(&self) -> Vec<String> {
+    pub fn in_words(&self) -> Vec<String> {
         let mut out = Vec::new();
         for (j, held) in self.held.iter().enumerate() {
             if self.beyond[j] == 0 {

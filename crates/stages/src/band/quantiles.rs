@@ -7,7 +7,7 @@ use cft_ident_files::config::held_out::HeldOut;
 const SPEEDS: [f64; 4] = [0.1, 0.3, 0.55, 0.8];
 const TORQUES: [f64; 2] = [0.5, 0.85];
 /// Independent samples that a width of its own takes.
-const LEAST: f64 = 20.0;
+const MIN_SAMPLES: f64 = 20.0;
 
 /// A sample that a model did not see.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,12 +68,16 @@ pub fn held_out(joint: &str, errors: &[Error], samples: u64, independent: f64) -
     for i in 0..=speed_edges.len() {
         let here = |e: &Error| range(&speed_edges, e.speed) == i;
         let (mut of_speed, effective) = width(&here);
-        if effective < LEAST {
+        if effective < MIN_SAMPLES {
             of_speed = all;
         }
         let of_torque = (0..=torque_edges.len()).map(|k| {
             let (own, effective) = width(&|e| here(e) && range(&torque_edges, e.torque) == k);
-            if effective < LEAST { of_speed } else { own }
+            if effective < MIN_SAMPLES {
+                of_speed
+            } else {
+                own
+            }
         });
         half_width_95.push(of_torque.collect());
     }

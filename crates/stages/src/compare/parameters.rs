@@ -1,6 +1,6 @@
 //! Parameters of two models side by side.
 //!
-//! A difference d = b - a of two independent estimates has the variance s_a^2 + s_b^2; what is told
+//! A difference d = b - a of two independent estimates has the variance s_a^2 + s_b^2; what is reported
 //! is d over the root of it. Estimates from the same logs are not independent: the caller says so.
 
 use schemars::JsonSchema;

@@ -177,7 +177,7 @@ impl Said {
 
     fn least_squares(&mut self, document: &Value) {
         for found in list(&document["parameters"]) {
-            // the name of a base parameter tells its meaning, its key is short
+            // the name of a base parameter says its meaning, its key is short
             let name = text(&found["name"]).unwrap_or_default();
             let key = text(&found["key"]).unwrap_or_else(|| name.clone());
             self.parameter(&key, text(&found["joint"]), &name, found);

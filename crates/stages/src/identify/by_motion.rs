@@ -25,7 +25,7 @@ use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::model_file::EffectSection;
 
 /// Windows for each number below which deviations are not trusted.
-const FEW: f64 = 4.0;
+const MIN_WINDOWS_PER_NUMBER: f64 = 4.0;
 
 /// Refines what `lsq` found on these logs by the motion that the torques make, in windows of so many seconds; without a
 /// length, blocks of the logs that are set aside choose it.
@@ -130,7 +130,7 @@ fn take(found: &mut IdentifiedDynamics, fit: &AxisFit) {
     }
     let u = found.unknowns.len();
     found.covariance = fit.covariance.view((0, 0), (u, u)).into_owned();
-    if fit.apart < FEW * fit.free.len() as f64 {
+    if fit.apart < MIN_WINDOWS_PER_NUMBER * fit.free.len() as f64 {
         found.warnings.push(format!(
             "fit to the motion: the logs hold {:.0} windows of {} s behind one another for {} numbers; their standard deviations are rough; give longer logs",
             fit.apart,

@@ -69,7 +69,7 @@ pub struct Campaigned {
 }
 
 /// Runs a campaign. Friction is fitted again beside an effect, so the diagnosis has the one-joint logs
-/// too; the validation logs are held out of it. `ended` is told each stage's result as it is there,
+/// too; the validation logs are held out of it. `ended` receives each stage's result as it is there,
 /// so that what was finished can be kept whatever follows.
 ///
 /// # Errors

@@ -60,7 +60,7 @@ pub struct ConsistentLink {
     pub prior: LinkPrior,
 }
 
-/// What fills in where torques tell nothing of a link.
+/// What fills in where torques say nothing of a link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinkPrior {
@@ -91,8 +91,8 @@ fn impossible(map: &StandardMap, bodies: &[Option<Body>], given: &[bool]) -> Vec
     bad.map(|((name, _), _)| name.clone()).collect()
 }
 
-/// Links and drives that were found, as they are told.
-fn told(
+/// Links and drives that were found, as they are reported.
+fn links_and_drives(
     robot: &Robot,
     map: &StandardMap,
     found: &Feasible,
@@ -182,7 +182,7 @@ pub(super) fn consistent(
     let growth: Vec<f64> = free.iter().zip(&bound).map(growth).collect();
     let before: Vec<f64> = fit.relative_error.iter().map(|e| e.all).collect();
     let after: Vec<f64> = before.iter().zip(&growth).map(|(e, g)| e * g).collect();
-    let (links, drives) = told(&machine.robot, &map, &found);
+    let (links, drives) = links_and_drives(&machine.robot, &map, &found);
     Ok(ConsistentLinks {
         links,
         drives,
@@ -344,7 +344,7 @@ fn project_in(
     if !found.theta.iter().all(|x| x.is_finite()) {
         return Ok(());
     }
-    let (links, drives) = told(&robot, &map, &found);
+    let (links, drives) = links_and_drives(&robot, &map, &found);
     for (key, value) in keys.iter().zip(&found.theta) {
         let of_key = |p: &&mut Parameter| p.key() == *key;
         if let Some(p) = model.parameters.iter_mut().find(of_key) {

@@ -1,4 +1,4 @@
-//! How a long stage tells what it does, and is asked to stop.
+//! How a long stage reports what it does, and is asked to stop.
 
 use std::fmt;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ type Stop = dyn Fn() -> bool + Send + Sync;
 type Tell = dyn Fn(Progress) + Send + Sync;
 
 /// Cancellation and progress as callbacks, called from any thread; by default nothing stops a stage
-/// and nobody is told.
+/// and nobody is informed.
 #[derive(Clone, Default)]
 pub struct Control {
     stop: Option<Arc<Stop>>,

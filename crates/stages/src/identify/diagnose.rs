@@ -20,7 +20,8 @@ use super::temperatures;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, Heard, LogRole, ParameterPrior, Watch, Wishes,
+    self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ParameterPrior, Watch,
+    Wishes,
 };
 use cft_ident_core::effect::{self, AugmentedModel};
 use cft_ident_core::judge::NUMBERS;
@@ -83,6 +84,8 @@ pub struct Diagnosed {
     pub(super) candidates: Vec<CandidateSection>,
     /// The friction was held.
     pub(super) hold_friction: bool,
+    /// Formulas were looked for.
+    pub searched: bool,
     pub filters: ParallelFilters,
     pub cutoff_hz: f64,
 }
@@ -219,6 +222,8 @@ pub fn diagnose(
     };
     in_memory.stretches = std::mem::take(&mut case.stretches);
     let train = logs.train;
+    // beside a log that vetoes, held-out data measure and choose nothing
+    let holdout_chooses = logs.veto.is_empty();
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
         if aside.role == LogRole::Holdout {
@@ -239,6 +244,7 @@ pub fn diagnose(
         friction_prior,
         candidates: settings.candidates.clone(),
         hold_friction: settings.hold_friction,
+        searched: settings.wishes.search,
         filters: case.filters.clone(),
         cutoff_hz: case.cutoff_hz,
     };
@@ -257,6 +263,9 @@ pub fn diagnose(
         let errors = found.judge_in_use(machine, &case, (name, as_given));
         found.in_memory.stretches = case.stretches;
         errors?;
+    }
+    if holdout_chooses && found.diagnosis.withdraw_worse(&found.given) {
+        found.held = Held::default();
     }
     let _work = control.begin("free run", None);
     found.free_run = found.run_freely(machine, (name, as_given))?;
@@ -341,6 +350,7 @@ fn case(
         own: own_laws(&settings.candidates, &machine.robot)?,
         wishes: settings.wishes.clone(),
         numbers: NUMBERS,
+        formula: FORMULA_NUMBERS,
     })
 }
 

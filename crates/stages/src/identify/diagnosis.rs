@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 use super::diagnose::{DataFault, Diagnosed};
+use super::formulas::{FormulaResult, formula_result};
 use super::logged_robot::LoggedRobot;
 use super::next_motion::separating_command;
 use crate::open_loop::FreeRun;
@@ -39,6 +40,9 @@ pub struct DiagnosisResult {
     pub unexplained: Vec<UnexplainedResult>,
     /// Signals that the residual of a joint with structure depends on, the strongest of each joint first.
     pub dependence: Vec<ResidualDependence>,
+    /// Formulas of what is left, where they were looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub formulas: Option<Vec<FormulaResult>>,
     /// Candidates that were added, then those of the last round.
     pub candidates: Vec<CandidateResult>,
     /// Blocks of the logs that were not fitted.
@@ -145,7 +149,7 @@ pub struct EffectValueFound {
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
-    /// It is held at a bound, for these data do not tell it.
+    /// It is held at a bound, for these data do not determine it.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub bound: bool,
 }
@@ -239,6 +243,7 @@ impl DataFault {
             changes: Vec::new(),
             unexplained: Vec::new(),
             dependence: Vec::new(),
+            formulas: None,
             candidates: Vec::new(),
             set_aside: None,
             processing: None,
@@ -308,6 +313,10 @@ impl Diagnosed {
             changes: d.changes.iter().map(change).collect(),
             unexplained: left.collect(),
             dependence: d.dependence.iter().map(|d| dependence(names, d)).collect(),
+            formulas: self.searched.then(|| {
+                let all = d.formulas.iter();
+                all.map(|f| formula_result(machine, f)).collect()
+            }),
             candidates: found.chain(others).collect(),
             set_aside: Some(aside.collect()),
             processing: Some(self.in_memory.summary.clone()),
@@ -339,7 +348,11 @@ impl Diagnosed {
             effect: effect.name(),
             family: effect.family().name(),
             joint: effect.place.name(robot),
-            parameters: self.told(machine, step).into_iter().map(number).collect(),
+            parameters: self
+                .numbers_of(machine, step)
+                .into_iter()
+                .map(number)
+                .collect(),
             alternatives,
             status: step.status,
             written: step.written.is_some(),
@@ -403,7 +416,7 @@ fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult
     let reason = match (step.written, step.status) {
         (Some(_), _) => "",
         (None, StepStatus::Seen) => "the parts of the data do not agree on its amplitude",
-        (None, _) if step.vetoed() => "it makes a joint worse on held-out data",
+        (None, _) if step.vetoed() => "held-out data are worse with it",
         (None, _) => "it can be measured, and the parts of the data do not agree enough",
     };
     CandidateResult {

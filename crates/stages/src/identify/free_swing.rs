@@ -20,7 +20,7 @@ use cft_ident_core::motion::{self, FilterSettings};
 use cft_ident_core::robot::Robot;
 
 /// Half of the torques: the least that a dead channel leaves.
-const HALF: f64 = 0.5;
+const DEAD_CHANNEL_SHARE: f64 = 0.5;
 /// Periods of the cut-off about the ends of a stretch whose filtered rows hold both kinds.
 const ENDS: f64 = 1.0;
 
@@ -132,7 +132,10 @@ fn judged(
         squares.sum::<f64>() / joint.off.rows().max(1) as f64
     });
     let known = torque > 0.0 && of_all(&|joint| joint.off.rows() as f64) > 0.0;
-    known.then(|| driven.max(off) <= 0.5 * (of_model + HALF) && off <= HALF * terms)
+    known.then(|| {
+        driven.max(off) <= 0.5 * (of_model + DEAD_CHANNEL_SHARE)
+            && off <= DEAD_CHANNEL_SHARE * terms
+    })
 }
 
 /// The parameters of least norm for some rows, and -1 for the torque's own column after them.

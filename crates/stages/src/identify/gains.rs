@@ -49,7 +49,7 @@ pub struct Gain {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurrentGains {
     pub joints: Vec<Gain>,
-    /// Joint whose gain is 1 where only ratios could be told.
+    /// Joint whose gain is 1 where only ratios could be reported.
     pub reference: Option<String>,
     /// Covariance of the logarithms of the gains, n x n.
     pub(super) covariance: DMatrix<f64>,

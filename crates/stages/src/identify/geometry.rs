@@ -1,4 +1,4 @@
-//! Which angle or length of a serial robot makes a base parameter that no motion can tell: one that is
+//! Which angle or length of a serial robot makes a base parameter that no motion can determine: one that is
 //! nearly, and not quite, that of parallel, crossing or square axes.
 
 use std::f64::consts::PI;
@@ -11,10 +11,10 @@ use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::robot_file::ModelKind;
 use cft_ident_files::config::serial_section::LinkSection;
 
-/// Normalised condition number from which a fit has a direction that its rows hardly tell.
+/// Normalised condition number from which a fit has a direction that its rows hardly determine.
 const CONDITION: f64 = 1e4;
 /// Nearness to a multiple of pi/12 \[rad\], and to 0 \[m\]: what calibrations correct by, and rounding.
-const NEAR: [f64; 2] = [0.02, 2e-3];
+const ROUNDING: [f64; 2] = [0.02, 2e-3];
 
 /// A number of a link that is nearly a plain one.
 struct Nearly {
@@ -30,8 +30,8 @@ impl Nearly {
     fn of(link: usize, key: &'static str, part: usize, declared: f64) -> Option<Self> {
         let angle = matches!(key, "alpha" | "theta" | "rpy");
         let (plain, near) = match angle {
-            true => ((declared / PI * 12.0).round() * PI / 12.0, NEAR[0]),
-            false => (0.0, NEAR[1]),
+            true => ((declared / PI * 12.0).round() * PI / 12.0, ROUNDING[0]),
+            false => (0.0, ROUNDING[1]),
         };
         let off = (declared - plain).abs();
         (off > 1e-9 && off < near).then_some(Self {

@@ -341,6 +341,8 @@ struct Watched {
     log: usize,
     fold: usize,
     observer: Observer,
+    /// How uncertain the parameters make torques: asked for at the samples that are kept.
+    uncertain: Directions,
     /// Samples are kept at least so far apart \[s\].
     every: f64,
     /// Time before the block from which the observer runs \[s\].
@@ -361,7 +363,8 @@ impl Watched {
         Ok(Self {
             log,
             fold,
-            observer: Observer::new(model.clone(), settings)?.with_uncertain(uncertain.clone()),
+            observer: Observer::new(model.clone(), settings)?,
+            uncertain: uncertain.clone(),
             every: 1.0 / (KEPT * settings.cutoff_hz),
             lead: LEAD / settings.cutoff_hz,
             next: f64::NEG_INFINITY,
@@ -393,12 +396,14 @@ impl Watched {
                 return;
             }
             self.next = o.t + every * (1.0 - 1e-6);
+            let mut variance = vec![0.0; o.q.len()];
+            self.uncertain.variances([o.q, o.v, o.a], &mut variance);
             taken.push(QuietSample {
                 t: o.t,
                 begins: std::mem::take(&mut self.begins),
                 external: o.external.to_vec(),
                 speed: o.speed.to_vec(),
-                variance: o.variance.to_vec(),
+                variance,
             });
         })?;
         Ok(taken)

@@ -74,7 +74,7 @@ pub(super) fn read_each(
                 most: MOST_SAMPLES,
             });
         }
-        warnings.extend(open.told(&summary));
+        warnings.extend(open.in_words(&summary));
         warnings.extend(machine.put_temperatures(log, open.origin(), &mut found)?);
         inputs.push(open.provenance()?);
         all.extend(found);

@@ -10,9 +10,9 @@ use cft_ident_core::robot::tree::pose::{driven, frames};
 use cft_ident_core::robot::tree::space::{Vector, add, cross, turn};
 use cft_ident_files::config::{ModelFile, RobotFile};
 
-/// Bandwidth of the position loop that a lag is told for \[Hz\]: that of a usual industrial arm.
+/// Bandwidth of the position loop that a lag is reported for \[Hz\]: that of a usual industrial arm.
 pub const BANDWIDTH_HZ: f64 = 5.0;
-/// Lever below which a torque is told as it is \[m\].
+/// Lever below which a torque is reported as it is \[m\].
 const LEVER: f64 = 0.05;
 
 /// What the error of one joint means in use.
@@ -41,7 +41,7 @@ pub struct JointInUse {
     pub speed_seen: f64,
 }
 
-/// The point that forces are told at, and what it is called: the first frame of the robot file, or the end of the
+/// The point that forces are reported at, and what it is called: the first frame of the robot file, or the end of the
 /// last link.
 fn tool(file: &RobotFile, machine: &LoggedRobot, q: &[f64]) -> (Vector, String) {
     let tree = machine.robot.tree();
@@ -93,7 +93,7 @@ pub(super) fn middle(file: &ModelFile) -> Vec<f64> {
     seen.map(|[low, high]| 0.5 * (low + high)).collect()
 }
 
-/// What the errors of a model mean in use, and the point that forces are told at; nothing where the file does not hold
+/// What the errors of a model mean in use, and the point that forces are reported at; nothing where the file does not hold
 /// what it left of data set aside.
 pub fn in_use(
     machine: &LoggedRobot,

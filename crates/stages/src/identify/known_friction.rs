@@ -48,7 +48,7 @@ pub struct FrictionParameter {
     pub verdict: Option<Verdict>,
 }
 
-/// What is known of the friction of every joint, and which logs tell it.
+/// What is known of the friction of every joint, and which logs determine it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FrictionBefore {
     pub known: Vec<KnownFriction>,

@@ -99,7 +99,7 @@ impl Log {
         })
     }
 
-    /// What tells it from other logs.
+    /// What distinguishes it from other logs.
     pub(super) fn key(&self) -> String {
         match self {
             Self::File(spec) => spec.to_string(),

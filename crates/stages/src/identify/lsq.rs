@@ -83,7 +83,7 @@ pub struct IdentifiedDynamics {
     pub condition: ConditionNumbers,
     /// Directions of the parameters that the rows determine.
     pub rank: usize,
-    /// The combination of parameters that they tell least about.
+    /// The combination of parameters that they determine least.
     pub weakest_direction: Vec<WeakestPart>,
     /// Rows of all joints.
     pub samples: u64,
@@ -250,7 +250,7 @@ pub fn lsq(
     warnings.extend(confounded(&fit, &unknowns));
     warnings.extend(negative(&unknowns));
     let costs: Vec<&CutoffCosts> = costs.iter().collect();
-    let (position_cutoffs, wrong) = CutoffCosts::told(&costs, machine, &columns, &fit);
+    let (position_cutoffs, wrong) = CutoffCosts::described(&costs, machine, &columns, &fit);
     warnings.extend(wrong);
     if unknowns
         .iter()
@@ -388,7 +388,7 @@ impl Account {
 /// Share of the torque that a fit leaves of every joint where noise is as large as the torque: noise alone leaves 0.7 of
 /// the sum of two that are equal.
 const NOISE: f64 = 0.7;
-/// Share of a joint's rows at rest from which on they are told.
+/// Share of a joint's rows at rest from which on they are reported.
 const TOLD: f64 = 0.01;
 
 /// Rows at rest that are not fitted, as a warning.

@@ -74,7 +74,7 @@ impl OpenLog<'_> {
     }
 
     /// The same with what the processing left out.
-    pub fn told(&self, summary: &Summary) -> Vec<String> {
+    pub fn in_words(&self, summary: &Summary) -> Vec<String> {
         let mut out = self.costs_and_places(summary.skipped.samples);
         out.extend(self.velocities());
         out.extend(summary_warnings(&self.name, self.origin(), summary));

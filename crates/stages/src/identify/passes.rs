@@ -87,7 +87,7 @@ impl<'a> Passes<'a> {
     }
 
     /// The same with what each log calls for by itself: its joints rest, and its positions are smoothed, as that log
-    /// alone tells.
+    /// alone shows.
     pub(super) fn each_by_itself(self, own: Vec<OwnSettings>) -> Self {
         Passes { own, ..self }
     }
@@ -198,11 +198,11 @@ impl<'a> Passes<'a> {
             .map_err(|e| open.ended(e))?;
             let samples = open.provenance()?.samples;
             if first {
-                // what cannot be fitted is told by the fit itself
+                // what cannot be fitted is reported by the fit itself
                 let found = jumps(&sums).unwrap_or_default();
                 self.jumps
                     .extend(found.into_iter().map(|jump| (index, jump)));
-                self.warnings.extend(open.told(&summary));
+                self.warnings.extend(open.in_words(&summary));
                 self.saw(open.provenance()?, summary);
             }
             all.push(match filter {

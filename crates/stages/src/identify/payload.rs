@@ -6,18 +6,20 @@
 //! 1987) and the covariance of the model's own parameters.
 
 use nalgebra::{DMatrix, DVector};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
 use super::in_memory::{InMemory, read_whole};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::payload_result::{
+    GainOff, LeftOfJoint, Number95, Payload, PayloadReading, PayloadVerdict,
+};
 use crate::band::NORMAL_95;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::bandwidth;
 use cft_ident_core::inertia::feasible::{ConsistencyProblem, feasible};
+use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::math::long_run::long_run;
 use cft_ident_core::math::rank::svd;
 use cft_ident_core::math::rfactor::RFactor;
@@ -26,8 +28,6 @@ use cft_ident_core::robot::bodies::StandardMap;
 use cft_ident_core::robot::friction::sign;
 use cft_ident_core::robot::standard::{Body, STANDARD};
 use cft_ident_files::config::ModelFile;
-use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
-use cft_ident_logs::log::Provenance;
 
 /// Entries of a row: ten of the body, viscous and Coulomb friction, offset.
 const OWN: usize = STANDARD + 3;
@@ -43,63 +43,6 @@ const ROUNDS: usize = 4;
 const NOTHING: f64 = 1e-7;
 /// Share of a number in a direction that is not excited from which on it is open.
 const PART: f64 = 1e-3;
-
-/// A number with its 95 % confidence interval; null where the log does not determine it.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Number95 {
-    pub value: Option<f64>,
-    pub std: Option<f64>,
-    pub interval_95: Option<[f64; 2]>,
-    pub unit: String,
-}
-
-/// A gain error of a joint's torque channel: what was logged over what the model's channel would show, less 1.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct GainOff {
-    pub joint: String,
-    pub error: Number95,
-}
-
-/// The torque error of a joint.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct LeftOfJoint {
-    pub joint: String,
-    /// Relative error of the model as given.
-    pub before: f64,
-    /// The same with body, friction and offset (and gains) of this reading.
-    pub after: f64,
-}
-
-/// The body by one reading of the torque channels.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct PayloadReading {
-    /// Whether gain errors were free.
-    pub gains_free: bool,
-    pub mass: Number95,
-    /// Centre of gravity in the frame of the link \[m\].
-    pub centre: [Number95; 3],
-    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity \[kg m^2\].
-    pub inertia: [Number95; 6],
-    pub gains: Vec<GainOff>,
-    pub joints: Vec<LeftOfJoint>,
-    /// Standard parameters of the body.
-    #[serde(skip)]
-    pub body: [f64; STANDARD],
-}
-
-/// What `payload` found.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Payload {
-    /// Link that carries the body, in whose frame it is told.
-    pub link: String,
-    /// With the gains of the model, then with free ones.
-    pub readings: Vec<PayloadReading>,
-    pub samples: u64,
-    #[serde(skip)]
-    pub inputs: Vec<Provenance>,
-    #[serde(skip)]
-    pub warnings: Vec<String>,
-}
 
 /// Filtered rows of every joint, and the sums that say what the model's own parameters do to a fit of them.
 struct Rows {
@@ -138,6 +81,7 @@ pub fn payload(
     control.check()?;
     let links = robot.tree().links();
     Ok(Payload {
+        verdict: PayloadVerdict::of(&readings),
         link: links.last().map_or(String::new(), |link| link.name.clone()),
         readings,
         samples: rows.joints.iter().map(|rows| rows.len() as u64).sum(),
@@ -234,15 +178,42 @@ fn places(j: usize, n: usize, gains: bool) -> Vec<usize> {
     (0..STANDARD).chain(own).chain(gain).collect()
 }
 
-/// The columns of a row, the gain's where it is free: it multiplies what the joint carries with the body.
-fn columns(row: &[f64; OWN + 3], body: &DVector<f64>, gains: bool) -> Vec<f64> {
-    let carried: f64 = row[..STANDARD]
-        .iter()
-        .zip(body.iter())
-        .map(|(y, x)| y * x)
-        .sum();
-    let gain = gains.then_some(row[HAT] + carried);
-    row[..OWN].iter().copied().chain(gain).collect()
+/// Where a fit stands: gain errors multiply the body, so that its columns depend on both.
+struct Point {
+    body: DVector<f64>,
+    /// Gain error of each joint, 0 where gains are held.
+    gains: Vec<f64>,
+}
+
+impl Point {
+    fn of(theta: &DVector<f64>, n: usize, gains: bool) -> Self {
+        let gain = |j: usize| {
+            if gains {
+                theta[STANDARD + 3 * n + j]
+            } else {
+                0.0
+            }
+        };
+        Self {
+            body: theta.rows(0, STANDARD).into_owned(),
+            gains: (0..n).map(gain).collect(),
+        }
+    }
+
+    fn carried(&self, row: &[f64; OWN + 3]) -> f64 {
+        let each = row[..STANDARD].iter().zip(self.body.iter());
+        each.map(|(y, x)| y * x).sum()
+    }
+
+    /// The columns of a row of joint `j`, the gain's where it is free, and what they are to give: the torque
+    /// (1 + gain) (body + model) less the model, linear about this point.
+    fn linear(&self, j: usize, row: &[f64; OWN + 3], gains: bool) -> (Vec<f64>, f64) {
+        let (gain, carried) = (self.gains[j], self.carried(row));
+        let of_body = row[..STANDARD].iter().map(|y| (1.0 + gain) * y);
+        let of_gain = gains.then_some(row[HAT] + carried);
+        let columns = of_body.chain(row[STANDARD..OWN].iter().copied());
+        (columns.chain(of_gain).collect(), row[LEFT] + gain * carried)
+    }
 }
 
 fn reading(
@@ -259,15 +230,16 @@ fn reading(
     for _ in 0..ROUNDS {
         let mut factor = RFactor::new(u + 1);
         let mut whole = vec![0.0; u + 1];
-        let body = theta.rows(0, STANDARD).into_owned();
+        let point = Point::of(&theta, n, gains);
         for (j, of) in rows.joints.iter().enumerate() {
             let places = places(j, n, gains);
             for (row, _) in of {
                 whole.fill(0.0);
-                for (at, x) in places.iter().zip(columns(row, &body, gains)) {
+                let (columns, left) = point.linear(j, row, gains);
+                for (at, x) in places.iter().zip(columns) {
                     whole[*at] = weights[j] * x;
                 }
-                whole[u] = weights[j] * row[LEFT];
+                whole[u] = weights[j] * left;
                 factor.fold(&whole);
             }
         }
@@ -280,21 +252,29 @@ fn reading(
         }
     }
     let (inverse, open) = inverse(&normal)?;
-    let body = theta.rows(0, STANDARD).into_owned();
+    let point = Point::of(&theta, n, gains);
     let mut scores = vec![DVector::zeros(u); rows.blocks.len()];
     let mut by_model = DMatrix::zeros(u, covariance.nrows());
     for (j, of) in rows.joints.iter().enumerate() {
         let places = places(j, n, gains);
         let square = weights[j] * weights[j];
         for ((row, block), error) in of.iter().zip(errors(rows, j, n, &theta, gains)) {
-            for (at, x) in places.iter().zip(columns(row, &body, gains)) {
+            for (at, x) in places.iter().zip(point.linear(j, row, gains).0) {
                 scores[*block][*at] += square * x * error;
             }
         }
-        // the gain's column is that of the model but for the body
+        // an error of the model is scaled as the model is
+        let gain = 1.0 + point.gains[j];
+        let beside = &rows.beside[j];
+        let carried = beside.rows(0, STANDARD).tr_mul(&point.body);
         for (c, at) in places.iter().enumerate() {
             for k in 0..by_model.ncols() {
-                by_model[(*at, k)] += square * rows.beside[j][(c, k)];
+                let column = match c {
+                    0..STANDARD => gain * beside[(c, k)],
+                    HAT => beside[(c, k)] + carried[k],
+                    _ => beside[(c, k)],
+                };
+                by_model[(*at, k)] += square * gain * column;
             }
         }
     }
@@ -302,7 +282,7 @@ fn reading(
     let lag = bandwidth(&scores, u, BLOCK_S);
     let middle = long_run(&scores, u, lag) + &by_model * covariance * by_model.transpose();
     let spread = &inverse * middle * &inverse;
-    Ok(told(machine, rows, &theta, &spread, &open, gains))
+    Ok(payload_of(machine, rows, &theta, &spread, &open, gains))
 }
 
 /// What a joint's rows leave.
@@ -313,12 +293,29 @@ fn errors<'a>(
     theta: &'a DVector<f64>,
     gains: bool,
 ) -> impl Iterator<Item = f64> + 'a {
-    let (places, body) = (places(j, n, gains), theta.rows(0, STANDARD).into_owned());
+    let (places, point) = (places(j, n, gains), Point::of(theta, n, gains));
     rows.joints[j].iter().map(move |(row, _)| {
-        let fitted = columns(row, &body, gains);
-        let fitted = places.iter().zip(fitted).map(|(at, x)| theta[*at] * x);
-        row[LEFT] - fitted.sum::<f64>()
+        let (columns, left) = point.linear(j, row, gains);
+        let fitted = places.iter().zip(columns).map(|(at, x)| theta[*at] * x);
+        left - fitted.sum::<f64>()
     })
+}
+
+/// Whether the errors of a joint are above those of the model as given, by more than chance does to their blocks.
+fn is_worse(rows: &Rows, j: usize, errors: impl Iterator<Item = f64>) -> bool {
+    let mut scores: Vec<(usize, DVector<f64>)> = (rows
+        .blocks
+        .iter()
+        .map(|stretch| (*stretch, DVector::zeros(1))))
+    .collect();
+    for ((row, block), error) in rows.joints[j].iter().zip(errors) {
+        scores[*block].1[0] += error * error - row[LEFT] * row[LEFT];
+    }
+    let more: f64 = scores.iter().map(|(_, score)| score[0]).sum();
+    let mean = more / scores.len().max(1) as f64;
+    scores.iter_mut().for_each(|(_, score)| score[0] -= mean);
+    let lag = bandwidth(&scores, 1, BLOCK_S);
+    more > NUMBERS.screen * long_run(&scores, 1, lag)[(0, 0)].max(0.0).sqrt()
 }
 
 /// Least squares over bodies that can exist.
@@ -377,7 +374,7 @@ fn interval(value: f64, variance: f64, open: bool, unit: &str) -> Number95 {
     }
 }
 
-fn told(
+fn payload_of(
     machine: &LoggedRobot,
     rows: &Rows,
     theta: &DVector<f64>,
@@ -424,7 +421,9 @@ fn told(
             .map(|(row, _)| row[LEFT].powi(2))
             .sum();
         let after: f64 = errors(rows, j, n, theta, gains).map(|e| e * e).sum();
+        let errors = errors(rows, j, n, theta, gains);
         LeftOfJoint {
+            worse: is_worse(rows, j, errors),
             joint: names[j].clone(),
             before: (before / torque).sqrt(),
             after: (after / torque).sqrt(),
@@ -442,49 +441,5 @@ fn told(
         },
         joints: (0..n).map(of_joint).collect(),
         body: standard,
-    }
-}
-
-impl PayloadReading {
-    /// The body as an effect of a model: its inertia is the same about every axis there.
-    fn effect(&self) -> EffectSection {
-        let body = Body::of(&self.body);
-        let parameter = |value: f64, std: Option<f64>, unit: &str| EffectParameter {
-            value,
-            std,
-            unit: unit.to_owned(),
-            bound: false,
-        };
-        let [xx, _, _, yy, _, zz] = body.inertia;
-        let mut parameters = std::collections::BTreeMap::from([
-            ("mass".to_owned(), parameter(body.mass, self.mass.std, "kg")),
-            (
-                "inertia".to_owned(),
-                parameter((xx + yy + zz) / 3.0, None, "kg m^2"),
-            ),
-        ]);
-        for (i, key) in ["mx", "my", "mz"].into_iter().enumerate() {
-            parameters.insert(key.to_owned(), parameter(self.body[6 + i], None, "kg m"));
-        }
-        EffectSection {
-            shrinkage: None,
-            accepted_by_user: false,
-            name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
-            joint: None,
-            parameters,
-        }
-    }
-}
-
-impl Payload {
-    /// The model with the body of the reading without gain errors, as an effect.
-    pub fn loaded(&self, file: &ModelFile) -> ModelFile {
-        let mut model = file.clone();
-        if let Some(reading) = self.readings.first() {
-            model.effects.push(reading.effect());
-            model.provenance.command = "payload".to_owned();
-            model.provenance.inputs.extend(self.inputs.iter().cloned());
-        }
-        model
     }
 }

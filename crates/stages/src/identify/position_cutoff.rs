@@ -75,7 +75,7 @@ impl CutoffCosts {
     /// The cut-offs of a fit of logs with these costs, whose friction scales those of joints without a known law, and
     /// what is wrong with them, as warnings. Where logs call for several cut-offs the lowest is reported, and of the costs
     /// the root of the mean square.
-    pub(super) fn told(
+    pub(super) fn described(
         logs: &[&CutoffCosts],
         machine: &LoggedRobot,
         columns: &RegressorColumns,

@@ -3,6 +3,7 @@
 use super::consistent::project_by;
 use super::diagnose::Diagnosed;
 use super::error::IdentifyError;
+use super::formulas::written_sections;
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
@@ -89,7 +90,7 @@ impl Diagnosed {
     }
 
     /// Estimated parameters of an effect with their standard deviations.
-    pub fn told(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
+    pub fn numbers_of(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
         let effect = &step.estimate;
         let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
         effect.numbers(&machine.robot, unit, Some(&step.covariance))
@@ -167,7 +168,9 @@ impl Diagnosed {
         }
         self.put_effects(machine, file, &mut model);
         let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
+        let formulas = written_sections(self);
         let known = file.candidates.iter().chain(&self.candidates);
+        let known = known.chain(&formulas);
         for candidate in known.filter(of_model) {
             if !model.candidates.contains(candidate) {
                 model.candidates.push(candidate.clone());
@@ -219,7 +222,7 @@ impl Diagnosed {
             else {
                 continue;
             };
-            let estimated = self.told(machine, step);
+            let estimated = self.numbers_of(machine, step);
             let whole = effect.linear == step.estimate.linear;
             let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
             let numbers = match whole {

@@ -41,7 +41,7 @@ pub(super) fn without_rows_of(machine: &LoggedRobot, logs: &[Log], others: &[Log
     logs.iter().filter(fresh).cloned().collect()
 }
 
-/// A sentence for each two logs with the same rows, for commands that only look; `layout` tells the time column
+/// A sentence for each two logs with the same rows, for commands that only look; `layout` names the time column
 /// where a robot is known.
 pub fn repeated_rows(logs: &[Log], layout: Option<&Layout>) -> Vec<String> {
     let all: Vec<&Log> = logs.iter().collect();
@@ -89,7 +89,7 @@ impl Log {
         }
     }
 
-    /// What tells its rows from others, where it can be read.
+    /// What distinguishes its rows from others, where it can be read.
     fn provenance(&self) -> Option<Provenance> {
         let (span, sha256) = match self {
             Self::File(spec) => (spec.part(), sha256(&spec.path).ok()?),

@@ -71,7 +71,7 @@ pub fn check_setup(
     );
     let searched = search(&problem, &|| control.stopped());
     control.check()?;
-    Ok(told(machine, &problem, &searched))
+    Ok(checked(machine, &problem, &searched))
 }
 
 /// What the robot file knows beside its channels.
@@ -150,7 +150,7 @@ fn sampled(
     Ok((channels.ok_or(IdentifyError::NoLog)?, thinner.finish()))
 }
 
-fn told(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
+fn checked(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
     let declared = Declared::new(&machine.file, problem.channels.drive == Drive::Motors);
     let edits = searched.correction.as_ref().map(|by| declared.edits(by));
     let edits = edits.unwrap_or_default();

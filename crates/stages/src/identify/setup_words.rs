@@ -483,7 +483,7 @@ impl Words<'_> {
     }
 }
 
-/// What tells readings apart that fit alike.
+/// What distinguishes readings that fit alike.
 fn experiment<'a>(found: &Found, name: impl Fn(usize) -> &'a String) -> Option<String> {
     if let Some([a, b]) = found.together {
         return Some(format!("; {}", apart([name(a), name(b)], None)));

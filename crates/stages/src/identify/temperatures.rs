@@ -69,7 +69,7 @@ impl LoggedRobot {
         }
     }
 
-    /// Puts the temperatures of a log beside its stretches. A column that it lacks is told alone: whether anything
+    /// Puts the temperatures of a log beside its stretches. A column that it lacks is reported alone: whether anything
     /// takes it is for [`Self::check_temperatures`].
     ///
     /// # Errors

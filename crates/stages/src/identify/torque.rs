@@ -132,9 +132,9 @@ pub fn torque(
     };
     drop(work);
     control.check()?;
-    let mut warnings = open.told(&summary);
+    let mut warnings = open.in_words(&summary);
     match &reach {
-        Some(reach) => warnings.extend(reach.told()),
+        Some(reach) => warnings.extend(reach.in_words()),
         None => warnings.push(NO_BAND.to_owned()),
     }
     let inputs = vec![open.provenance()?];

@@ -1,4 +1,4 @@
-//! The parameters of robots over their logs: what each log tells by itself, followed in order of time.
+//! The parameters of robots over their logs: what each log says by itself, followed in order of time.
 
 use std::collections::BTreeMap;
 use std::slice::from_ref;
@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
+use super::one_log::{OneEstimate, Source};
 use super::reduced::reduced_log::{MadeWith, ReducedLog};
-use super::told::{Source, Told};
 use super::track_error::TrackError;
 use cft_ident_files::config::ModelFile;
 use cft_ident_fleet::track::{
@@ -78,11 +78,11 @@ pub struct TrackedParameter {
     pub unit: String,
     /// By the logs' own clock \[s\], or the numbers of the logs from 0 where their clocks do not order them.
     pub times: Vec<f64>,
-    /// Smoothed \[unit\]; null where no log tells the parameter.
+    /// Smoothed \[unit\]; null where no log determines the parameter.
     pub values: Vec<Option<f64>>,
     /// Standard deviations of these.
     pub std: Vec<Option<f64>>,
-    /// What each log tells by itself, and its standard deviation.
+    /// What each log says by itself, and its standard deviation.
     pub estimates: Vec<Option<f64>>,
     pub estimates_std: Vec<Option<f64>>,
     /// Standard deviation of the random walk from log to log.
@@ -91,7 +91,7 @@ pub struct TrackedParameter {
     pub scatter: f64,
     /// Numbers of the logs whose estimate stands alone, from 0.
     pub outliers: Vec<usize>,
-    /// Size from which on a step in the middle of the course is told \[unit\]; null where there are too few logs.
+    /// Size from which on a step in the middle of the course is reported \[unit\]; null where there are too few logs.
     pub least_seen: Option<f64>,
 }
 
@@ -287,7 +287,7 @@ fn ordered(
     Ok((places.iter().map(|k| given[*k].clone()).collect(), times))
 }
 
-/// Two sources that tell the same: spans of one log that meet, a log under two names, and models of the same rows.
+/// Two sources that say the same: spans of one log that meet, a log under two names, and models of the same rows.
 fn twice(given: &[TrackSource]) -> Option<[&TrackSource; 2]> {
     let mut of_log: BTreeMap<&str, Vec<&TrackSource>> = BTreeMap::new();
     for source in given {
@@ -359,7 +359,7 @@ fn followed(
     times: &[f64],
     control: &Control,
 ) -> Result<TrackedRobot, IdentifyError> {
-    let told: Vec<Source> = sources
+    let found: Vec<Source> = sources
         .par_iter()
         .map(|source| {
             if control.stopped() {
@@ -371,14 +371,14 @@ fn followed(
             }
         })
         .collect::<Result<_, _>>()?;
-    let groups = groups(&told);
+    let groups = groups(&found);
     let level = ALARMS / groups.len().max(1) as f64;
     let (mut parameters, mut changes) = (Vec::new(), Vec::new());
     for keys in &groups {
-        let of_key = |key: &&Told| -> Vec<LogEstimate> {
-            let each = told.iter().zip(times);
+        let of_key = |key: &&OneEstimate| -> Vec<LogEstimate> {
+            let each = found.iter().zip(times);
             each.map(|(source, time)| {
-                let own = source.told.iter().find(|t| t.is(key));
+                let own = source.estimates.iter().find(|t| t.is(key));
                 LogEstimate {
                     time: *time,
                     value: own.map_or(0.0, |t| t.value),
@@ -389,7 +389,7 @@ fn followed(
         };
         let estimates: Vec<Vec<LogEstimate>> = keys.iter().map(of_key).collect();
         let own: Vec<&[LogEstimate]> = estimates.iter().map(Vec::as_slice).collect();
-        let courses = follow_together(&own, correlation(&told, keys).as_deref(), level);
+        let courses = follow_together(&own, correlation(&found, keys).as_deref(), level);
         for ((key, estimates), course) in keys.iter().zip(&estimates).zip(&courses) {
             changes.extend(changed(key, course, &courses, times));
             parameters.push(tracked(key, course, estimates, times));
@@ -405,14 +405,14 @@ fn followed(
 }
 
 /// Parameters that are followed together: sizes of the friction of one joint, and each other one by itself.
-fn groups(told: &[Source]) -> Vec<Vec<&Told>> {
-    let mut groups: Vec<Vec<&Told>> = Vec::new();
-    for one in told.iter().flat_map(|source| &source.told) {
+fn groups(found: &[Source]) -> Vec<Vec<&OneEstimate>> {
+    let mut groups: Vec<Vec<&OneEstimate>> = Vec::new();
+    for one in found.iter().flat_map(|source| &source.estimates) {
         if groups.iter().flatten().any(|key| key.is(one)) {
             continue;
         }
-        let with = |group: &&mut Vec<&Told>| {
-            let alike = |key: &&Told| key.is_friction() && key.joint == one.joint;
+        let with = |group: &&mut Vec<&OneEstimate>| {
+            let alike = |key: &&OneEstimate| key.is_friction() && key.joint == one.joint;
             one.is_friction() && group.iter().any(alike)
         };
         match groups.iter_mut().find(with) {
@@ -424,9 +424,9 @@ fn groups(told: &[Source]) -> Vec<Vec<&Told>> {
 }
 
 /// Correlation of the errors of estimates of one log, as the logs say it on average, row by row.
-fn correlation(told: &[Source], keys: &[&Told]) -> Option<Vec<f64>> {
-    let mean = |one: &Told, other: &Told| {
-        let all = told
+fn correlation(found: &[Source], keys: &[&OneEstimate]) -> Option<Vec<f64>> {
+    let mean = |one: &OneEstimate, other: &OneEstimate| {
+        let all = found
             .iter()
             .filter_map(|source| source.correlation(one, other));
         let all: Vec<f64> = all.collect();
@@ -443,14 +443,19 @@ fn correlation(told: &[Source], keys: &[&Told]) -> Option<Vec<f64>> {
 const SHOWN: f64 = 2.0;
 
 /// Changes of one parameter of those that are followed together.
-fn changed(key: &Told, course: &Course, together: &[Course], times: &[f64]) -> Vec<TrackedChange> {
+fn changed(
+    key: &OneEstimate,
+    course: &Course,
+    together: &[Course],
+    times: &[f64],
+) -> Vec<TrackedChange> {
     let clear = |c: &ParameterChange| (c.size / c.std).abs();
     let shown = |(i, change): &(usize, &ParameterChange)| {
         let all = together.iter().map(|course| clear(&course.changes[*i]));
         clear(change) >= all.fold(0.0, f64::max).min(SHOWN)
     };
     let changes = course.changes.iter().enumerate().filter(shown);
-    let told = changes.map(|(_, c)| {
+    let reported = changes.map(|(_, c)| {
         let before = course.values[c.at.saturating_sub(1)];
         TrackedChange {
             parameter: key.name.clone(),
@@ -465,12 +470,12 @@ fn changed(key: &Told, course: &Course, together: &[Course], times: &[f64]) -> V
             log: c.at,
         }
     });
-    told.collect()
+    reported.collect()
 }
 
 /// One parameter over time.
 fn tracked(
-    key: &Told,
+    key: &OneEstimate,
     course: &Course,
     estimates: &[LogEstimate],
     times: &[f64],
@@ -482,8 +487,8 @@ fn tracked(
             .collect()
     };
     let of_log = |of: fn(&LogEstimate) -> f64| -> Vec<Option<f64>> {
-        let told = |e: &LogEstimate| e.variance.is_finite().then(|| of(e));
-        estimates.iter().map(told).collect()
+        let determined = |e: &LogEstimate| e.variance.is_finite().then(|| of(e));
+        estimates.iter().map(determined).collect()
     };
     TrackedParameter {
         name: key.name.clone(),

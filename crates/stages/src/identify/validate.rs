@@ -80,7 +80,7 @@ impl Validated {
 
 /// Which inputs hold rows that a model was made from.
 ///
-/// Told by checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
+/// OneEstimate by checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
 /// model was fitted to into an unseen one.
 pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
     let held_out = |made: &Provenance| made.role == Some(DataRole::HeldOut);
@@ -151,7 +151,7 @@ pub fn validate(
         found.warnings.insert(0, text);
     }
     match &reach {
-        Some(reach) => found.warnings.extend(reach.told()),
+        Some(reach) => found.warnings.extend(reach.in_words()),
         None if file.is_some() => found.warnings.push(NO_BAND.to_owned()),
         None => {}
     }
@@ -358,7 +358,7 @@ fn reconstruct(
                     row(r, origin)
                 })
                 .map_err(|e| open.ended(e))?;
-            warnings.extend(open.told(&summary));
+            warnings.extend(open.in_words(&summary));
             inputs.push(open.provenance()?);
             last = Some(summary);
         } else {

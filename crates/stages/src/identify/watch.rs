@@ -63,7 +63,7 @@ pub struct WatchLine<'a> {
 pub struct WatchedJoint {
     pub joint: String,
     pub unit: String,
-    /// Least and greatest threshold over the ranges of speed, where the logs of the fit tell the parameters \[unit\].
+    /// Least and greatest threshold over the ranges of speed, where the logs of the fit determine the parameters \[unit\].
     pub threshold: [f64; 2],
     /// Force at `Watched::point` that the least threshold stands for [N]; null where the joint has no lever there.
     pub force_n: Option<f64>,
@@ -79,7 +79,7 @@ const BLIND: f64 = 0.5;
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Watched {
     pub joints: Vec<WatchedJoint>,
-    /// The point that forces are told at.
+    /// The point that forces are reported at.
     pub point: String,
     /// False alarms an hour that were asked for.
     pub false_alarms_per_hour: f64,

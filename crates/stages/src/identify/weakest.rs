@@ -1,4 +1,4 @@
-//! Which combination of the parameters the data tell least about.
+//! Which combination of the parameters the data determine least.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use schemars::JsonSchema;
@@ -8,7 +8,7 @@ use super::unknowns::FittedUnknown;
 use cft_ident_core::inertia::solve::Fit;
 
 /// Parts below this share of a direction of norm 1 are left out.
-const LEAST: f64 = 0.1;
+const MIN_PART: f64 = 0.1;
 
 /// A parameter's part in the least certain combination of columns, each scaled to norm 1.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -39,7 +39,7 @@ pub(super) fn weakest(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<WeakestPart>
     parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.cmp(&b.0)));
     // an eigenvector has no sign of its own
     let sign = parts.first().map_or(1.0, |p| p.1.signum());
-    let large = parts.into_iter().take_while(|(_, x)| x.abs() > LEAST);
+    let large = parts.into_iter().take_while(|(_, x)| x.abs() > MIN_PART);
     let part = |(i, x): (usize, f64)| WeakestPart {
         parameter: unknowns[i].key.clone(),
         joint: unknowns[i].joint.clone(),

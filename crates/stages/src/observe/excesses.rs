@@ -6,9 +6,9 @@ use cft_ident_files::config::held_out::{Excesses, HeldOut};
 /// Samples of a period of the cut-off that are kept.
 pub const KEPT: f64 = 20.0;
 /// Clusters from which on a law of excesses has a shape.
-const SHAPED: usize = 50;
+const MIN_CLUSTERS_WITH_SHAPE: usize = 50;
 /// Clusters that a level has, if it can.
-const ENOUGH: usize = 40;
+const USUAL_CLUSTERS: usize = 40;
 /// Levels to try: shares of the samples below.
 const LEVELS: [f64; 6] = [0.995, 0.99, 0.98, 0.96, 0.93, 0.9];
 /// Peaks that are kept at most.
@@ -16,7 +16,7 @@ const PEAKS: usize = 256;
 /// Share of the external torques' mean square that the parameters' deviation leaves at least.
 const LEFT: f64 = 0.04;
 /// Samples that a deviation of its own takes.
-const LEAST: usize = 40;
+const MIN_SAMPLES: usize = 40;
 
 /// Time without an excess that ends a cluster or an alarm \[s\].
 pub fn hold_s(cutoff_hz: f64) -> f64 {
@@ -55,7 +55,7 @@ impl Quiet {
         self.samples.push(sample);
     }
 
-    /// Completes what was held out with deviations of external torques, and tells their excesses; none where there
+    /// Completes what was held out with deviations of external torques, and returns their excesses; none where there
     /// are too few samples.
     pub fn learn(
         &self,
@@ -63,7 +63,7 @@ impl Quiet {
         cutoff_hz: f64,
         position_cutoff_hz: f64,
     ) -> Option<Excesses> {
-        if self.samples.len() < LEAST {
+        if self.samples.len() < MIN_SAMPLES {
             return None;
         }
         for (j, held) in held.iter_mut().enumerate() {
@@ -84,7 +84,7 @@ impl Quiet {
             let (all, count) = squares(None);
             let all = (all / count as f64).sqrt().max(f64::MIN_POSITIVE);
             let each = (0..=held.speed_edges.len()).map(|range| match squares(Some(range)) {
-                (sum, count) if count >= LEAST && sum > 0.0 => (sum / count as f64).sqrt(),
+                (sum, count) if count >= MIN_SAMPLES && sum > 0.0 => (sum / count as f64).sqrt(),
                 _ => all,
             });
             held.external_std = each.collect();
@@ -110,7 +110,9 @@ impl Quiet {
                 (level, self.peaks(&sizes, level, hold_s(cutoff_hz)))
             })
             .collect();
-        let enough = tried.iter().find(|(_, peaks)| peaks.len() >= ENOUGH);
+        let enough = tried
+            .iter()
+            .find(|(_, peaks)| peaks.len() >= USUAL_CLUSTERS);
         let most = || tried.iter().max_by_key(|(_, peaks)| peaks.len());
         let (level, peaks) = enough.or_else(most)?;
         if peaks.is_empty() || *level <= 0.0 {
@@ -164,7 +166,7 @@ fn pareto(mut x: Vec<f64>) -> (f64, f64) {
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
     let mean = mean.max(1e-6);
-    if x.len() < SHAPED {
+    if x.len() < MIN_CLUSTERS_WITH_SHAPE {
         return (mean, 0.0);
     }
     let above = |(i, x): (usize, &f64)| (n - 1.0 - i as f64) / (n - 1.0) * x;

@@ -88,7 +88,7 @@ impl Sums {
 }
 
 impl Explainer {
-    /// Nothing yet; rows are taken two a period of the cut-off, as nearer ones tell the same.
+    /// Nothing yet; rows are taken two a period of the cut-off, as nearer ones say the same.
     pub fn new(robot: Robot, cutoff_hz: f64) -> Self {
         let n = robot.joints();
         Self {

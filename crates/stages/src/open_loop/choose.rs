@@ -20,9 +20,9 @@ pub const BLOCKS: usize = 4;
 /// Shortest windows that are tried \[s\]; the next are twice as long each.
 const SHORTEST_S: f64 = 0.25;
 /// Share of the error on blocks set aside that friction must take away to be added.
-const PAYS: f64 = 0.1;
+const MIN_GAIN: f64 = 0.1;
 /// Least samples of a window.
-const LEAST: usize = 20;
+const MIN_WINDOW_SAMPLES: usize = 20;
 /// Every sample of a block set aside.
 const ALL: usize = usize::MAX;
 
@@ -113,8 +113,8 @@ pub fn fit_axis(
     let block_s = block_s.fold(0.0, f64::max);
     let dt = stretches.iter().map(|s| s.dt).fold(0.0, f64::max);
     let shortest = window.unwrap_or(SHORTEST_S);
-    if shortest > block_s || shortest < LEAST as f64 * dt {
-        let window_s = shortest.max(LEAST as f64 * dt);
+    if shortest > block_s || shortest < MIN_WINDOW_SAMPLES as f64 * dt {
+        let window_s = shortest.max(MIN_WINDOW_SAMPLES as f64 * dt);
         return Err(AxisError::TooShort { window_s, block_s });
     }
     let doubled = std::iter::successors(Some(shortest), |s| Some(2.0 * s));
@@ -149,7 +149,7 @@ pub fn fit_axis(
         let best = scores
             .filter_map(|(i, e)| Some((i, (*e)?)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((i, error)) = best.filter(|(_, e)| *e < (1.0 - PAYS) * score.0) else {
+        let Some((i, error)) = best.filter(|(_, e)| *e < (1.0 - MIN_GAIN) * score.0) else {
             break;
         };
         tried[first + i].taken = true;
@@ -209,7 +209,9 @@ impl Trial<'_> {
         let at = |of: &Stretch, b: usize| b * (of.len() - 1) / BLOCKS;
         let each = self.stretches.iter().enumerate();
         let spans = each.map(|(s, of)| (s, at(of, block), at(of, block + 1) + 1));
-        spans.filter(|(_, from, to)| to - from >= LEAST).collect()
+        spans
+            .filter(|(_, from, to)| to - from >= MIN_WINDOW_SAMPLES)
+            .collect()
     }
 
     /// What is before and behind one of the blocks.
@@ -218,7 +220,8 @@ impl Trial<'_> {
             .block(block)
             .into_iter()
             .flat_map(|(s, from, to)| [(s, 0, from + 1), (s, to - 1, self.stretches[s].len())]);
-        out.filter(|(_, from, to)| to - from >= LEAST).collect()
+        out.filter(|(_, from, to)| to - from >= MIN_WINDOW_SAMPLES)
+            .collect()
     }
 
     /// Which numbers of a model may move.
@@ -288,7 +291,7 @@ impl Trial<'_> {
         Ok((error, length))
     }
 
-    /// The model with one more effect: friction that is a law of speed, each from the shape that the torques tell best.
+    /// The model with one more effect: friction that is a law of speed, each from the shape that the torques determine best.
     fn rivals(&self, model: &AugmentedModel) -> Vec<AugmentedModel> {
         let of_speed = |law: &&&Law| {
             let entry = law.entry;

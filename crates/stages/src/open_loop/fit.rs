@@ -26,7 +26,7 @@ const MOST_SAMPLES: usize = 500_000;
 /// Positions of a window that count.
 pub(super) const POSITIONS: usize = 50;
 /// Most steps that are tried.
-const MOST: usize = 40;
+const MAX_STEPS: usize = 40;
 /// Share of the cost below which a step brings nothing.
 const SETTLED: f64 = 1e-4;
 const DAMPING: StepControl = StepControl::damping(6.0, 4.0, [1e-6, 1e8]);
@@ -152,7 +152,7 @@ pub(super) fn fit(
     let x = numbers(start);
     let begun = DVector::from_vec(along(&x)?);
     let begun = point(x, begun)?;
-    let found = descend(begun, &DAMPING, MOST, &mut |at: &At, damping| {
+    let found = descend(begun, &DAMPING, MAX_STEPS, &mut |at: &At, damping| {
         let mut normal = at.slopes.tr_mul(&at.slopes);
         let target = at.slopes.tr_mul(&at.errors);
         for i in 0..free.len() {

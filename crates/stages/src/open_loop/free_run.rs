@@ -17,9 +17,9 @@ pub const FREE_RUN_S: f64 = 0.5;
 /// Longest step of the simulation \[s\].
 const STEP_S: f64 = 1e-3;
 /// Windows that are simulated; of longer logs they are spread all along.
-const MOST: usize = 60;
+const MAX_WINDOWS: usize = 60;
 /// Windows below which nothing is compared.
-const LEAST: usize = 4;
+const MIN_WINDOWS: usize = 4;
 /// Where in a window its error is looked at, as shares of its length.
 const SHARES: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 
@@ -111,7 +111,7 @@ pub fn free_run(
     spans: &[RunSpan],
 ) -> Option<FreeRun> {
     let windows = windows(stretches, spans);
-    if windows.len() < LEAST {
+    if windows.len() < MIN_WINDOWS {
         return None;
     }
     let models: Vec<&AugmentedModel> = std::iter::once(given).chain(after).collect();
@@ -153,7 +153,7 @@ fn windows(stretches: &[Stretch], spans: &[RunSpan]) -> Vec<RunSpan> {
             begin += size - 1;
         }
     }
-    let count = all.len().min(MOST);
+    let count = all.len().min(MAX_WINDOWS);
     (0..count).map(|i| all[i * all.len() / count]).collect()
 }
 
@@ -217,7 +217,7 @@ fn change(before: &[Sums], after: &[Sums]) -> Option<PositionErrorChange> {
     let pairs = before.iter().zip(after);
     let changes: Vec<f64> = pairs.map(|(a, b)| b.rms() - a.rms()).collect();
     let n = changes.len() as f64;
-    if changes.len() < LEAST {
+    if changes.len() < MIN_WINDOWS {
         return None;
     }
     let value = changes.iter().sum::<f64>() / n;
@@ -286,8 +286,8 @@ mod tests {
         );
         let long = [stretch(100)];
         let found = windows(&long, &[(0, 0, long[0].len())]);
-        assert_eq!(found.len(), MOST);
-        assert!(found[MOST - 1].1 > 40_000);
+        assert_eq!(found.len(), MAX_WINDOWS);
+        assert!(found[MAX_WINDOWS - 1].1 > 40_000);
     }
 
     #[test]

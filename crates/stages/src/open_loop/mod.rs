@@ -3,8 +3,8 @@
 //!
 //! M(q) a = tau - C v - G - F(v) - effects. One step takes smooth friction implicitly (Rosenbrock's method with
 //! dF/dv), and friction that jumps at rest as an impulse of at most Fc dt against the motion, joint after joint
-//! until all agree (Moreau 1988): a joint that rests stays at rest, however long the step. A model is told by it
-//! where torques alone hardly tell: errors of slow friction and of gravity add up.
+//! until all agree (Moreau 1988): a joint that rests stays at rest, however long the step. A motion judges a model
+//! where torques alone hardly do: errors of slow friction and of gravity add up.
 //!
 //! [`free_run`] says how the error grows in windows, and whether a changed model runs worse. [`fit_axis`] moves the
 //! numbers of a single axis until its motion is that of the log.

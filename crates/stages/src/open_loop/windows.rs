@@ -10,7 +10,7 @@ use cft_ident_core::motion::Stretch;
 /// Longest step of the simulation \[s\].
 const STEP_S: f64 = 2.5e-4;
 /// Least window, in samples.
-const LEAST: usize = 4;
+const MIN_WINDOW_SAMPLES: usize = 4;
 
 /// How long windows are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
             WindowLength::Whole => stretch.len(),
             WindowLength::Seconds(s) => (s / stretch.dt).round() as usize + 1,
         };
-        if size < LEAST {
+        if size < MIN_WINDOW_SAMPLES {
             continue;
         }
         // where the model's torque comes late, the torque that moves it at t is logged later

@@ -89,7 +89,7 @@ pub enum Setting {
     Names(Vec<String>),
 }
 
-/// Another reading that the data do not tell from this one.
+/// Another reading that the data do not distinguish from this one.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Alternative {
     pub kind: FindingKind,
@@ -142,8 +142,8 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// As it is told: what is wrong, what to write, and what these data say as well.
-    pub fn told(&self) -> String {
+    /// As it is reported: what is wrong, what to write, and what these data say as well.
+    pub fn in_words(&self) -> String {
         let mut out = self.meaning.clone();
         if !self.remedy.is_empty() {
             out += &format!("; write {}", self.remedy);
@@ -220,7 +220,7 @@ impl Finding {
 }
 
 impl FrictionPower {
-    /// As it is told.
+    /// As it is reported.
     pub fn sentence(&self) -> String {
         let watts = |x: f64| match x.abs() < 0.01 {
             true => format!("{x:.2e}"),

@@ -6,7 +6,7 @@ use cft_ident_core::judge::LogRows;
 /// Numbers of a joint in a row.
 const OF_JOINT: usize = 6;
 
-/// Rows of smoothed motion and torque. Of motors behind a linkage they are what the channels have: it is to be told
+/// Rows of smoothed motion and torque. Of motors behind a linkage they are what the channels have: it is to be reported
 /// which of them belong to no pose.
 #[derive(Debug, Clone, Default)]
 pub struct Sample {

@@ -25,7 +25,7 @@ pub struct Found {
     pub sure: bool,
     /// Readings that fit alike are of other joints: these data cannot tell.
     pub open: bool,
-    /// Other readings that these data do not tell from it.
+    /// Other readings that these data do not distinguish from it.
     pub tied: Vec<Change>,
     /// Joints of them that move in proportion.
     pub together: Option<[usize; 2]>,
@@ -95,7 +95,7 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
     out
 }
 
-type Told = Option<(SetupEstimate, [Vec<f64>; 2])>;
+type OneEstimate = Option<(SetupEstimate, [Vec<f64>; 2])>;
 
 struct Look<'a> {
     problem: &'a Problem<'a>,
@@ -126,7 +126,7 @@ impl Look<'_> {
         }
     }
 
-    fn round(&self, base: &Correction, declared: Option<&Judged>) -> (Option<Found>, Told) {
+    fn round(&self, base: &Correction, declared: Option<&Judged>) -> (Option<Found>, OneEstimate) {
         let moving = self.problem.channels_that_move();
         let (mut doubt, mut turned) = (moving.clone(), 0);
         if let Some(d) = declared {
@@ -210,7 +210,7 @@ impl Look<'_> {
             .collect()
     }
 
-    /// Whether the data tell the factor of a hypothesis: any that is far off frees a joint from all others.
+    /// Whether the data determine the factor of a hypothesis: any that is far off frees a joint from all others.
     fn has_a_factor(&self, base: &Correction, judged: &Judged, declared: Option<&Judged>) -> bool {
         let trial = &judged.trial;
         let seen = match declared {
@@ -246,7 +246,7 @@ impl Look<'_> {
             .collect()
     }
 
-    /// The reading of the list that is told, if any. `fitted` is the best value that is on no list.
+    /// The reading of the list that is reported, if any. `fitted` is the best value that is on no list.
     fn decide(
         &self,
         declared: Option<&Judged>,
@@ -289,7 +289,7 @@ impl Look<'_> {
             if compared.harms || !(mended || likely && own) {
                 return None;
             }
-            // physics alone tells where no error changes
+            // physics alone shows where no error changes
             if !compared.better.is_empty() {
                 seen = compared.better;
             }
@@ -358,7 +358,7 @@ impl Look<'_> {
         }
     }
 
-    /// The first reading, or another factor of its channel that the blocks do not tell from it and that people write
+    /// The first reading, or another factor of its channel that the blocks do not distinguish from it and that people write
     /// more often.
     fn plainer<'j>(&self, order: &[&'j Judged]) -> Option<&'j Judged> {
         let best = *order.first()?;

@@ -7,6 +7,7 @@
 mod arms;
 mod blocks;
 mod figures;
+mod formulas;
 mod tables;
 
 use std::path::Path;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::arms;
+use super::{arms, formulas};
 use cft_ident::number::{percent, significant, value_and_std};
 use cft_ident::report::usual::{Measured, Over, PUBLISHED, Published};
 use serde_json::Value;
@@ -24,6 +24,7 @@ pub fn render(words: &[&str]) -> Rendered {
         ["arm-errors", names @ ..] => arms::errors(names),
         ["arm-friction", names @ ..] => arms::friction(names),
         ["arm-parameters", names @ ..] => arms::named(names),
+        ["formulas", names @ ..] => formulas::found(names),
         ["usual"] => Ok(usual()),
         ["left-out", result] => Ok(left_out(&json(result)?)),
         ["replay", result] => Ok(replay(&json(result)?)),

@@ -1,6 +1,7 @@
 //! What a diagnosis is given: a model, logs, what is known and open, and what the user asks for.
 
 use super::data_split::LogRole;
+use super::formula_numbers::FormulaNumbers;
 use super::prior::ParameterPrior;
 use super::unknowns::FreeParameters;
 use crate::effect::{AugmentedModel, Law};
@@ -37,6 +38,8 @@ pub struct Case {
     pub wishes: Wishes,
     /// What decides.
     pub numbers: Numbers,
+    /// What decides on formulas.
+    pub formula: FormulaNumbers,
 }
 
 /// What the user asks for besides.
@@ -46,6 +49,31 @@ pub struct Wishes {
     pub cautious: bool,
     /// Effects that are written whatever the judge says: name, and joint where it is of one.
     pub accepted: Vec<(String, Option<String>)>,
+    /// A formula of what is left is looked for.
+    pub search: bool,
+}
+
+impl Wishes {
+    /// Whether it is the formula that is searched, of some joint: `formula:JOINT`.
+    pub fn is_formula(&self, (name, _): &(String, Option<String>)) -> bool {
+        self.search && name == FORMULA
+    }
+
+    /// Whether the formula of a joint is to be written.
+    pub fn wants_formula(&self, joint: &str) -> bool {
+        let own = |w: &&(String, Option<String>)| w.1.as_deref() == Some(joint);
+        self.accepted.iter().filter(own).any(|w| self.is_formula(w))
+    }
+}
+
+/// As the user calls a formula that was searched.
+const FORMULA: &str = "formula";
+
+/// Name of the formula of a joint.
+pub fn formula_name(joint: &str) -> String {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+    let plain = joint.chars().map(|c| if is_name(c) { c } else { '_' });
+    format!("formula-{}", plain.collect::<String>())
 }
 
 impl Case {

@@ -4,6 +4,7 @@
 pub mod case;
 pub mod data_split;
 pub mod fit;
+pub mod formula_numbers;
 pub mod pass;
 pub mod prior;
 pub(crate) mod rests;

@@ -17,6 +17,8 @@ use crate::judge::{BlockSums, Bound, Term, TimeBlock};
 use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::model::JointFriction;
 
+/// Channels that are filtered side by side.
+const LANES: usize = 8;
 /// Samples of a window besides its lead.
 const WINDOW: usize = 16_384;
 /// Samples before a window from which memory runs, and behind it.
@@ -278,7 +280,6 @@ impl<'a> Window<'a> {
     ) -> Result<DMatrix<f64>, MotionError> {
         let (model, part) = (self.model, &self.part);
         let scene = self.scene();
-        let late = model.shift(j) / part.dt;
         let mut friction = friction_columns(&model.model.friction[j], &part.v[j]);
         let mut raw: Vec<Vec<f64>> = Vec::new();
         for i in &unknowns.columns[j] {
@@ -293,31 +294,131 @@ impl<'a> Window<'a> {
             raw.extend(candidate.columns(&scene, j));
         }
         let mut hat = self.torques.hat[j].clone();
+        let late = model.shift(j) / part.dt;
         raw.iter_mut().for_each(|column| shifted(column, late));
         shifted(&mut hat, late);
         let tau = &part.tau[j];
         raw.push(tau.clone());
         raw.push(tau.iter().zip(&hat).map(|(tau, hat)| tau - hat).collect());
-        let parallel = self.data.filters.of(&self.data.stretches[self.stretch]);
-        if model.model.friction[j] != JointFriction::None {
-            // both sides of the model, where the joint stands or turns, weigh nothing before any filter
-            let weights = parallel.weights(part, j, self.data.rest_speed[j]);
-            for column in &mut raw {
-                column.iter_mut().zip(&weights).for_each(|(x, w)| *x *= w);
-            }
-        }
-        let (skip, count) = (self.range.start - self.begin, self.range.len());
-        let mut out = DMatrix::zeros(count, raw.len());
-        for (first, group) in raw.chunks(8).enumerate().map(|(g, group)| (8 * g, group)) {
-            let channels: Vec<&[f64]> = group.iter().map(Vec::as_slice).collect();
-            for (l, rows) in parallel.run(&channels)?.into_iter().enumerate() {
-                let kept = rows.iter().skip(skip).take(count);
-                let column = out.column_mut(first + l);
-                column.into_iter().zip(kept).for_each(|(out, x)| *out = *x);
+        let weights = self.weights(j);
+        let mut out = DMatrix::zeros(self.range.len(), raw.len());
+        for (first, group) in raw.chunks_mut(LANES).enumerate() {
+            for (l, rows) in self.kept(group, &weights)?.into_iter().enumerate() {
+                out.column_mut(LANES * first + l).copy_from_slice(&rows);
             }
         }
         Ok(out)
     }
+
+    /// Weights of the samples of a joint; none where all weigh the same.
+    fn weights(&self, j: usize) -> Vec<f64> {
+        match self.model.model.friction[j] {
+            JointFriction::None => Vec::new(),
+            // both sides of the model, where the joint stands or turns, weigh nothing before any filter
+            _ => {
+                let parallel = self.data.filters.of(&self.data.stretches[self.stretch]);
+                parallel.weights(&self.part, j, self.data.rest_speed[j])
+            }
+        }
+    }
+
+    /// The rows that are wanted of some channels of weighed samples.
+    fn kept(&self, raw: &mut [Vec<f64>], weights: &[f64]) -> Result<Vec<Vec<f64>>, MotionError> {
+        for column in raw.iter_mut() {
+            column.iter_mut().zip(weights).for_each(|(x, w)| *x *= w);
+        }
+        let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
+        let parallel = self.data.filters.of(&self.data.stretches[self.stretch]);
+        let (skip, count) = (self.range.start - self.begin, self.range.len());
+        let own = |rows: Vec<f64>| {
+            let mut kept: Vec<f64> = rows.into_iter().skip(skip).take(count).collect();
+            kept.resize(count, 0.0);
+            kept
+        };
+        Ok(parallel.run(&channels)?.into_iter().map(own).collect())
+    }
+
+    /// Rows of more columns of one joint, each made of series along the scene.
+    fn made(&self, j: usize, more: &Made) -> Result<Vec<Vec<f64>>, MotionError> {
+        let series = (more.series)(&self.scene());
+        let weights = self.weights(j);
+        let late = self.model.shift(j) / self.part.dt;
+        let groups: Vec<usize> = (0..more.count).step_by(LANES).collect();
+        let rows = groups.into_par_iter().map(|first| {
+            let own = first..(first + LANES).min(more.count);
+            let mut raw: Vec<Vec<f64>> = own.map(|i| (more.column)(&series, i)).collect();
+            raw.iter_mut().for_each(|column| shifted(column, late));
+            self.kept(&mut raw, &weights)
+        });
+        Ok(rows.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+}
+
+/// Columns that are made of series along a scene.
+pub struct Made<'a> {
+    pub series: &'a (dyn Fn(&Scene) -> Vec<Vec<f64>> + Sync),
+    pub column: &'a (dyn Fn(&[Vec<f64>], usize) -> Vec<f64> + Sync),
+    pub count: usize,
+}
+
+/// Rows of one joint.
+#[derive(Debug, Clone, Default)]
+pub struct RowsOfJoint {
+    /// Of unknowns, of candidates, the torque and the residual.
+    pub declared: DMatrix<f64>,
+    pub more: DMatrix<f64>,
+    /// Rows of each block.
+    pub blocks: Vec<Range<usize>>,
+}
+
+/// About `most` rows of one joint in blocks, with more columns.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn joint_rows(
+    model: &AugmentedModel,
+    (unknowns, candidates): (&Unknowns, &[Candidate]),
+    (data, blocks): (&Data, &[TimeBlock]),
+    (j, most): (usize, usize),
+    more: &Made,
+) -> Result<RowsOfJoint, MotionError> {
+    let moving = |(s, _): &&(usize, Range<usize>)| !data.split.is_stationary(*s, j);
+    let pieces = blocks.iter().flat_map(|b| &b.pieces).filter(moving);
+    let all: usize = pieces.map(|(_, rows)| rows.len()).sum();
+    let every = all.div_ceil(most).max(1);
+    // of each block: columns of its rows, piece by piece
+    let mut found: Vec<Vec<Vec<f64>>> = vec![Vec::new(); blocks.len()];
+    for (stretch, range) in windows(data, blocks) {
+        if data.split.is_stationary(stretch, j) {
+            continue;
+        }
+        let window = Window::of(model, data, stretch, &range);
+        let mut regressor = regressor(model, unknowns, &window.part);
+        let own = window.rows_of(j, unknowns, candidates, &mut regressor[j])?;
+        let made = window.made(j, more)?;
+        for (block, out) in blocks.iter().zip(&mut found) {
+            for (_, piece) in block.pieces.iter().filter(|(s, _)| *s == stretch) {
+                let (from, to) = (piece.start.max(range.start), piece.end.min(range.end));
+                for row in (from.next_multiple_of(every)..to).step_by(every) {
+                    let k = row - range.start;
+                    let made = made.iter().map(|column| column[k]);
+                    out.push(own.row(k).iter().copied().chain(made).collect());
+                }
+            }
+        }
+    }
+    let mut out = RowsOfJoint::default();
+    let mut begin = 0;
+    for block in &found {
+        out.blocks.push(begin..begin + block.len());
+        begin += block.len();
+    }
+    let rows: Vec<&Vec<f64>> = found.iter().flatten().collect();
+    let width = rows.first().map_or(0, |row| row.len());
+    let first = width.saturating_sub(more.count);
+    out.declared = DMatrix::from_fn(begin, first, |i, c| rows[i][c]);
+    out.more = DMatrix::from_fn(begin, width - first, |i, c| rows[i][first + c]);
+    Ok(out)
 }
 
 /// Regressor of the inertial parameters along a stretch, `[joint][parameter][sample]`; nothing where these are kept.

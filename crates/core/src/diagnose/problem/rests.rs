@@ -43,7 +43,7 @@ fn slow(v: &[f64]) -> f64 {
     STANDING * square.sqrt()
 }
 
-/// Rows in which each joint rests, as `validate` tells them, `[joint][row]`; none of joints without friction.
+/// Rows in which each joint rests, as `validate` finds them, `[joint][row]`; none of joints without friction.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.

@@ -30,10 +30,10 @@ pub struct Dependence {
 const BINS: [usize; 2] = [16, 6];
 /// Signals that are tried in pairs, the strongest.
 const PAIRED: usize = 6;
-/// Share of a residual's square below which a dependence is not worth telling.
+/// Share of a residual's square below which a dependence is not worth reporting.
 const LEAST_SHARE: f64 = 0.02;
-/// Chance above which a dependence is not told.
-const SURE: f64 = 0.01;
+/// Chance above which a dependence is not reported.
+const MAX_CHANCE: f64 = 0.01;
 /// Dependences reported of one joint.
 const TOLD: usize = 4;
 /// Part by which two signals must take up more than the better of them alone.
@@ -116,7 +116,7 @@ fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
         Signal::Direction,
         Signal::SinceReversal,
     ];
-    // before the time: what warms up steadily tells the same
+    // before the time: what warms up steadily says the same
     signals.extend((0..joints).filter(warm).map(Signal::Temperature));
     signals.push(Signal::Time);
     for i in (0..joints).filter(moving) {
@@ -159,7 +159,7 @@ fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
         let as_good = best.iter().filter(|b| **b >= own).count();
         let p_value = (1 + as_good) as f64 / (1 + draws) as f64;
         let share = (taken.real - taken.mean) / square;
-        if p_value > SURE || share < LEAST_SHARE {
+        if p_value > MAX_CHANCE || share < LEAST_SHARE {
             continue;
         }
         let mut of = of.clone();

@@ -30,7 +30,7 @@ pub struct JointEvidence {
 /// Bins over a quantity.
 const BINS: usize = 60;
 /// Rows that a bin needs.
-const LEAST: usize = 5;
+const MIN_ROWS_PER_BIN: usize = 5;
 /// Points of a spectrum: the fewest, the most, and how many a peak is wide.
 const SPECTRUM: usize = 240;
 const MOST_POINTS: usize = 2000;
@@ -38,7 +38,7 @@ const PEAK: f64 = 3.0;
 /// Over the highest order that was found, where its spectrum ends.
 const ABOVE: f64 = 1.25;
 /// Room between two logs on the axis of time, over the time of all.
-const APART: f64 = 0.02;
+const GAP_BETWEEN_LOGS: f64 = 0.02;
 /// Rows that a spectrum is made of, about.
 const ROWS: usize = 4000;
 
@@ -139,7 +139,7 @@ pub fn evidence(
 pub fn one_after_the_other(stretches: &[&Stretch]) -> Vec<f64> {
     let ends = |s: &Stretch| s.t.first().copied().zip(s.t.last().copied());
     let lasts = |s: &&Stretch| ends(s).map_or(0.0, |(from, to)| to - from);
-    let apart = APART * stretches.iter().map(lasts).sum::<f64>();
+    let apart = GAP_BETWEEN_LOGS * stretches.iter().map(lasts).sum::<f64>();
     let (mut log, mut late, mut end) = (None, 0.0, None);
     let of = |stretch: &&Stretch| {
         let (from, to) = ends(stretch).unwrap_or_default();
@@ -197,7 +197,7 @@ fn binned(x: &[f64], e: &[f64], v: &[f64], wanted: &dyn Fn(f64) -> bool) -> Line
     sums.iter()
         .enumerate()
         .map(|(i, (sum, count))| {
-            let y = if *count < LEAST {
+            let y = if *count < MIN_ROWS_PER_BIN {
                 f64::NAN
             } else {
                 sum / *count as f64
@@ -255,7 +255,7 @@ mod tests {
             stretch(2, 90.0),
         ];
         let late = one_after_the_other(&all.each_ref());
-        let apart = APART * 40.0;
+        let apart = GAP_BETWEEN_LOGS * 40.0;
         let expected = [0.0, 0.0, 25.0 + apart, 35.0 + 2.0 * apart - 90.0];
         for (late, expected) in late.iter().zip(expected) {
             assert!((late - expected).abs() < 1e-9, "{late} {expected}");

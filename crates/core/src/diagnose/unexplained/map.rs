@@ -23,7 +23,7 @@ const BINS: usize = 24;
 /// Part of the rows beyond each end.
 const BEYOND: f64 = 0.005;
 /// Least rows of a cell.
-const LEAST: f64 = 3.0;
+const MIN_ROWS_PER_CELL: f64 = 3.0;
 
 impl ResidualMap {
     /// Of a residual and two signals at the same rows. Rows of one block are not independent: the standard error is
@@ -53,7 +53,7 @@ impl ResidualMap {
                 *rows += 1.0;
             }
         }
-        let mean = |[sum, rows]: &[f64; 2]| (*rows >= LEAST).then(|| sum / rows);
+        let mean = |[sum, rows]: &[f64; 2]| (*rows >= MIN_ROWS_PER_CELL).then(|| sum / rows);
         ResidualMap {
             signals,
             ends,

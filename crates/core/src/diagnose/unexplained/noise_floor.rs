@@ -246,7 +246,7 @@ fn power(x: &[f64]) -> f64 {
 }
 
 /// Blocks below which their spread says nothing of the median's error.
-const FEW: usize = 8;
+const MIN_BLOCKS: usize = 8;
 
 /// Median of blocks with its standard error, as if they were normal between their quartiles; of few blocks it
 /// is no more than an order of magnitude.
@@ -258,7 +258,7 @@ struct Middle {
 
 impl Middle {
     /// Of powers with so many independent numbers in each: their median lies below their mean (Wilson and Hilferty
-    /// 1931), which is what is told. 0 of none.
+    /// 1931), which is what is reported. 0 of none.
     fn of(mut values: Vec<f64>, freedom: f64) -> Self {
         values.sort_by(f64::total_cmp);
         let n = values.len();
@@ -270,7 +270,7 @@ impl Middle {
         let spread = (at(0.75) - at(0.25)) / 1.349;
         let below = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
         let value = at(0.5) / below;
-        let error = match n < FEW {
+        let error = match n < MIN_BLOCKS {
             true => value,
             false => 1.2533 * spread / (n as f64).sqrt() / below,
         };

@@ -18,7 +18,7 @@ pub enum Signal {
 }
 
 /// A signal of joint `j` at rows, each of a stretch and a sample.
-pub(super) fn values(
+pub(in crate::diagnose) fn values(
     signal: Signal,
     j: usize,
     rows: &[(usize, usize)],

@@ -3,7 +3,7 @@
 //! The fit's R factor says how much the torques suffer for any parameters, so the nearest feasible
 //! ones are found on it, without reading a log again: least squares over ten free numbers a link
 //! ([`log_cholesky`]) and the logarithm of each drive's inertia, damped as Levenberg and Marquardt
-//! do. What torques do not tell is filled by a prior: the mass properties that the robot file gives,
+//! do. What torques do not determine is filled by a prior: the mass properties that the robot file gives,
 //! or a plain body, with a small weight in the same ten numbers.
 
 mod friction;
@@ -37,7 +37,7 @@ const SETTLED: f64 = 1e-6;
 /// Damping of the steps.
 const DAMPING: StepControl = StepControl::damping(5.0, 4.0, [1e-12, 1e12]);
 /// Most steps under each weight of the prior.
-const MOST: usize = 300;
+const MAX_STEPS: usize = 300;
 /// Weights of the prior on the way to [`PRIOR_WEIGHT`].
 const WEIGHTS: [f64; 7] = [1e4, 1e3, 100.0, 10.0, 1.0, 0.1, PRIOR_WEIGHT];
 /// A number changes by at most this in one step.
@@ -100,15 +100,15 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     // is consistent, where its numbers go to infinity and it hardly moves
     for weight in WEIGHTS {
         let at = |x: DVector<f64>| {
-            let (cost, jacobian, residual) = reduced.at(task.map, &x, &prior, weight);
-            (x, cost, jacobian, residual)
+            let (residual, slopes) = reduced.at(task.map, &x, &prior, weight);
+            (x, residual.norm_squared(), residual, slopes)
         };
         let found = descend(
             at(x),
             &DAMPING,
-            MOST,
-            &mut |(x, lowest, jacobian, residual), d| {
-                let step = damped_step(jacobian, residual, d);
+            MAX_STEPS,
+            &mut |(x, lowest, residual, slopes), d| {
+                let step = damped_step(&reduced.jacobian(slopes, weight), residual, d);
                 let next = at(x + step.map(|s| s.clamp(-FARTHEST, FARTHEST)));
                 Ok::<_, FitError>(match next.1 {
                     cost if cost < *lowest && lowest - cost <= SETTLED * cost => Trial::Last(next),
@@ -193,7 +193,9 @@ struct EliminatedFactor {
     order: Vec<usize>,
     free: usize,
     r: DMatrix<f64>,
-    effective: f64,
+    /// What standard parameters do to the rows of the mapped unknowns, and what those rows are to be.
+    rows: DMatrix<f64>,
+    target: DVector<f64>,
 }
 
 impl EliminatedFactor {
@@ -213,43 +215,49 @@ impl EliminatedFactor {
             row[u] = task.factor[(i, u)];
             factor.fold(&row);
         }
+        let (r, m) = (factor.r(), u - free);
+        let scale = task.effective.sqrt();
+        let chosen = task.map.matrix.select_rows(&order[free..]);
         EliminatedFactor {
+            rows: r.view((free, free), (m, m)) * scale * chosen,
+            target: r.view((free, u), (m, 1)).column(0) * scale,
             order,
             free,
-            r: factor.r(),
-            effective: task.effective,
+            r,
         }
     }
 
-    /// Cost, Jacobian and residual: data first, prior below.
+    /// Residual, data first, prior below, and the slopes of the standard parameters.
     fn at(
         &self,
         map: &StandardMap,
         x: &DVector<f64>,
         prior: &DVector<f64>,
         weight: f64,
-    ) -> (f64, DMatrix<f64>, DVector<f64>) {
-        let drives = map.drives.len();
-        let (s, slopes) = standard_at(x, map.links.len(), drives);
-        let u = self.order.len();
-        let m = u - self.free;
-        let chosen = map.matrix.select_rows(&self.order[self.free..]);
-        let block = self.r.view((self.free, self.free), (m, m)) * self.effective.sqrt();
-        let to_rows = block * chosen;
-        let target = self.r.view((self.free, u), (m, 1)) * self.effective.sqrt();
-        let off = &to_rows * s - target;
-        let data = to_rows * slopes;
-        let weight = weight.sqrt();
-        let n = x.len();
-        let mut jacobian = DMatrix::zeros(m + n, n);
-        jacobian.view_mut((0, 0), (m, n)).copy_from(&data);
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let (s, slopes) = standard_at(x, map.links.len(), map.drives.len());
+        let (m, n) = (self.target.len(), x.len());
         let mut residual = DVector::zeros(m + n);
-        residual.rows_mut(0, m).copy_from(&off);
-        for k in 0..n {
-            jacobian[(m + k, k)] = weight;
-            residual[m + k] = weight * (x[k] - prior[k]);
-        }
-        (residual.norm_squared(), jacobian, residual)
+        residual
+            .rows_mut(0, m)
+            .copy_from(&(&self.rows * s - &self.target));
+        residual
+            .rows_mut(m, n)
+            .copy_from(&((x - prior) * weight.sqrt()));
+        (residual, slopes)
+    }
+
+    /// Jacobian of the residual where the standard parameters have these slopes.
+    fn jacobian(&self, slopes: &DMatrix<f64>, weight: f64) -> DMatrix<f64> {
+        let (m, n) = (self.target.len(), slopes.ncols());
+        let mut jacobian = DMatrix::zeros(m + n, n);
+        jacobian
+            .view_mut((0, 0), (m, n))
+            .copy_from(&(&self.rows * slopes));
+        jacobian
+            .view_mut((m, 0), (n, n))
+            .fill_diagonal(weight.sqrt());
+        jacobian
     }
 
     /// All unknowns from the shared parameters of the map.

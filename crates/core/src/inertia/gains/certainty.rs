@@ -60,7 +60,7 @@ impl Solved {
     }
 }
 
-/// One block of time: its stretch, its score, and its weighted slopes in the directions that are told.
+/// One block of time: its stretch, its score, and its weighted slopes in the directions that are reported.
 struct Moment {
     stretch: usize,
     score: DVector<f64>,
@@ -100,7 +100,7 @@ fn moments(
     out
 }
 
-/// What keeps the rest of a log apart from singular where one stretch tells all of a direction.
+/// What keeps the rest of a log apart from singular where one stretch determines all of a direction.
 const LEFT: f64 = 1e-9;
 
 /// Covariance of all unknowns.

@@ -50,7 +50,7 @@ pub struct GainFit {
     /// Covariance of the logarithms of `channel`; without a payload that of their differences to the
     /// reference joint.
     pub covariance: DMatrix<f64>,
-    /// Whether the rows tell it of this joint: by itself with a payload, else beside the reference.
+    /// Whether the rows determine it of this joint: by itself with a payload, else beside the reference.
     pub determined: Vec<bool>,
     /// The joint beside which the others are determined, where there is no payload.
     pub reference: Option<usize>,

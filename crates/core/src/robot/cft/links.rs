@@ -2,7 +2,7 @@
 //!
 //! A pseudo-inertia holds all of a rigid body that its dynamics see: J = integral of p p^T dm with
 //! p = (x, y, z, 1) in the Denavit-Hartenberg frame of its link. Of the 80 numbers of eight links
-//! 22 combinations can be told apart from the outside, the base parameters.
+//! 22 combinations can be distinguished from the outside, the base parameters.
 
 use super::geometry::{D, D6, L4, L5, L6};
 use nalgebra::Matrix4;

@@ -1,4 +1,4 @@
-//! Base parameters: the combinations of standard parameters that torques can tell.
+//! Base parameters: the combinations of standard parameters that torques can determine.
 //!
 //! The columns of the standard regressor on random states are orthogonalised in a fixed order, from
 //! the base outward (the QR factorisation of Gautier 1990, without exchange of columns). A column

@@ -5,7 +5,7 @@
 //! | [`space`] | vectors and rotations |
 //! | [`links`] | links, joints, dependent coordinates |
 //! | [`newton_euler`] | the regressor of the standard parameters, one recursion |
-//! | [`base`] | which combinations of them torques can tell |
+//! | [`base`] | which combinations of them torques can determine |
 //! | [`pose`] | where the links are |
 //! | [`capsule`] | how far their shapes are from each other |
 //! | [`enclosing`] | a capsule about points |

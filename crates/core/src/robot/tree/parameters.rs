@@ -1,4 +1,4 @@
-//! The parameters of a tree as a fit can tell them, and what they multiply.
+//! The parameters of a tree as a fit can determine them, and what they multiply.
 //!
 //! tau = Y(q, v, a) theta + F(v) + offset, with theta the base parameters, and beside them the
 //! inertias, viscous and Coulomb friction that coupled gear trains share.

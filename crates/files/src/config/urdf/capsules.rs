@@ -76,7 +76,7 @@ impl UrdfChain {
     }
 }
 
-/// The capsules of a link with these shapes; what has none is told in `out`.
+/// The capsules of a link with these shapes; what has none is reported in `out`.
 fn of_link<'c>(
     link: &str,
     collisions: impl Iterator<Item = &'c Collision>,

@@ -113,7 +113,7 @@ fn stl(bytes: &[u8]) -> Result<Vec<Vector>, String> {
     let body = bytes.get(COUNT..).unwrap_or_default();
     let room = triangles.map(|n| n * TRIANGLE as u64);
     let start = bytes.trim_ascii_start().get(..5).unwrap_or_default();
-    // heads of binary files begin with this word too: then the length tells
+    // heads of binary files begin with this word too: then the length says
     if start.eq_ignore_ascii_case(b"solid") && room != Some(body.len() as u64) {
         let vertices = listed(bytes, "vertex")?;
         let last = bytes.trim_ascii_end().rsplit(|b| *b == b'\n').next();

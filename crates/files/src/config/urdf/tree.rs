@@ -355,7 +355,7 @@ fn notes(parts: &Parts, place: &Place) -> Vec<String> {
     });
     let impossible = parts.impossible.as_ref();
     let impossible = impossible.map(|text| format!("{}: {text}", place.file));
-    let told = parts.changes.told(place.file).into_iter();
+    let told = parts.changes.in_words(place.file).into_iter();
     told.chain(renamed).chain(impossible).collect()
 }
 

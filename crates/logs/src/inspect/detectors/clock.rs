@@ -8,7 +8,7 @@ pub(in crate::inspect) const GAP: f64 = 2.5;
 /// A step within this share of the median is even.
 const EVEN: f64 = 0.10;
 /// Long steps that are kept until the median is known.
-const MOST: usize = 1 << 16;
+const MAX_LONG_STEPS: usize = 1 << 16;
 
 /// What a row's time is to the row before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,14 +107,14 @@ impl LogClock {
 
     #[cold]
     fn note_long(&mut self, from: f64, to: f64) {
-        if self.long.len() == MOST {
+        if self.long.len() == MAX_LONG_STEPS {
             // The shorter half is the less likely to be gaps once the median is known.
             let mut lengths: Vec<f64> = self.long.iter().map(|[a, b]| b - a).collect();
             lengths.sort_by(f64::total_cmp);
-            let middle = lengths[MOST / 2];
+            let middle = lengths[MAX_LONG_STEPS / 2];
             self.long.retain(|[a, b]| b - a > middle);
         }
-        if self.long.len() < MOST {
+        if self.long.len() < MAX_LONG_STEPS {
             self.long.push([from, to]);
         }
     }

@@ -2,9 +2,9 @@
 //! reads that failed.
 
 /// A position that goes to such a number was no further from it than so many of its steps before, or of its smallest ones.
-const NEAR: f64 = 10.0;
+const USUAL_STEPS: f64 = 10.0;
 /// Rows that are remembered.
-const MOST: usize = 65_536;
+const MAX_ROWS: usize = 65_536;
 
 /// Looks for failed reads, row by row.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl FailedReads {
                 // no -0
                 self.value = one + 0.0;
             }
-            if self.times.len() < MOST {
+            if self.times.len() < MAX_ROWS {
                 self.times.push(t);
             }
             return true;
@@ -62,7 +62,8 @@ impl FailedReads {
     /// Whether a position cannot go to a number from where it was.
     fn far(&self, to: f64) -> bool {
         let pairs = self.before.iter().zip(&self.steps).zip(&self.grains);
-        let mut far = pairs.map(|((q, step), grain)| (q - to).abs() > NEAR * step.max(*grain));
+        let mut far =
+            pairs.map(|((q, step), grain)| (q - to).abs() > USUAL_STEPS * step.max(*grain));
         far.any(|far| far)
     }
 

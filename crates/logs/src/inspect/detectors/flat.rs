@@ -8,9 +8,9 @@
 use super::histogram::Histogram;
 
 /// Rows of one value from which a run is looked at.
-const SHORTEST: u64 = 3;
+const MIN_RUN_ROWS: u64 = 3;
 /// Runs that are kept, the longest.
-const MOST: usize = 4096;
+const MAX_RUNS: usize = 4096;
 /// Values next to an extreme that are counted.
 const LEVELS: usize = 8;
 
@@ -118,15 +118,15 @@ impl Flat {
         };
         let mut run = current.run;
         self.lengths.add(run.rows as f64);
-        if run.rows < SHORTEST.max(self.shortest) {
+        if run.rows < MIN_RUN_ROWS.max(self.shortest) {
             return;
         }
         run.exit = exit;
         run.travel = (current.high - current.low).max(0.0);
-        if self.runs.len() == MOST {
+        if self.runs.len() == MAX_RUNS {
             let mut rows: Vec<u64> = self.runs.iter().map(|run| run.rows).collect();
             rows.sort_unstable();
-            self.shortest = rows[MOST / 2] + 1;
+            self.shortest = rows[MAX_RUNS / 2] + 1;
             self.runs.retain(|run| run.rows >= self.shortest);
         }
         self.runs.push(run);
@@ -226,7 +226,7 @@ mod tests {
     fn the_longest_runs_are_kept_where_there_are_too_many() {
         let values = (0..60_000).map(|k| f64::from(k / if k < 30_000 { 3 } else { 6 }));
         let flat = fed(values);
-        assert!(flat.runs().len() <= MOST);
+        assert!(flat.runs().len() <= MAX_RUNS);
         assert!(
             flat.runs().iter().all(|run| run.rows == 6),
             "{:?}",

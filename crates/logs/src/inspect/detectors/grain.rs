@@ -60,7 +60,7 @@ pub(in crate::inspect) fn step<'w>(
 }
 
 /// Deviation of the noise that a moving channel carries, by its differences of order eight; `None`
-/// where it does not move long enough to tell.
+/// where it does not move long enough to say.
 pub(in crate::inspect) fn noise<'w>(
     windows: impl Iterator<Item = &'w Window>,
     channel: usize,

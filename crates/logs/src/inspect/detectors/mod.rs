@@ -8,6 +8,7 @@ pub(super) mod flat;
 pub(super) mod grain;
 pub(super) mod histogram;
 pub(super) mod repeats;
+pub(super) mod replays;
 pub(super) mod spike;
 pub(super) mod step;
 pub(super) mod turn;

@@ -9,9 +9,9 @@ use crate::inspect::fault::Episodes;
 /// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
 const LONGEST: usize = 20;
 /// Rows in motion that repeat, from which samples may have been held.
-const HELD: u64 = 50;
+const MIN_HELD_ROWS: u64 = 50;
 /// Runs that are kept.
-const MOST: usize = 1 << 18;
+const MAX_RUNS: usize = 1 << 18;
 /// Long runs that are kept.
 const LONG_RUNS: usize = 4096;
 /// Usual smallest steps that a joint goes from row to row where it moves.
@@ -128,7 +128,7 @@ impl Repeats {
         let long = self.rows > LONGEST;
         let full = match long {
             true => self.frozen.len() == LONG_RUNS || !self.identical,
-            false => self.runs.len() == MOST,
+            false => self.runs.len() == MAX_RUNS,
         };
         if full {
             return;
@@ -195,7 +195,7 @@ impl Repeats {
     /// every other row of those that change is one that was held.
     pub(in crate::inspect) fn hold(&self, repeated: u64) -> Option<usize> {
         let held = self.repeated();
-        let holds = repeated >= HELD && 2 * held >= self.changed;
+        let holds = repeated >= MIN_HELD_ROWS && 2 * held >= self.changed;
         let rows = 1.0 + held as f64 / self.changed.max(1) as f64;
         holds.then(|| rows.round() as usize)
     }

@@ -13,7 +13,7 @@ use super::histogram::Histogram;
 
 /// Rows of the median.
 const WIDTH: usize = 7;
-const HALF: usize = WIDTH / 2;
+const HALF_WIDTH: usize = WIDTH / 2;
 /// Rows to each side that are remembered of a spike.
 const REACH: usize = 5;
 /// Rows to each side in which a spike must stand alone.
@@ -23,7 +23,7 @@ const RING: usize = 64;
 /// Rows to each side by which a change of the speed is seen.
 const CHANGE: usize = 9;
 /// Spikes that are kept, the highest.
-const MOST: usize = 16_384;
+const MAX_SPIKES: usize = 16_384;
 /// A row may be a spike where it is off by so many times what nine rows of ten are.
 const SUSPECT: f64 = 3.0;
 const MOST_ROWS: f64 = 0.9;
@@ -35,8 +35,8 @@ pub(in crate::inspect) const SPIKE: f64 = 8.0;
 pub(in crate::inspect) const SPIKE_SHARE: f64 = 0.1;
 /// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
 /// smooth motion it does in the next rows too.
-const MOVES: f64 = 6.0;
-const ALONE: f64 = 3.0;
+const SPEED_CHANGES: f64 = 6.0;
+const MIN_RATIO_TO_NEIGHBOURS: f64 = 3.0;
 
 /// Rows of two sources by turns: the squared steps over two rows are less than this share of those over one.
 const ALTERNATES: f64 = 0.5;
@@ -141,7 +141,7 @@ impl Spikes {
             (value - before).powi(2),
         ];
         (self.steps.iter_mut().zip(sums)).for_each(|(sum, x)| *sum += x);
-        let centre = k - HALF;
+        let centre = k - HALF_WIDTH;
         let window = std::array::from_fn(|i| self.values[(k - i) % RING]);
         let difference = self.values[centre % RING] - median(window);
         self.differences[centre % RING] = difference;
@@ -152,7 +152,7 @@ impl Spikes {
                 self.changes_seen.add(change);
             }
         }
-        if centre >= HALF + AROUND {
+        if centre >= HALF_WIDTH + AROUND {
             self.judge(centre - AROUND, centre);
         }
     }
@@ -160,8 +160,8 @@ impl Spikes {
     /// The next row belongs to another stretch.
     pub(in crate::inspect) fn part(&mut self) {
         if self.count >= WIDTH {
-            let last = self.count - 1 - HALF;
-            for row in self.judged.max(HALF)..=last {
+            let last = self.count - 1 - HALF_WIDTH;
+            for row in self.judged.max(HALF_WIDTH)..=last {
                 self.judge(row, last);
             }
         }
@@ -232,12 +232,12 @@ impl Spikes {
         if row < CHANGE || row + CHANGE >= self.count || usual <= 0.0 {
             return false;
         }
-        let reach = CHANGE + HALF + 1;
+        let reach = CHANGE + HALF_WIDTH + 1;
         let from = row.saturating_sub(AROUND).max(CHANGE);
         let to = (row + AROUND).min(self.count - 1 - CHANGE);
         let beside = (from..=to).filter(|k| k.abs_diff(row) >= reach);
         let largest = beside.map(|k| self.change(k).abs()).fold(0.0, f64::max);
-        self.change(row).abs() > (MOVES * usual).max(ALONE * largest)
+        self.change(row).abs() > (SPEED_CHANGES * usual).max(MIN_RATIO_TO_NEIGHBOURS * largest)
     }
 
     /// Looks whether a row stands alone among those up to `last`.
@@ -252,8 +252,8 @@ impl Spikes {
 
     #[cold]
     fn judge_closely(&mut self, row: usize, last: usize, height: f64) {
-        let from = row.saturating_sub(AROUND).max(HALF);
-        let others = (from..=last.min(row + AROUND)).filter(|k| k.abs_diff(row) > HALF);
+        let from = row.saturating_sub(AROUND).max(HALF_WIDTH);
+        let others = (from..=last.min(row + AROUND)).filter(|k| k.abs_diff(row) > HALF_WIDTH);
         let high = others.filter(|k| self.differences[k % RING].abs() > 0.25 * height.abs());
         // A second spike may be near, a rough stretch may not.
         if high.count() > 3 {
@@ -265,10 +265,10 @@ impl Spikes {
         if self.lasts(row, height) && self.moves(row) {
             return;
         }
-        if self.found.len() == MOST {
+        if self.found.len() == MAX_SPIKES {
             let mut heights: Vec<f64> = self.found.iter().map(|s| s.height.abs()).collect();
             heights.sort_by(f64::total_cmp);
-            self.lowest = heights[MOST / 2];
+            self.lowest = heights[MAX_SPIKES / 2];
             self.found.retain(|spike| spike.height.abs() > self.lowest);
         }
         // as far as the cubic reaches, there are rows
@@ -331,7 +331,7 @@ fn median(mut x: [f64; WIDTH]) -> f64 {
         x[a] = low;
         x[b] = high;
     }
-    x[HALF]
+    x[HALF_WIDTH]
 }
 
 #[cfg(test)]

@@ -21,9 +21,9 @@ const BEYOND: [f64; 2] = [0.25, 2.0];
 /// Rows that are remembered.
 const RING: usize = 64;
 /// Rows that repeat all positions from which the robot is at rest.
-const REST: usize = 6;
+const MIN_ROWS_AT_REST: usize = 6;
 /// Leaps that are kept, the highest.
-const MOST: usize = 4096;
+const MAX_LEAPS: usize = 4096;
 /// Largest heights that may be leaps, over those of 99 % of the rows.
 const SUSPECT: f64 = 3.0;
 
@@ -153,10 +153,10 @@ impl Leaps {
         if near.filter(higher).any(|k| self.stays(k)) {
             return;
         }
-        if self.found.len() == MOST {
+        if self.found.len() == MAX_LEAPS {
             let mut heights: Vec<f64> = self.found.iter().map(|leap| leap.height.abs()).collect();
             heights.sort_by(f64::total_cmp);
-            self.lowest = heights[MOST / 2];
+            self.lowest = heights[MAX_LEAPS / 2];
             self.found.retain(|leap| leap.height.abs() > self.lowest);
         }
         self.found.push(Leap {
@@ -179,7 +179,7 @@ impl Leaps {
     }
 
     /// Height of a leap by five rows on each side, without `skip` rows next to it on each: what brings
-    /// them onto one parabola. `None` too near an end to tell.
+    /// them onto one parabola. `None` too near an end to say.
     fn level(&self, row: usize, skip: usize) -> Option<f64> {
         let from = row.saturating_sub(LEVEL + skip);
         let rows = (from..(row + LEVEL + skip).min(self.count))
@@ -285,7 +285,7 @@ impl FreshRows {
             self.last = t;
             return Freshness::Repeats;
         }
-        let rest = self.repeated >= REST;
+        let rest = self.repeated >= MIN_ROWS_AT_REST;
         self.repeated = 0;
         self.previous.copy_from_slice(positions);
         match rest {

@@ -1,15 +1,15 @@
 //! Positions that begin anew after their range: encoders of one turn, counters that overflow.
 
 /// Share of the travel from which a step may go through the end of the range.
-const LONG: f64 = 0.5;
+const LONG_STEP_SHARE: f64 = 0.5;
 /// Long steps that are kept.
-const MOST: usize = 1024;
+const MAX_LONG_STEPS: usize = 1024;
 /// Usual steps that a range is longer than.
 const COUNTS: f64 = 16.0;
 /// By how much the ranges that several steps tell may differ, as a share.
-const ALIKE: f64 = 0.02;
+const RANGE_AGREEMENT: f64 = 0.02;
 /// By how much a range may be off one that is usual, as a share.
-const NEAR: f64 = 0.02;
+const USUAL_RANGE_TOLERANCE: f64 = 0.02;
 
 /// A step that is long against the travel so far.
 #[derive(Debug, Clone, Copy)]
@@ -68,14 +68,14 @@ impl Turns {
         };
         let step = value - last;
         if let Some(mut waiting) = self.waiting.take()
-            && step.abs() < LONG * waiting.step.abs()
+            && step.abs() < LONG_STEP_SHARE * waiting.step.abs()
         {
             waiting.range -= 0.5 * step;
             self.keep(waiting);
         }
         // A spike goes and comes back: the motion before a turn's end is no leap.
-        let alone = before.abs() < LONG * step.abs();
-        if alone && step.abs() > LONG * (self.high - self.low) {
+        let alone = before.abs() < LONG_STEP_SHARE * step.abs();
+        if alone && step.abs() > LONG_STEP_SHARE * (self.high - self.low) {
             let range = step - 0.5 * before;
             self.waiting = Some(LongStep { t, step, range });
         }
@@ -84,10 +84,10 @@ impl Turns {
 
     #[cold]
     fn keep(&mut self, step: LongStep) {
-        let least = LONG * (self.high - self.low);
-        if self.long.len() == MOST {
+        let least = LONG_STEP_SHARE * (self.high - self.low);
+        if self.long.len() == MAX_LONG_STEPS {
             self.long.retain(|long| long.step.abs() > least);
-            self.full |= self.long.len() == MOST;
+            self.full |= self.long.len() == MAX_LONG_STEPS;
         }
         if !self.full {
             self.long.push(step);
@@ -103,14 +103,14 @@ impl Turns {
     /// The range, where the position goes through its end; `usual` are ranges that encoders have,
     /// `step` is a usual step from row to row.
     ///
-    /// All long steps must tell the same range, and everything must lie within it. One or two alone
+    /// All long steps must show the same range, and everything must lie within it. One or two alone
     /// are believed of a usual range only: a reference that was set anew leaps once, too.
     pub(in crate::inspect) fn wrapped(&self, usual: &[f64], step: f64) -> Option<Wrapped> {
         let travel = self.high - self.low;
         let long = || {
             self.long
                 .iter()
-                .filter(|long| long.step.abs() > LONG * travel)
+                .filter(|long| long.step.abs() > LONG_STEP_SHARE * travel)
         };
         let (first, last) = (long().next()?, long().next_back()?);
         let mut ranges: Vec<f64> = long().map(|long| long.range.abs()).collect();
@@ -119,9 +119,9 @@ impl Turns {
         let spread = ranges[ranges.len() - 1] - ranges[0];
         let known = usual
             .iter()
-            .find(|range| (median / **range - 1.0).abs() < NEAR);
+            .find(|range| (median / **range - 1.0).abs() < USUAL_RANGE_TOLERANCE);
         let range = known.copied().unwrap_or(median);
-        let fits = spread <= ALIKE * median && travel <= (1.0 + ALIKE) * range;
+        let fits = spread <= RANGE_AGREEMENT * median && travel <= (1.0 + RANGE_AGREEMENT) * range;
         let sure = known.is_some() || ranges.len() >= 3;
         // A joint at rest goes to and fro between two counts.
         (fits && sure && range > COUNTS * step).then_some(Wrapped {

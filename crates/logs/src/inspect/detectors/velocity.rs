@@ -41,7 +41,7 @@ impl LagSums {
 }
 
 /// Finds the lag at which a velocity resembles the derivative of a position most; `None` where
-/// they do not move enough to tell.
+/// they do not move enough to say.
 pub(in crate::inspect) fn follows<'w>(
     windows: impl Iterator<Item = &'w Window>,
     position: usize,

@@ -1,7 +1,7 @@
 //! A few stretches of a log, evenly spread over it, for what is judged from many rows at once.
 
 /// Stretches that are kept at most.
-const MOST: usize = 16;
+const MAX_STRETCHES: usize = 16;
 /// Numbers that they hold together at most.
 const NUMBERS: usize = 1 << 23;
 
@@ -40,7 +40,7 @@ impl Windows {
         if !number.is_multiple_of(self.stride) {
             return;
         }
-        let most = (NUMBERS / (t.len() * (columns.len() + 1)).max(1)).min(MOST);
+        let most = (NUMBERS / (t.len() * (columns.len() + 1)).max(1)).min(MAX_STRETCHES);
         if most < 2 {
             // Too wide to keep more than the first rows.
             if self.kept.is_empty() && most == 1 {
@@ -93,7 +93,7 @@ mod tests {
             windows.offer(&[f64::from(k)], &[&[f64::from(-k)]]);
         }
         let times: Vec<f64> = windows.iter().map(|w| w.t[0]).collect();
-        assert!(times.len() > MOST / 2 && times.len() <= MOST);
+        assert!(times.len() > MAX_STRETCHES / 2 && times.len() <= MAX_STRETCHES);
         let step = times[1] - times[0];
         assert!(
             times.windows(2).all(|pair| pair[1] - pair[0] == step),

@@ -20,7 +20,7 @@ const PASSIVE: usize = 4;
 /// Share of the torque that the motion must explain.
 const EXPLAINED: f64 = 0.5;
 /// Least share of each direction in the squared speed: one way at one speed, a torque that depends
-/// on position cannot be told from any delay.
+/// on position cannot be distinguished from any delay.
 const BOTH_WAYS: f64 = 0.1;
 /// Share of the gain over no delay that another minimum may reach.
 const SECOND_BEST: f64 = 0.5;
@@ -324,7 +324,7 @@ fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
     if !any || least == 0 || least + 1 == residuals.len() {
         return None;
     }
-    // as good at another delay: a motion of one frequency tells it up to whole periods
+    // as good at another delay: a motion of one frequency determines it up to whole periods
     let gain = |trial: usize| residuals[TRIALS] - residuals[trial];
     let minimum = |trial: &usize| {
         let higher = |other: Option<&f64>| other.is_none_or(|other| *other >= residuals[*trial]);

@@ -22,7 +22,7 @@ pub struct TopicFacts {
     /// Type of its messages.
     #[serde(rename = "type")]
     pub kind: String,
-    /// Publishers that the recorder told apart; 1 where it keeps no account of them.
+    /// Publishers that the recorder distinguished; 1 where it keeps no account of them.
     pub publishers: usize,
     /// Messages.
     pub messages: u64,

@@ -1,7 +1,6 @@
 //! Files of messages, several of them read as one recording, its messages in the order of their times.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use super::format::format_of;
@@ -16,43 +15,18 @@ const OPEN: usize = 16;
 const HELD: usize = 4096;
 const HELD_BYTES: usize = 4 << 20;
 
-/// A message that was read ahead, ordered by its time, then by its place in the file.
+/// A message that was read ahead.
 struct Held {
     head: MessageHead,
     data: Vec<u8>,
-}
-
-impl Held {
-    fn key(&self) -> (u64, u64) {
-        (self.head.log_ns, self.head.number)
-    }
-}
-
-impl PartialEq for Held {
-    fn eq(&self, other: &Self) -> bool {
-        self.key() == other.key()
-    }
-}
-
-impl Eq for Held {}
-
-impl PartialOrd for Held {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Held {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.key().cmp(&other.key())
-    }
 }
 
 /// One file of a recording, some messages ahead.
 struct OpenFile {
     path: PathBuf,
     file: Box<dyn MessageFile>,
-    held: BinaryHeap<Reverse<Held>>,
+    /// In the order of their times, then of their places in the file.
+    held: VecDeque<Held>,
     held_bytes: usize,
     /// Memory that is used again.
     spare: Vec<Vec<u8>>,
@@ -81,7 +55,7 @@ impl OpenFile {
         let mut part = Self {
             path: path.to_owned(),
             file: (format.open)(path, content, wanted)?,
-            held: BinaryHeap::new(),
+            held: VecDeque::new(),
             held_bytes: 0,
             spare: Vec::new(),
             ended: false,
@@ -103,12 +77,18 @@ impl OpenFile {
                 Ok(None) => self.ended = true,
                 Ok(Some(head)) => {
                     self.held_bytes += data.len();
-                    self.held.push(Reverse(Held { head, data }));
+                    // mostly the last one: messages lie nearly in the order of their times
+                    let not_later = |held: &Held| held.head.log_ns <= head.log_ns;
+                    let at = match self.held.back().is_none_or(not_later) {
+                        true => self.held.len(),
+                        false => self.held.partition_point(not_later),
+                    };
+                    self.held.insert(at, Held { head, data });
                 }
             }
         }
         self.head = None;
-        let Some(Reverse(next)) = self.held.pop() else {
+        let Some(next) = self.held.pop_front() else {
             return self.failed.take().map_or(Ok(()), Err);
         };
         self.held_bytes -= next.data.len();

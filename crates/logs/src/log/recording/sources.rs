@@ -1,4 +1,4 @@
-//! Messages of one topic that come from several publishers: told apart by their channel and by the names that
+//! Messages of one topic that come from several publishers: distinguished by their channel and by the names that
 //! they list, and those that contradict the others left out.
 //!
 //! A publisher may list its joints in another order each time. So one with other names, or on another channel, is

@@ -7,7 +7,7 @@ use super::lines::{COLUMNS, Table, unusable};
 use super::npy::{Array, Field};
 
 /// Columns of an array whose columns lie one behind the other, each of which is read from a place of its own.
-const APART: u64 = 256;
+const MAX_COLUMNS_APART: u64 = 256;
 /// Names of the column of times, by which the rows are counted.
 const TIMES: [&str; 6] = ["t", "time", "times", "timestamp", "timestamps", "stamp"];
 
@@ -104,7 +104,7 @@ impl ArrayTable {
         };
         let wide = count.saturating_mul(element.fields.len() as u64);
         let room = (COLUMNS - self.names.len()) as u64;
-        if count == 0 || wide > room || (apart && count > APART) {
+        if count == 0 || wide > room || (apart && count > MAX_COLUMNS_APART) {
             return Ok(false);
         }
         let base = match array.name.is_empty() {

@@ -190,7 +190,7 @@ fn is_numeric(field: &Arc<Type>) -> bool {
     plain && number
 }
 
-/// Appends what tells each number of a field from the others.
+/// Appends what distinguishes each number of a field from the others.
 fn leaves(field: &Field, name: String, out: &mut Vec<String>) {
     match field {
         Field::Group(row) => {

@@ -102,7 +102,7 @@ pub(super) fn members(file: &OpenFile) -> io::Result<Vec<Member>> {
 
 /// Packed bytes of a member and the place of its local header; large ones stand in the extra field.
 fn sizes(entry: &[u8], mut extra: &[u8]) -> io::Result<[u64; 2]> {
-    const LARGE: u64 = u32::MAX as u64;
+    const IN_EXTRA_FIELD: u64 = u32::MAX as u64;
     let plain = [u32_at(entry, 24)?, u32_at(entry, 20)?, u32_at(entry, 42)?];
     let mut all = plain;
     while extra.len() >= 4 {
@@ -110,7 +110,7 @@ fn sizes(entry: &[u8], mut extra: &[u8]) -> io::Result<[u64; 2]> {
         let body = extra.get(4..4 + count).ok_or_else(cut)?;
         if kind == 1 {
             let mut from = 0;
-            for value in all.iter_mut().filter(|value| **value == LARGE) {
+            for value in all.iter_mut().filter(|value| **value == IN_EXTRA_FIELD) {
                 *value = u64_at(body, from)?;
                 from += 8;
             }

@@ -1,13 +1,11 @@
 //! Text logs as they lie on the disk: header, then records one by one.
 
-use std::fmt;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use csv::ByteRecord;
-
+use super::records::{BUFFER, LONGEST_ROW, Record, Records};
 use super::{head, line, number};
-use crate::log::content::{Bytes, Content};
+use crate::log::content::Content;
 use crate::log::layout::Layout;
 use crate::log::rows::Strictness;
 use crate::log::stream::Watch;
@@ -15,53 +13,13 @@ use crate::log::time::Instant;
 use crate::log::{LogError, escape, source};
 use cft_ident_core::number::beyond;
 
-/// Bytes that one row may take.
-const LONGEST_ROW: usize = 1 << 20;
-/// Bytes read at once.
-const BUFFER: usize = 1 << 17;
-
-/// Ends the reading of a row that never ends, before it fills the memory.
-struct Guard {
-    inner: Bytes,
-    /// Bytes handed out since the last row was complete.
-    pending: usize,
-    /// The last of them.
-    last: u8,
-}
-
-impl fmt::Debug for Guard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Guard")
-    }
-}
-
-impl Read for Guard {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.pending > LONGEST_ROW + BUFFER {
-            return Err(io::ErrorKind::FileTooLarge.into());
-        }
-        loop {
-            match self.inner.read(buffer) {
-                Ok(count) => {
-                    self.pending += count;
-                    let last = count.checked_sub(1).and_then(|at| buffer.get(at));
-                    self.last = last.copied().unwrap_or(self.last);
-                    return Ok(count);
-                }
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
-        }
-    }
-}
-
 /// A text log: its records one by one.
 #[derive(Debug)]
 pub(super) struct TextFile {
     path: PathBuf,
-    reader: csv::Reader<Guard>,
-    record: ByteRecord,
-    previous: ByteRecord,
+    reader: Records,
+    record: Record,
+    previous: Record,
     header: Vec<String>,
     header_line: u64,
     /// Columns are parted by runs of spaces: where the fields that are not empty stand.
@@ -104,22 +62,11 @@ impl TextFile {
         let (before, _) = found.before;
         let passed = io::copy(&mut (&mut inner).take(before), &mut io::sink());
         passed.map_err(|error| source::failed(path, error))?;
-        let reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .comment(Some(found.comment))
-            .delimiter(found.delimiter)
-            .buffer_capacity(BUFFER)
-            .from_reader(Guard {
-                inner,
-                pending: 0,
-                last: b'\n',
-            });
         let mut rows = Self {
             path: path.to_owned(),
-            reader,
-            record: ByteRecord::new(),
-            previous: ByteRecord::new(),
+            reader: Records::new(inner, found.delimiter, found.comment),
+            record: Record::default(),
+            previous: Record::default(),
             header: Vec::new(),
             header_line: found.header_line,
             runs: found.spaces.then(Vec::new),
@@ -170,7 +117,7 @@ impl TextFile {
     }
 
     /// What was taken for what, and what was passed over, one sentence each.
-    pub(super) fn told(&self) -> Vec<String> {
+    pub(super) fn in_words(&self) -> Vec<String> {
         let mut out = match self.told.is_empty() {
             true => Vec::new(),
             false => vec![self.told.join("; ")],
@@ -208,7 +155,7 @@ impl TextFile {
                 }
             }
             if let Some(watch) = &self.watch
-                && watch.is_cut_at(self.before.0 + self.reader.position().byte())
+                && watch.is_cut_at(self.before.0 + self.reader.byte())
             {
                 return Err(LogError::CutLine { at: self.place() });
             }
@@ -222,7 +169,7 @@ impl TextFile {
             let (found, end) = (self.fields(), self.end());
             let narrow = found < self.header.len();
             let remark = narrow && (0..found).all(|index| self.number(index).is_none());
-            if narrow && !self.goes_on()? && (remark || self.reader.get_ref().last != b'\n') {
+            if narrow && !self.goes_on()? && (remark || !self.reader.ends_a_line()) {
                 self.told.push(format!(
                     "line {}, the last one, is cut off or a remark, and is passed over",
                     self.line_at(end)
@@ -249,35 +196,30 @@ impl TextFile {
 
     /// Reads one record.
     fn advance(&mut self) -> Result<bool, LogError> {
-        self.reader.get_mut().pending = 0;
-        let more = match self.reader.read_byte_record(&mut self.record) {
+        let more = match self.reader.read(&mut self.record) {
             Ok(more) => more,
             Err(error) => return Err(self.failed(error)),
         };
         if let Some(runs) = &mut self.runs {
             runs.clear();
-            let full = self.record.iter().enumerate();
-            runs.extend(
-                full.filter(|(_, field)| !field.is_empty())
-                    .map(|(index, _)| index),
-            );
+            let full = |index: &usize| {
+                self.record
+                    .get(*index)
+                    .is_some_and(|field| !field.is_empty())
+            };
+            runs.extend((0..self.record.len()).filter(full));
         }
         Ok(more)
     }
 
-    fn failed(&self, error: csv::Error) -> LogError {
-        let line = self.reader.position().line();
-        match error.into_kind() {
-            csv::ErrorKind::Io(error) if error.kind() == io::ErrorKind::FileTooLarge => {
-                LogError::LongLine {
-                    file: self.file(),
-                    line,
-                    limit: LONGEST_ROW,
-                }
-            }
-            csv::ErrorKind::Io(error) => source::failed(&self.path, error),
-            // Byte records of any length have no other error; should one appear, it is a read error.
-            other => source::failed(&self.path, io::Error::other(format!("{other:?}"))),
+    fn failed(&self, error: io::Error) -> LogError {
+        match error.kind() {
+            io::ErrorKind::FileTooLarge => LogError::LongLine {
+                file: self.file(),
+                line: self.reader.line(),
+                limit: LONGEST_ROW,
+            },
+            _ => source::failed(&self.path, error),
         }
     }
 
@@ -439,7 +381,7 @@ impl TextFile {
 
     /// Byte of the file at which the current row ends.
     fn end(&self) -> u64 {
-        self.before.0 + self.reader.position().byte()
+        self.before.0 + self.reader.byte()
     }
 
     /// Line of the row that ends at a byte.
@@ -448,14 +390,12 @@ impl TextFile {
             // a stream cannot be read again
             return self.line_hint();
         }
-        count_lines(&self.path, end.saturating_sub(1))
-            .unwrap_or_else(|_| self.reader.position().line())
+        count_lines(&self.path, end.saturating_sub(1)).unwrap_or_else(|_| self.reader.line())
     }
 
     /// Line of the current row where no comment or blank line stands right before it.
     pub(super) fn line_hint(&self) -> u64 {
-        let line = self.record.position().map_or(0, csv::Position::line);
-        self.before.1 + line
+        self.before.1 + self.reader.begins()
     }
 }
 

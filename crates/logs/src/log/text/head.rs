@@ -7,7 +7,7 @@ use super::table::{self, Found};
 use crate::log::content::HEAD;
 use crate::log::{LogError, source};
 
-/// What the head of a file tells.
+/// What the head of a file says.
 pub(super) struct Head {
     pub(super) comment: u8,
     pub(super) delimiter: u8,

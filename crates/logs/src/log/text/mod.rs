@@ -5,6 +5,7 @@ mod head;
 mod json_lines;
 mod line;
 mod number;
+mod records;
 mod table;
 
 use std::path::Path;
@@ -103,7 +104,7 @@ impl TextRows {
                     true => Some(power.unwrap_or(0)),
                     false => power.filter(|_| seconds().is_some_and(|t| t.abs() >= FAR_S)),
                 };
-                // A first row without a time tells nothing.
+                // A first row without a time says nothing.
                 if exact.is_none() {
                     seconds()?;
                 }
@@ -192,7 +193,7 @@ impl LogRows for TextRows {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let mut out = self.file.told();
+        let mut out = self.file.in_words();
         if let Some((time, (rest, _))) = self.time.and_then(|time| Some((time, time.rest?))) {
             let name = |column: usize| escape(&self.names()[column]);
             out.push(format!(

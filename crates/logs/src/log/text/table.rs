@@ -184,7 +184,7 @@ impl Table {
                 .any(|w| [n, names.len()].contains(w))
         };
         let is_number = |field: &&str| {
-            // a decimal comma is told later on, with the line
+            // a decimal comma is reported later on, with the line
             let point = field.replace(',', ".");
             is_datum(field) || (sign != b',' && number::parse(point.as_bytes()).is_some())
         };

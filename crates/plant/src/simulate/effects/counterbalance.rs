@@ -14,13 +14,18 @@ const COUNT: usize = 6;
 /// Pieces between its ends.
 const PIECES: usize = COUNT - 3;
 /// Default distances of the two points from the axis \[m\].
-const LONG: f64 = 0.4;
-const SHORT: f64 = 0.1;
+const FAR_POINT_M: f64 = 0.4;
+const NEAR_POINT_M: f64 = 0.1;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| {
-        let mut defaults = vec![0.4 * site.scale / (LONG * SHORT), 0.5 * LONG, LONG, SHORT];
+        let mut defaults = vec![
+            0.4 * site.scale / (FAR_POINT_M * NEAR_POINT_M),
+            0.5 * FAR_POINT_M,
+            FAR_POINT_M,
+            NEAR_POINT_M,
+        ];
         let (from, to) = site.travel;
         defaults.extend([site.middle() - std::f64::consts::FRAC_PI_2, from, to]);
         defaults.extend([0.0; COUNT]);

@@ -1,7 +1,7 @@
 //! `elasticity`: a spring between the motor, where the encoder sits, and the link.
 //!
 //! The link's side has `inertia`, the motor's side what is left of the joint's, all its friction and every
-//! torque that is no load, so that a stiff spring gives the rigid joint back. Unless it is told, the motor has a
+//! torque that is no load, so that a stiff spring gives the rigid joint back. Unless it is declared, the motor has a
 //! fifth of the joint's inertia ([`ROTOR`]; less where the least inertia of any pose asks for it, so that what is
 //! left to the link stays positive). With the deflection z = q_motor - q_link the spring passes on
 //! T = stiffness z + d dz/dt, d = 2 damping sqrt(stiffness inertia), and B (a + d2z/dt2) = tau - F - E - T on the

@@ -105,7 +105,7 @@ fn number(spec: &EffectSpec, key: &str) -> Result<f64, SimulateError> {
     given.map(|(_, value)| *value).ok_or_else(missing)
 }
 
-/// The effect as the truth tells it.
+/// The effect as the truth says it.
 fn value(
     spec: &EffectSpec,
     candidate: &CandidateSection,
@@ -157,6 +157,13 @@ impl Own {
                 let what = format!("`{key}`: `{name}` is no signal of this robot and no shape");
                 wrong(candidate, &what)
             })?;
+            if signal.remembers() {
+                let what = format!(
+                    "`{key}`: `{name}` hangs on the way before, which a plant of formulas does not keep; use backlash or \
+                     presliding of the catalogue"
+                );
+                return Err(wrong(candidate, &what));
+            }
             let of = of.unwrap_or(site.joint());
             if signal == FormulaSignal::Temperature && sites.temperatures.at(of, 0.0).is_none() {
                 let joint = &joints[of];
@@ -232,6 +239,7 @@ impl Own {
             }
             FormulaSignal::Temperature => self.temperatures.at(j, motion.t).unwrap_or(f64::NAN),
             FormulaSignal::Time => motion.t,
+            FormulaSignal::SinceReversal | FormulaSignal::Play | FormulaSignal::Dahl => f64::NAN,
         }
     }
 }

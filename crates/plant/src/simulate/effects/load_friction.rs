@@ -13,13 +13,13 @@ pub static LAW: PlantLaw = PlantLaw {
     defaults: |site| vec![0.05, 0.0, site.slope().min(40.0 / site.speed)],
     build: |site, _, values| {
         let most = values[0].abs() + values[1].abs() * 4.0 * site.speed;
-        if most >= MOST {
+        if most >= MAX_LOAD_SHARE {
             return Err(SimulateError::EffectNumber {
                 effect: ENTRY.name.to_owned(),
                 key: "mu_c + mu_v |v|".to_owned(),
                 value: most,
                 rule: format!(
-                    "must stay below {MOST}: beyond it the joint locks itself under load"
+                    "must stay below {MAX_LOAD_SHARE}: beyond it the joint locks itself under load"
                 ),
             });
         }
@@ -33,7 +33,7 @@ pub static LAW: PlantLaw = PlantLaw {
 };
 
 /// Share of the load that friction may take.
-const MOST: f64 = 0.95;
+const MAX_LOAD_SHARE: f64 = 0.95;
 
 #[derive(Debug)]
 struct LoadFriction {
@@ -47,7 +47,7 @@ impl Effect for LoadFriction {
     fn load(&self, motion: &PlantState, share: &mut [[f64; 2]]) {
         let v = motion.v[self.joint];
         // Speeds far beyond the joint's own, as a rejected trial step has them, must not turn the balance over.
-        let mu = (self.mu_c + self.mu_v * v.abs()).clamp(-MOST, MOST);
+        let mu = (self.mu_c + self.mu_v * v.abs()).clamp(-MAX_LOAD_SHARE, MAX_LOAD_SHARE);
         let friction = mu * (self.slope * v).tanh();
         let [positive, negative] = &mut share[self.joint];
         *positive += friction;

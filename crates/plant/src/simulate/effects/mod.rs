@@ -46,7 +46,7 @@ pub struct PlantState<'a> {
     pub load: &'a [f64],
 }
 
-/// What an effect is told before the first step.
+/// What an effect learns before the first step.
 #[derive(Debug, Clone, Copy)]
 pub struct Beginning<'a> {
     /// Joint positions, m or rad.

@@ -16,7 +16,7 @@ pub struct CoursePanel {
     pub unit: String,
     /// Times \[`time_unit`\].
     pub times: Vec<f64>,
-    /// Estimates of the logs by themselves; none where a log tells nothing.
+    /// Estimates of the logs by themselves; none where a log says nothing.
     pub estimates: Vec<Option<f64>>,
     /// Smoothed value and standard deviation.
     pub course: Vec<Option<[f64; 2]>>,

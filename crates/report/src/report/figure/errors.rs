@@ -42,7 +42,7 @@ const TOP: f64 = 62.0;
 const LINE: f64 = 18.0;
 /// Height of one bar, and of the room below a joint's bars [px].
 const BAR: f64 = 13.0;
-const APART: f64 = 12.0;
+const ROOM_BELOW_PX: f64 = 12.0;
 /// Room at the right for the numbers [px].
 const NUMBERS: f64 = 142.0;
 const SIZE: f64 = 12.0;
@@ -52,7 +52,7 @@ impl ErrorFigure {
     pub fn svg(&self) -> String {
         let compared = self.joints.iter().any(|joint| joint.before.is_some());
         let rows = if compared { 2.0 } else { 1.0 };
-        let pitch = rows * BAR + APART;
+        let pitch = rows * BAR + ROOM_BELOW_PX;
         let top = TOP + if self.usual.is_some() { LINE } else { 0.0 };
         let bottom = top + pitch * self.joints.len() as f64;
         let height = bottom + 34.0;

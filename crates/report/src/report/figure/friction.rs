@@ -52,7 +52,7 @@ pub struct FrictionFigure {
 /// Radius of a plateau's dot [px].
 const DOT: f64 = 2.3;
 /// Height of a panel by itself [px], and most rows of a cloud.
-const ALONE: f64 = 180.0;
+const PANEL_HEIGHT_PX: f64 = 180.0;
 const ROWS: usize = 500;
 
 const CURVE: Stroke = Stroke::solid(colour::BLUE, 1.8);
@@ -83,7 +83,7 @@ impl FrictionFigure {
     pub fn cells(&self) -> Cells {
         let cell = |panel: &FrictionPanel| {
             let title = format!("friction of {}", panel.joint);
-            cell::cell(&title, &panel.words(), ALONE, |svg, frame| {
+            cell::cell(&title, &panel.words(), PANEL_HEIGHT_PX, |svg, frame| {
                 panel.draw(svg, frame)
             })
         };

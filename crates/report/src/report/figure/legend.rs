@@ -22,13 +22,13 @@ pub(super) enum Key {
 const SIZE: f64 = 11.0;
 const SAMPLE: f64 = 26.0;
 /// Room between two entries, and height of a line.
-const APART: f64 = 14.0;
+const ROOM_BETWEEN_PX: f64 = 14.0;
 const LINE: f64 = 18.0;
 
 /// One entry as a picture of its own: a page sets as many beside each other as its width takes.
 pub(super) fn alone(entry: (Key, &str)) -> String {
     let (_, name) = entry;
-    let width = SAMPLE + 6.0 + width_of(name, SIZE) + APART;
+    let width = SAMPLE + 6.0 + width_of(name, SIZE) + ROOM_BETWEEN_PX;
     let mut svg = Svg::new(width, LINE, "legend", name);
     draw(&mut svg, [0.0, 0.72 * LINE], &[entry]);
     svg.finish()
@@ -75,6 +75,6 @@ pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
             ),
         }
         svg.text([at + SAMPLE + 6.0, y], name, Type::new(SIZE, Anchor::Start));
-        at += width + APART;
+        at += width + ROOM_BETWEEN_PX;
     }
 }

@@ -45,7 +45,7 @@ const FOOT: f64 = 18.0;
 /// Points of a line.
 const POINTS: usize = 900;
 /// Use of a limit from which on the panel shows it; below it the motion itself fills the panel.
-const NEAR: f64 = 0.45;
+const LIMIT_SHOWN_FROM: f64 = 0.45;
 
 const MOTION: Stroke = Stroke::solid(colour::BLUE, 1.3);
 const LIMIT: Stroke = Stroke::dashed(colour::VERMILLION, 1.2, "6 3");
@@ -105,7 +105,9 @@ impl MotionPanel {
             &rest,
             Type::new(11.5, Anchor::Start),
         );
-        let shown = self.limits.filter(|_| self.used.is_some_and(|u| u >= NEAR));
+        let shown = self
+            .limits
+            .filter(|_| self.used.is_some_and(|u| u >= LIMIT_SHOWN_FROM));
         let values = self.values.iter().copied();
         let both = values.chain(shown.into_iter().flatten());
         let (Some(clock), Some(range)) = (clock, axis::interval(both, 0.06)) else {

@@ -41,7 +41,7 @@ pub struct OverlayFigure {
 /// Room for one name in the legend [px].
 const LABEL: f64 = 250.0;
 /// Height of a panel by itself [px], and most rows of a cloud.
-const ALONE: f64 = 180.0;
+const PANEL_HEIGHT_PX: f64 = 180.0;
 const ROWS: usize = 500;
 
 /// Told apart by dashes as well as by colour.
@@ -56,7 +56,9 @@ impl OverlayFigure {
         let picture = |panel: &OverlayPanel| {
             let title = format!("friction of {}", panel.joint);
             let told = format!("{title} by {} and {}", self.names[0], self.names[1]);
-            cell::cell(&title, &told, ALONE, |svg, frame| panel.draw(svg, frame))
+            cell::cell(&title, &told, PANEL_HEIGHT_PX, |svg, frame| {
+                panel.draw(svg, frame)
+            })
         };
         let keys = STROKES.iter().zip(&self.names);
         let keys: Vec<(Key, &str)> = keys

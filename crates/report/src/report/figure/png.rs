@@ -7,7 +7,7 @@ use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::fontdb::Database;
 use resvg::usvg::{Options, Tree};
 
-const PLAIN: &[u8] = include_bytes!("font/DejaVuSans.ttf");
+const REGULAR_FONT: &[u8] = include_bytes!("font/DejaVuSans.ttf");
 const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
 
 /// Pixels of the picture for one px of the figure: 300 dots an inch where a figure of 760 px is
@@ -29,7 +29,7 @@ fn fonts() -> Arc<Database> {
     static FONTS: OnceLock<Arc<Database>> = OnceLock::new();
     let fonts = FONTS.get_or_init(|| {
         let mut fonts = Database::new();
-        fonts.load_font_data(PLAIN.to_vec());
+        fonts.load_font_data(REGULAR_FONT.to_vec());
         fonts.load_font_data(BOLD.to_vec());
         fonts.set_sans_serif_family("DejaVu Sans");
         Arc::new(fonts)

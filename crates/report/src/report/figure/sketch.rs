@@ -34,7 +34,7 @@ pub struct Sketch {
 const HEIGHT: f64 = 230.0;
 const NAMES: f64 = 96.0;
 /// Distance of two names [px].
-const APART: f64 = 14.0;
+const NAME_DISTANCE_PX: f64 = 14.0;
 const LINK: Stroke = Stroke::solid(colour::INK, 3.0);
 const EARLIER: Stroke = Stroke::solid(colour::ZERO, 1.4);
 const WAY: Stroke = Stroke::dashed(colour::MUTED, 0.9, "3 2");
@@ -162,10 +162,10 @@ impl Sketch {
         let mut lines: Vec<f64> = Vec::new();
         for (k, (_, at)) in places.iter().enumerate() {
             let behind = (places.len() - k - 1) as f64;
-            let lowest = top + height - APART * behind;
+            let lowest = top + height - NAME_DISTANCE_PX * behind;
             let line = at[1].max(next).min(lowest.max(next));
             lines.push(line);
-            next = line + APART;
+            next = line + NAME_DISTANCE_PX;
         }
         for ((_, at), line) in places.iter().zip(&lines) {
             svg.line(*at, [left - 3.0, *line - 3.5], LEADER);

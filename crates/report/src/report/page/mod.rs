@@ -156,7 +156,7 @@ fn whole_words(text: &str) -> String {
 /// A table; the first column holds names. A column of words is set to the left.
 fn table_of(table: &Table) -> String {
     let (caption, _, rows) = table.parts();
-    match rows.len() > MANY {
+    match rows.len() > FOLDED_FROM_ROWS {
         true => format!(
             "<details class=\"table\"><summary>{} ({} rows)</summary>{}</details>\n",
             escaped(if caption.is_empty() { "table" } else { caption }),
@@ -168,7 +168,7 @@ fn table_of(table: &Table) -> String {
 }
 
 /// Rows from which on a table is folded.
-const MANY: usize = 24;
+const FOLDED_FROM_ROWS: usize = 24;
 
 fn open_table(table: &Table) -> String {
     let (caption, head, rows) = table.parts();
@@ -230,14 +230,17 @@ enum Column {
 }
 
 /// Longest cell that stays on one line.
-const LONG: usize = 28;
+const MAX_CELL_CHARACTERS: usize = 28;
 
 impl Column {
     fn of<'a>(c: usize, mut cells: impl Iterator<Item = &'a String> + Clone) -> Self {
         let checksum = |cell: &String| cell.len() == 64 && !cell.contains(' ');
         if cells.clone().any(checksum) {
             Column::Code
-        } else if cells.clone().any(|cell| cell.chars().count() > LONG) {
+        } else if cells
+            .clone()
+            .any(|cell| cell.chars().count() > MAX_CELL_CHARACTERS)
+        {
             Column::Long
         } else if c == 0 || cells.any(|cell| wordy(cell)) {
             Column::Words
@@ -388,7 +391,7 @@ mod tests {
     #[test]
     fn a_long_table_is_folded_with_its_number_of_rows() {
         let rows = |n: usize| vec![vec!["cell".to_owned()]; n];
-        let short = table_of(&Table::of_words("short", &["a"], rows(MANY)));
+        let short = table_of(&Table::of_words("short", &["a"], rows(FOLDED_FROM_ROWS)));
         assert!(!short.contains("<details"), "{short}");
         let long = table_of(&Table::of_words("long", &["a"], rows(58)));
         assert!(long.starts_with("<details"), "{long}");

@@ -1,14 +1,14 @@
-//! How certain the parameters are together: condition, and what the data hardly tell apart.
+//! How certain the parameters are together: condition, and what the data hardly distinguish.
 
 use crate::report::Writer;
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_stages::identify::{IdentifiedDynamics, WeakestPart};
 
-/// Correlation of two errors from which on a pair is told.
-const ALIKE: f64 = 0.9;
-/// Pairs and parts of a direction that are told.
-const MOST: usize = 8;
+/// Correlation of two errors from which on a pair is reported.
+const MIN_CORRELATION: f64 = 0.9;
+/// Pairs and parts of a direction that are reported.
+const MAX_SHOWN: usize = 8;
 
 /// The section of a fit.
 pub fn section(page: &mut Writer, found: &IdentifiedDynamics, model: &ModelFile) {
@@ -47,7 +47,7 @@ fn weakest(page: &mut Writer, found: &IdentifiedDynamics) {
     if found.weakest_direction.is_empty() {
         return;
     }
-    let parts = found.weakest_direction.iter().take(MOST);
+    let parts = found.weakest_direction.iter().take(MAX_SHOWN);
     let row = |part: &WeakestPart| {
         vec![
             part.parameter.clone(),
@@ -67,22 +67,22 @@ pub fn pairs(page: &mut Writer, model: &ModelFile) {
     let Some(covariance) = &model.covariance else {
         return;
     };
-    let found = covariance.correlated(ALIKE);
+    let found = covariance.correlated(MIN_CORRELATION);
     let count = found.len();
     let rows: Vec<Vec<String>> = found
         .into_iter()
-        .take(MOST)
+        .take(MAX_SHOWN)
         .map(|([a, b], correlation)| vec![a.to_owned(), b.to_owned(), format!("{correlation:+.3}")])
         .collect();
     if rows.is_empty() {
         page.paragraph(&format!(
-            "No two estimates are correlated by {ALIKE} or more."
+            "No two estimates are correlated by {MIN_CORRELATION} or more."
         ));
         return;
     }
     page.rows(
         &format!(
-            "most correlated estimates, {} of {count} pairs beyond {ALIKE}",
+            "most correlated estimates, {} of {count} pairs beyond {MIN_CORRELATION}",
             rows.len()
         ),
         &["parameter", "and", "correlation"],

@@ -13,12 +13,12 @@ pub mod torque;
 
 /// The first few of many names.
 fn first_of(names: &[String]) -> String {
-    const MOST: usize = 3;
-    match names.len() > MOST {
+    const MAX_NAMES: usize = 3;
+    match names.len() > MAX_NAMES {
         true => format!(
             "{} and {} more",
-            names[..MOST].join(", "),
-            names.len() - MOST
+            names[..MAX_NAMES].join(", "),
+            names.len() - MAX_NAMES
         ),
         false => names.join(", "),
     }

@@ -5,8 +5,8 @@ use cft_ident_core::number;
 use cft_ident_logs::inspect::{Findings, Severity};
 use cft_ident_logs::log::escape;
 
-/// Faults that are told; a log with more of them has one cause.
-const MOST: usize = 30;
+/// Faults that are reported; a log with more of them has one cause.
+const MAX_FAULTS: usize = 30;
 
 /// Cells of a fault's row that may differ where the fault is the same.
 const CHANNEL: usize = 3;
@@ -73,7 +73,7 @@ pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
                 for cell in [CHANNEL, SPAN] {
                     also(&mut known[cell], &row[cell]);
                 }
-            } else if faults.len() == MOST {
+            } else if faults.len() == MAX_FAULTS {
                 hidden += 1;
             } else {
                 faults.push(row);

@@ -15,7 +15,7 @@ use cft_ident_stages::identify::{Compared, Curves, DIFFERENT, TriedOnLogs};
 use cft_ident_stages::replay::{ReplayedPair, is_beyond_curve, speeds};
 
 /// Parameters that a screen has room for.
-const FEW: usize = 8;
+const MAX_PARAMETERS_ON_SCREEN: usize = 8;
 
 /// The comparison; `logs` names the logs that both were tried on.
 pub fn compare(of: &Compared, logs: &str) -> Report {
@@ -34,13 +34,17 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
         .verdict(&words(of), of.warnings.is_empty());
     if let Some(table) = parameters
         .clone()
-        .filter(|_| of.table.parameters.len() > FEW)
+        .filter(|_| of.table.parameters.len() > MAX_PARAMETERS_ON_SCREEN)
     {
         report.detail().line("");
         report.detail().table(table);
         let differ = of.different();
         if !differ.is_empty() {
-            let table = parameter_table(differ.into_iter().take(FEW), &letters, &legend);
+            let table = parameter_table(
+                differ.into_iter().take(MAX_PARAMETERS_ON_SCREEN),
+                &letters,
+                &legend,
+            );
             report.terminal().line("");
             report.terminal().table(table);
         }

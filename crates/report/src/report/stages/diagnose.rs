@@ -3,7 +3,7 @@
 use super::diagnose_words::errors as errors_of;
 pub use super::diagnose_words::words;
 use super::step_words::{alternatives, grade, in_words, worsened};
-use super::{first_screen, found_effects, what_is_left};
+use super::{first_screen, formulas, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
 use crate::report::sections::{
@@ -18,10 +18,10 @@ use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_stages::identify::{DataFault, Diagnosed, LoggedRobot};
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
-/// Candidates that a page tells.
-const MOST: usize = 20;
+/// Candidates that a page shows.
+const MAX_CANDIDATES: usize = 20;
 /// Changes of friction that a screen has room for.
-const FEW: usize = 2;
+const MAX_CHANGES_ON_SCREEN: usize = 2;
 /// Margin of what a terminal says of an effect.
 const MARGIN: &str = "     ";
 
@@ -43,10 +43,11 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
     let (text, good) = words(of.machine, of.found);
     report.everywhere().verdict(&text, good);
-    told(&mut report, (of.machine, of.found), (of.refined, of.path));
+    diagnosed(&mut report, (of.machine, of.found), (of.refined, of.path));
     let mut page = report.page();
     first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
+    formulas::told(&mut page, of.machine, of.found);
     free_run::section(&mut page, of.found.free_run.as_ref());
     report
 }
@@ -95,7 +96,7 @@ pub fn at_fault(fault: &DataFault) -> String {
 }
 
 /// The errors and what to do next for a terminal; the effects one by one where it shows everything.
-pub fn told(
+pub fn diagnosed(
     report: &mut Report,
     (machine, found): (&LoggedRobot, &Diagnosed),
     written: (&ModelFile, &str),
@@ -113,12 +114,17 @@ pub fn told(
     }
     free_run::section(&mut detail, found.free_run.as_ref());
     detail.list(doubts(machine, found));
-    report
-        .terminal()
-        .list(changes(machine, found).into_iter().take(FEW));
-    report
-        .detail()
-        .list(changes(machine, found).into_iter().skip(FEW));
+    report.terminal().list(
+        changes(machine, found)
+            .into_iter()
+            .take(MAX_CHANGES_ON_SCREEN),
+    );
+    report.detail().list(
+        changes(machine, found)
+            .into_iter()
+            .skip(MAX_CHANGES_ON_SCREEN),
+    );
+    formulas::told(&mut report.terminal(), machine, found);
     let mut terminal = report.terminal();
     terminal.line("");
     terminal.note("", &first_screen::next(machine, found, written.1), 2);
@@ -128,7 +134,7 @@ pub fn told(
 /// Errors joint by joint, those of a screen.
 fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
     let (_, before) = errors_of(&d.before);
-    let (data, after) = errors_of(&d.after);
+    let (data, after) = errors_of(d.errors_now());
     let changed = d.written().next().is_some();
     let mut columns = vec![
         ("joint", Align::Left),
@@ -350,7 +356,7 @@ fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             c.reason.clone(),
         ]
     };
-    let rows: Vec<Vec<String>> = rest.iter().take(MOST).map(row).collect();
+    let rows: Vec<Vec<String>> = rest.iter().take(MAX_CANDIDATES).map(row).collect();
     if rows.is_empty() {
         return;
     }

@@ -58,8 +58,8 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             worse.join(", ")
         );
     }
-    let unusual =
-        errors(&d.after).1.overall.mean_relative_error > usual::band(machine.file.log.torque_is)[1];
+    let unusual = errors(d.errors_now()).1.overall.mean_relative_error
+        > usual::band(machine.file.log.torque_is)[1];
     let good = !gains_nothing
         && worse.is_empty()
         && !unusual
@@ -84,7 +84,7 @@ pub(super) fn is_exact(d: &Diagnosis) -> bool {
         .map(|measured| usual::range(measured)[0])
         .into_iter()
         .fold(f64::INFINITY, f64::min);
-    errors(&d.after).1.overall.mean_relative_error < 0.5 * least
+    errors(d.errors_now()).1.overall.mean_relative_error < 0.5 * least
 }
 
 /// Effects that the parts speak for, too little for what can be measured.
@@ -138,7 +138,7 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
 
 /// What the diagnosis did to the error, and whether effects were written that gain nothing.
 fn bought(d: &Diagnosis) -> (String, bool) {
-    let ((data, before), (_, after)) = (errors(&d.before), errors(&d.after));
+    let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
     let mean = |e: &Errors| e.overall.mean_relative_error;
     let percent = |e: &Errors| number::percent(mean(e));
     let goes = match (
@@ -175,8 +175,15 @@ fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
     };
     let vetoed = d.steps.iter().filter(|s| s.vetoed());
     let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
+    if d.written().next().is_none() {
+        return format!(
+            " Not written, for held-out data are worse with it ({}): {}.",
+            number::percent(errors(&d.after).1.overall.mean_relative_error),
+            names.join("; ")
+        );
+    }
     format!(
-        " Not written, for a joint is worse with it on held-out data: {}. The model as it is written has a {} of {}, \
+        " Not written, for held-out data are worse with it: {}. The model as it is written has a {} of {}, \
          which is optimistic, since these data chose.",
         names.join("; "),
         errors(selected).0,
@@ -191,7 +198,7 @@ fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let worst = d
         .structured_joints()
         .max_by(|a, b| share(a).total_cmp(&share(b)))?;
-    let error = number::percent(errors(&d.after).1.joints[worst].relative_error);
+    let error = number::percent(errors(d.errors_now()).1.joints[worst].relative_error);
     let place = match names.len() {
         1 => format!("More than noise is left ({error} of the torque)"),
         _ => format!("Most is left in {} ({error} of its torque)", names[worst]),

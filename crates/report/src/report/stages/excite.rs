@@ -11,7 +11,7 @@ use cft_ident_plant::excite::limits::{BoundedQuantity, Quantity};
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::motion::Motion;
 
-/// Parts of the weakest direction that a terminal tells.
+/// Parts of the weakest direction that a terminal shows.
 const PARTS: usize = 4;
 
 /// The judgement of a motion; `path` names the trajectory, `name` is the same without folders.
@@ -190,7 +190,7 @@ fn expected(
     table
 }
 
-/// What the motion hardly tells apart.
+/// What the motion hardly separates.
 fn apart(report: &mut Report, judged: &Judgement) {
     let parts = &judged.weakest_direction;
     let words: Vec<String> = parts

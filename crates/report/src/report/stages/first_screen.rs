@@ -21,7 +21,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
         Some(_) => "held-out data",
         None => "the fitted data",
     };
-    let errors = [&d.before, &d.after].map(|split| errors_of(split).1);
+    let errors = [&d.before, d.errors_now()].map(|split| errors_of(split).1);
     let bar = |errors: &Errors, j: usize| ErrorBar {
         error: errors.joints[j].relative_error,
         interval_95: Some(errors.joints[j].interval_95),
@@ -52,7 +52,7 @@ fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
     written.find(|step| !step.alternatives.is_empty())
 }
 
-/// The next motion to record, as a command that ends a result: it separates the first effect that the data do not tell
+/// The next motion to record, as a command that ends a result: it separates the first effect that the data do not determine
 /// from its like, or narrows what is weak in the model that is written, `path` as a shell takes it.
 pub fn next_motion(
     writer: &mut Writer,
@@ -111,6 +111,10 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed, path: &str) -> String {
         .structured_joints()
         .max_by(|a, b| share(a).total_cmp(&share(b)));
     match worst {
+        Some(j) if !found.searched => format!(
+            "Next: search a formula for what is left of {}: `cft-ident diagnose LOG... -m {path} --search`.",
+            machine.robot.joint_names()[j]
+        ),
         Some(j) => format!(
             "Next: look at the residual of {}, which has a pattern that no known effect explains, and \
              log it at other speeds and loads.",

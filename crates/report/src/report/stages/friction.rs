@@ -24,7 +24,7 @@ pub struct Friction<'a> {
 }
 
 /// Joints whose laws a screen has room for.
-const FEW: usize = 2;
+const MAX_JOINTS_ON_SCREEN: usize = 2;
 
 /// The verdict, how the filter went, and the laws.
 pub fn friction(of: &Friction) -> Report {
@@ -35,7 +35,7 @@ pub fn friction(of: &Friction) -> Report {
     report.terminal().line("");
     filter(&mut report.everywhere(), of);
     for joint in &of.found.joints {
-        let mut laws = match of.found.joints.len() <= FEW {
+        let mut laws = match of.found.joints.len() <= MAX_JOINTS_ON_SCREEN {
             true => report.terminal(),
             false => report.detail(),
         };

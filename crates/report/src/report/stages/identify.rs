@@ -91,7 +91,7 @@ pub fn identify(of: &Identify) -> Report {
     of.verdicts(&mut report.everywhere());
     guesses(&mut report.terminal(), of.guesses);
     if let Some(diagnosed) = of.diagnosed() {
-        diagnose::told(&mut report, (machine, diagnosed), (of.model(), of.path));
+        diagnose::diagnosed(&mut report, (machine, diagnosed), (of.model(), of.path));
     }
     if let Some(validated) = &found.validated {
         let caption = format!("torque on held-out data ({})", of.unseen.join(", "));
@@ -102,7 +102,7 @@ pub fn identify(of: &Identify) -> Report {
             None => report.terminal(),
         };
         rest.line("");
-        validate::told(&mut rest, errors, &caption);
+        validate::errors_by_joint(&mut rest, errors, &caption);
         validate::overall(&mut report.detail(), errors);
     }
     let (tally, _) = parameters::tally(of.model());
@@ -122,7 +122,7 @@ pub fn identify(of: &Identify) -> Report {
         }
         (None, Some(validated)) => {
             let caption = "errors of the reconstructed torque on held-out data";
-            validate::errors(&mut page, validated.judged(), caption);
+            validate::errors_by_joint(&mut page, validated.judged(), caption);
         }
         (None, None) => {
             let all: Vec<usize> = (0..found.dynamics.joints.len()).collect();

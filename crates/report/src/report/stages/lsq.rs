@@ -32,7 +32,7 @@ pub struct Lsq<'a> {
 }
 
 /// Parameters that a screen has room for.
-const FEW: usize = 8;
+const MAX_PARAMETERS_ON_SCREEN: usize = 8;
 
 /// The verdict, the residual of the fit, the parameters and the quality of the fit.
 pub fn lsq(of: &Lsq) -> Report {
@@ -52,7 +52,7 @@ pub fn lsq(of: &Lsq) -> Report {
     residuals(&mut report.detail(), of.found, &all);
     let (tally, _) = parameters::tally(of.file);
     report.detail().paragraph(&format!("{tally}."));
-    let mut parameters = match of.found.unknowns.len() <= FEW {
+    let mut parameters = match of.found.unknowns.len() <= MAX_PARAMETERS_ON_SCREEN {
         true => report.terminal(),
         false => report.detail(),
     };
@@ -195,8 +195,8 @@ fn words(of: &Lsq) -> (String, bool) {
 }
 
 /// A joint's error is far above the others from so many times their median on, and from so much.
-const FAR: f64 = 3.0;
-const LEAST: f64 = 0.05;
+const OUTLYING_RATIO: f64 = 3.0;
+const OUTLYING_ERROR: f64 = 0.05;
 
 /// Joints whose error is far above those of the others, as a sentence.
 fn far_off(found: &IdentifiedDynamics) -> Option<String> {
@@ -210,7 +210,7 @@ fn far_off(found: &IdentifiedDynamics) -> Option<String> {
     };
     let far = moving().filter_map(|j| {
         let median = median(j)?;
-        (error(j) > LEAST && error(j) > FAR * median).then(|| {
+        (error(j) > OUTLYING_ERROR && error(j) > OUTLYING_RATIO * median).then(|| {
             format!(
                 " Do not use it for {} before that is explained: its error of {} is far above the others', {} in the median.",
                 found.joints[j].joint,
@@ -283,7 +283,13 @@ fn motion(writer: &mut Writer, fit: &MotionFit) {
     let added = fit.effects.iter().flat_map(|effect| {
         let numbers = effect.parameters.iter().filter(|(_, p)| !p.bound);
         numbers.map(move |(key, p)| {
-            [effect.name.as_str(), key, &told(p.value, p.std), &p.unit].join(" ")
+            [
+                effect.name.as_str(),
+                key,
+                &with_deviation(p.value, p.std),
+                &p.unit,
+            ]
+            .join(" ")
         })
     });
     let added: Vec<String> = added.collect();
@@ -293,7 +299,7 @@ fn motion(writer: &mut Writer, fit: &MotionFit) {
 }
 
 /// A number with its deviation, where it has one.
-fn told(value: f64, std: Option<f64>) -> String {
+fn with_deviation(value: f64, std: Option<f64>) -> String {
     match std {
         Some(std) => number::plus_minus(value, std),
         None => number::significant(value, 4),

@@ -7,6 +7,7 @@ mod diagnose_words;
 pub mod diff;
 pub mod excite;
 mod first_screen;
+mod formulas;
 mod found_effects;
 pub mod friction;
 pub mod identify;

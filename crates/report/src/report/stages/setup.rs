@@ -15,7 +15,7 @@ pub fn section(out: &mut Writer, report: &SetupReport) {
         let head = format!("{} {}", severity.word(), finding.kind.word());
         out.note("", &head, 0);
         if severity == FindingSeverity::Hint {
-            out.note("    ", &finding.told(), 4);
+            out.note("    ", &finding.in_words(), 4);
             continue;
         }
         out.note("    ", &finding.meaning, 4);

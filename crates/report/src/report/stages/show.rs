@@ -15,7 +15,7 @@ pub struct Show<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
     pub model: &'a AugmentedModel,
-    /// What the errors mean in use, and the point that forces are told at.
+    /// What the errors mean in use, and the point that forces are reported at.
     pub in_use: Option<&'a (Vec<JointInUse>, String)>,
 }
 

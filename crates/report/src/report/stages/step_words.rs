@@ -71,7 +71,7 @@ pub(super) fn chance(p: f64) -> String {
 
 /// Estimated parameters of an effect in words: `order = 14.0 1/m, ..`.
 pub(super) fn in_words(machine: &LoggedRobot, found: &Diagnosed, step: &FoundEffect) -> String {
-    let words = found.told(machine, step).into_iter().map(|t| {
+    let words = found.numbers_of(machine, step).into_iter().map(|t| {
         let (scale, unit) = match t.unit == "m" && t.value.abs() < number::MILLIMETRES {
             true => (1e3, "mm"),
             false => (1.0, t.unit.as_ref()),

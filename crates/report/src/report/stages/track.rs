@@ -10,7 +10,7 @@ use cft_ident_logs::log::escape;
 use cft_ident_stages::identify::{Tracked, TrackedChange, TrackedParameter, TrackedRobot};
 
 /// Parameters that a screen has room for.
-const FEW: usize = 12;
+const MAX_PARAMETERS_ON_SCREEN: usize = 12;
 /// Most courses of a robot without a change that a page draws.
 const DRAWN: usize = 60;
 /// Courses without a change that are shown at once.
@@ -35,7 +35,7 @@ pub fn track(of: &Tracked) -> Report {
         all.table(table);
     }
     if let [robot] = of.robots.as_slice() {
-        let mut table = match robot.parameters.len() > FEW {
+        let mut table = match robot.parameters.len() > MAX_PARAMETERS_ON_SCREEN {
             true => report.detail(),
             false => report.terminal(),
         };

@@ -51,7 +51,7 @@ pub fn validate(of: &Validate) -> Report {
     let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
     let whole = caption(logs);
     summary::largest_errors(&mut report.usual(), &whole, &judged.joints);
-    told(&mut report.detail(), judged, &whole);
+    errors_by_joint(&mut report.detail(), judged, &whole);
     if let Some(ErrorsByUse { used, .. }) = by_use {
         let mut detail = report.detail();
         detail.line("");
@@ -148,7 +148,7 @@ fn escaped(names: &[String]) -> String {
 }
 
 /// The errors for a terminal.
-pub fn told(terminal: &mut Writer, of: &TorqueErrors, caption: &str) {
+pub fn errors_by_joint(terminal: &mut Writer, of: &TorqueErrors, caption: &str) {
     terminal.table(summary::torque_errors(caption, &of.joints));
     if let Some(text) = at_rest(of) {
         terminal.line("");

@@ -54,19 +54,7 @@ pub(super) fn section(page: &mut Writer, machine: &LoggedRobot, found: &Diagnose
 fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
     let names = machine.robot.joint_names();
     let torque = machine.file.torque_unit(joint);
-    let over = map.signals.map(|signal| {
-        let position = |j: usize| machine.robot.joint_kind(j).position_unit();
-        let unit = match signal {
-            Signal::Position(j) => position(j).to_owned(),
-            Signal::Speed(j) => format!("{}/s", position(j)),
-            Signal::Acceleration => format!("{}/s\u{b2}", position(joint)),
-            Signal::Load => torque.to_owned(),
-            Signal::Direction => "1".to_owned(),
-            Signal::SinceReversal | Signal::Time => "s".to_owned(),
-            Signal::Temperature(_) => "degC".to_owned(),
-        };
-        (signal_words(names, joint, signal), unit)
-    });
+    let over = map.signals.map(|signal| axis_of(machine, joint, signal));
     let small = [0, 1]
         .map(|s: usize| over[s].1 == "m" && map.ends[s].iter().all(|end| end.abs() < MILLIMETRES));
     let scale = small.map(|small| if small { 1e3 } else { 1.0 });
@@ -93,4 +81,22 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
             .map(|[x, mean, std]| [scale[0] * x, *mean, *std])
             .collect(),
     }
+}
+
+/// Name and unit of a signal of a joint.
+pub(super) fn axis_of(machine: &LoggedRobot, joint: usize, signal: Signal) -> (String, String) {
+    let position = |j: usize| machine.robot.joint_kind(j).position_unit();
+    let unit = match signal {
+        Signal::Position(j) => position(j).to_owned(),
+        Signal::Speed(j) => format!("{}/s", position(j)),
+        Signal::Acceleration => format!("{}/s\u{b2}", position(joint)),
+        Signal::Load => machine.file.torque_unit(joint).to_owned(),
+        Signal::Direction => "1".to_owned(),
+        Signal::SinceReversal | Signal::Time => "s".to_owned(),
+        Signal::Temperature(_) => "degC".to_owned(),
+    };
+    (
+        signal_words(machine.robot.joint_names(), joint, signal),
+        unit,
+    )
 }

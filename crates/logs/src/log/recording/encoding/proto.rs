@@ -331,7 +331,7 @@ impl ProtoReader {
 }
 
 /// Where `value` stands in the list of texts `list` of a message, and how many texts that has; the outer
-/// option tells whether there is such a list.
+/// option says whether there is such a list.
 fn named(
     place: &Place<'_>,
     list: &str,

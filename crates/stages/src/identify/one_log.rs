@@ -20,7 +20,7 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 
 /// What one source says about one parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Told {
+pub(super) struct OneEstimate {
     pub name: String,
     pub joint: Option<String>,
     pub unit: String,
@@ -29,7 +29,7 @@ pub(super) struct Told {
     pub variance: f64,
 }
 
-impl Told {
+impl OneEstimate {
     pub(super) fn is(&self, other: &Self) -> bool {
         (&self.name, &self.joint) == (&other.name, &other.joint)
     }
@@ -40,31 +40,31 @@ impl Told {
     }
 }
 
-/// What one source tells.
+/// What one source says.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Source {
-    pub told: Vec<Told>,
+    pub estimates: Vec<OneEstimate>,
     /// Covariance in their order, row by row; 0 where unknown.
     covariance: Vec<f64>,
 }
 
 impl Source {
     /// Correlation of the errors of two parameters, where both are determined.
-    pub(super) fn correlation(&self, one: &Told, other: &Told) -> Option<f64> {
-        let place = |of: &Told| self.told.iter().position(|t| t.is(of));
+    pub(super) fn correlation(&self, one: &OneEstimate, other: &OneEstimate) -> Option<f64> {
+        let place = |of: &OneEstimate| self.estimates.iter().position(|t| t.is(of));
         let (i, j) = (place(one)?, place(other)?);
-        let n = self.told.len();
-        let norm = (self.told[i].variance * self.told[j].variance).sqrt();
+        let n = self.estimates.len();
+        let norm = (self.estimates[i].variance * self.estimates[j].variance).sqrt();
         let covariance = *self.covariance.get(i * n + j)?;
         norm.is_finite().then_some(covariance / norm)
     }
 
-    /// What a model tells.
+    /// What a model says.
     pub(super) fn of_model(file: &ModelFile) -> Self {
-        let told = |p: &Parameter| {
+        let estimate = |p: &Parameter| {
             let known = p.verdict != Some(Verdict::NotIdentifiable);
             let std = p.std.filter(|std| known && *std > 0.0);
-            Told {
+            OneEstimate {
                 name: p.name.clone(),
                 joint: p.joint.clone(),
                 unit: p.unit.clone(),
@@ -74,12 +74,12 @@ impl Source {
         };
         let keys: Vec<String> = file.parameters.iter().map(Parameter::key).collect();
         Source {
-            told: file.parameters.iter().map(told).collect(),
+            estimates: file.parameters.iter().map(estimate).collect(),
             covariance: file.covariance_of(&keys),
         }
     }
 
-    /// What a reduced log tells by itself; all that is not determined has an infinite variance.
+    /// What a reduced log says by itself; all that is not determined has an infinite variance.
     pub(super) fn of_part(
         part: &Arc<ReducedLog>,
         control: &Control,
@@ -94,7 +94,7 @@ impl Source {
         let mut passes = Passes::new(&machine, from_ref(&log), control);
         let found = match estimate(&mut passes, linear.clone(), EstimatorKind::Wls, false) {
             Ok(found) => Some(found.fit),
-            // a log that tells nothing is a log that tells nothing
+            // a log that says nothing is a log that says nothing
             Err(IdentifyError::Fit(_)) => None,
             Err(error) => return Err(error),
         };
@@ -112,27 +112,27 @@ impl Source {
             })
         });
         let named = inertial.chain(own).enumerate();
-        let told: Vec<Told> = named
+        let estimates: Vec<OneEstimate> = named
             .map(|(i, (name, joint, unit))| {
-                let told = found.as_ref().filter(|fit| fit.determined[i]);
-                let variance = told.map(|fit| fit.covariance[(i, i)]);
-                Told {
+                let fitted = found.as_ref().filter(|fit| fit.determined[i]);
+                let variance = fitted.map(|fit| fit.covariance[(i, i)]);
+                OneEstimate {
                     name,
                     joint,
                     unit,
-                    value: told.map_or(0.0, |fit| fit.theta[i]),
+                    value: fitted.map_or(0.0, |fit| fit.theta[i]),
                     variance: variance.filter(|v| *v > 0.0).unwrap_or(f64::INFINITY),
                 }
             })
             .collect();
-        let n = told.len();
+        let n = estimates.len();
         let of = |fit: &Fit| {
             let places = (0..n * n).map(|k| (k / n, k % n));
             places.map(|(i, j)| fit.covariance[(i, j)]).collect()
         };
         Ok(Source {
             covariance: found.as_ref().map(of).unwrap_or_default(),
-            told,
+            estimates,
         })
     }
 }

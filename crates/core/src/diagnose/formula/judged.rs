@@ -1,0 +1,289 @@
+//! Formulas before the judge of every other effect: each an effect of the user's own whose shapes are refined, asked of
+//! parts and of data set aside.
+
+use super::Proposed;
+use super::term::{FormulaTerm, Names, ShapeNumber, Source, named};
+use crate::diagnose::candidates::refined_shapes;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::outcome::{FormulaEnd, FoundEffect, FoundFormula, StepStatus, Symmetry};
+use crate::diagnose::prepared::PreparedCase;
+use crate::diagnose::problem::case::formula_name;
+use crate::diagnose::problem::pass::Candidate;
+use crate::diagnose::search::Chosen;
+use crate::diagnose::searched::SearchedCase;
+use crate::diagnose::steps::{Judged, judge};
+use crate::diagnose::watch::UNWATCHED;
+use crate::effect::formula::{Definition, Shape};
+use crate::effect::{Added, Place, own};
+use crate::judge::{BlocksLeftOut, Bound};
+use crate::robot::FormulaSignal;
+
+/// A shape is refined from half to twice its value on the grid; a wave within so much of it.
+const AROUND: [f64; 2] = [0.5, 2.0];
+const WAVE: [f64; 2] = [0.95, 1.05];
+
+/// What was made of a search: formulas, and the outcome with those that the user accepts.
+pub struct SearchedFormulas {
+    pub formulas: Vec<FoundFormula>,
+    pub accepted: Option<(SearchedCase, Judged)>,
+}
+
+impl PreparedCase<'_> {
+    /// Judges what is proposed beside the effects that are confirmed.
+    pub fn judged_formulas(
+        &self,
+        searched: &SearchedCase,
+        confirmed: &[Chosen],
+        proposed: Vec<Proposed>,
+    ) -> Result<SearchedFormulas, DiagnoseError> {
+        let definitions = proposed.iter().map(|p| self.definition(p));
+        let definitions: Vec<Definition> = definitions.collect();
+        let all: Vec<usize> = (0..proposed.len()).collect();
+        let mut formulas = Vec::new();
+        if !proposed.is_empty() {
+            let (_, judged) =
+                self.with_formulas(searched, (confirmed, &proposed), &definitions, &all)?;
+            let first = judged.steps.len() - proposed.len();
+            let each = proposed
+                .iter()
+                .zip(&definitions)
+                .zip(&judged.steps[first..]);
+            for ((p, definition), step) in each {
+                let mut told = self.told(searched, confirmed, (p, definition), step.clone());
+                if let Some(place) = step.judged {
+                    told.picture = self.picture((&judged.judge, place), p.joint, &told.signals)?;
+                }
+                formulas.push(told);
+            }
+        }
+        let robot = &self.case.given.model.robot;
+        let wanted = |i: &usize| {
+            let joint = &robot.joint_names()[proposed[*i].joint];
+            self.case.wishes.wants_formula(joint)
+        };
+        let accepted: Vec<usize> = all.into_iter().filter(wanted).collect();
+        let asked = self.case.wishes.accepted.iter();
+        let found = |joint: &Option<String>| {
+            let joint = joint.as_deref();
+            accepted
+                .iter()
+                .any(|i| Some(robot.joint_names()[proposed[*i].joint].as_str()) == joint)
+        };
+        let mut missing = asked.filter(|w| self.case.wishes.is_formula(w) && !found(&w.1));
+        if let Some((name, joint)) = missing.next() {
+            return Err(DiagnoseError::Accept {
+                name: format!("{name}:{}", joint.as_deref().unwrap_or("JOINT")),
+                why: "no formula was found there: see `formulas` in the JSON document".to_owned(),
+            });
+        }
+        let accepted = match accepted.is_empty() {
+            true => None,
+            false => Some(self.with_formulas(
+                searched,
+                (confirmed, &proposed),
+                &definitions,
+                &accepted,
+            )?),
+        };
+        Ok(SearchedFormulas { formulas, accepted })
+    }
+
+    /// Some formulas beside the effects that stay, in their best shape, and what the judge makes of all of them.
+    fn with_formulas(
+        &self,
+        searched: &SearchedCase,
+        (confirmed, proposed): (&[Chosen], &[Proposed]),
+        definitions: &[Definition],
+        taken: &[usize],
+    ) -> Result<(SearchedCase, Judged), DiagnoseError> {
+        let stays = |c: &&Chosen| {
+            let same = |own: &Chosen| own.candidate == c.candidate;
+            taken.iter().all(|i| proposed[*i].beside.iter().any(same))
+        };
+        let mut chosen: Vec<Chosen> = confirmed.iter().filter(stays).cloned().collect();
+        let mut candidates = searched.candidates.clone();
+        for (i, candidate) in candidates.iter_mut().enumerate() {
+            if !chosen.iter().any(|c| c.candidate == i) {
+                candidate.bounds.clear();
+                candidate.slopes.clear();
+            }
+        }
+        for i in taken {
+            chosen.push(Chosen {
+                candidate: candidates.len(),
+                gain: proposed[*i].selected.gain.clone(),
+                error: proposed[*i].selected.error,
+                alternatives: Vec::new(),
+            });
+            candidates.push(self.candidate(&proposed[*i], &definitions[*i])?);
+        }
+        let about = searched.summed.about.clone();
+        let summed = self.summed(about, &candidates, &searched.directions)?;
+        let summed = self.polished(&mut candidates, &summed, &chosen, &searched.directions)?;
+        let first = chosen.len() - taken.len();
+        for at in first..chosen.len() {
+            let field = self.field(&candidates, &summed, UNWATCHED);
+            let mut others = chosen.clone();
+            let own = others.remove(at).candidate;
+            let terms = summed.declared.with(&field.terms_of(&others));
+            let left_out = BlocksLeftOut::new(&summed.sums, self.judging(), &terms);
+            let left_out = left_out.ok_or(DiagnoseError::NothingDetermined {
+                unknowns: self.unknowns.len(),
+            })?;
+            let errors = left_out.errors();
+            let weighted = errors.iter().flat_map(|e| e.iter().zip(&terms.weights));
+            chosen[at].error = weighted.map(|(e, w)| e * w).sum();
+            chosen[at].gain = left_out.gain(&field.terms[own]);
+        }
+        let case = SearchedCase {
+            candidates,
+            summed,
+            chosen,
+            not_tried: searched.not_tried.clone(),
+            looked: searched.looked.clone(),
+            directions: searched.directions.clone(),
+            ..*searched
+        };
+        let judged = judge(self, &case)?;
+        Ok((case, judged))
+    }
+
+    fn candidate(
+        &self,
+        of: &Proposed,
+        definition: &Definition,
+    ) -> Result<Candidate, DiagnoseError> {
+        let robot = &self.case.given.model.robot;
+        let law = own::law(definition, robot)?;
+        let shape = self.shapes(of).iter().map(|s| s.value).collect();
+        let effect = Added::new(
+            law,
+            Place::Joint(of.joint),
+            shape,
+            vec![0.0; law.linear.len()],
+        );
+        Ok(Candidate {
+            bounds: vec![Bound::NONE; law.linear.len()],
+            slopes: refined_shapes(&self.fitted.model, self.case, &self.cover, &effect),
+            effect,
+        })
+    }
+
+    fn shapes(&self, of: &Proposed) -> Vec<ShapeNumber> {
+        self.with_names(of.joint, |names| named(&of.terms, names))
+    }
+
+    /// What names and units there are at a joint.
+    pub(super) fn with_names<T>(&self, joint: usize, of: impl FnOnce(&Names) -> T) -> T {
+        let robot = &self.case.given.model.robot;
+        let kinds = (0..robot.joints()).map(|k| robot.joint_kind(k).position_unit());
+        of(&Names {
+            joint,
+            joints: robot.joint_names(),
+            positions: &kinds.collect::<Vec<_>>(),
+            torques: &self.case.units,
+        })
+    }
+
+    /// A formula as an effect of the user's own: its name is that of its joint.
+    fn definition(&self, of: &Proposed) -> Definition {
+        self.with_names(of.joint, |names| {
+            let shapes = named(&of.terms, names);
+            let mut coefficients: Vec<[String; 3]> = Vec::new();
+            for term in &of.terms {
+                let unit = term.unit(names).unwrap_or_default();
+                for text in term.texts(names, &shapes) {
+                    let name = format!("c{}", coefficients.len() + 1);
+                    coefficients.push([name, unit.clone(), text]);
+                }
+            }
+            let joint = &names.joints[of.joint];
+            Definition {
+                name: self.free_name(&formula_name(joint)),
+                joints: Some(vec![joint.clone()]),
+                coefficients,
+                shapes: shapes.iter().map(range).collect(),
+                friction: self.symmetry(of).odd > 0.5,
+                at_rest: of
+                    .terms
+                    .iter()
+                    .flat_map(FormulaTerm::sources)
+                    .all(Source::is_position),
+                meaning: "a formula of what was left, found by diagnose --search".to_owned(),
+            }
+        })
+    }
+
+    /// A name, numbered where the given model has an effect that is called so.
+    fn free_name(&self, name: &str) -> String {
+        let known = |own: &String| self.case.given.effects.iter().any(|e| e.name() == own);
+        let numbered = (2..).map(|k| format!("{name}-{k}"));
+        let mut all = std::iter::once(name.to_owned()).chain(numbered);
+        all.find(|own| !known(own)).unwrap_or_default()
+    }
+
+    fn symmetry(&self, of: &Proposed) -> Symmetry {
+        Symmetry::of(&of.terms, &of.selected.squares, of.joint)
+    }
+
+    fn told(
+        &self,
+        searched: &SearchedCase,
+        confirmed: &[Chosen],
+        (of, definition): (&Proposed, &Definition),
+        step: FoundEffect,
+    ) -> FoundFormula {
+        let stays = |c: &&Chosen| !of.beside.iter().any(|own| own.candidate == c.candidate);
+        let replaced = confirmed.iter().filter(stays);
+        let end = match &step {
+            _ if of.p_value > self.case.formula.chance => FormulaEnd::Chance,
+            step if step.status == StepStatus::Seen => FormulaEnd::Parts,
+            step if step.joints.iter().any(|j| j.worsened) => FormulaEnd::Worse,
+            _ => FormulaEnd::Found,
+        };
+        FoundFormula {
+            joint: of.joint,
+            end,
+            definition: definition.clone(),
+            step,
+            p_value: of.p_value,
+            share: of.selected.gain.value / of.selected.error.max(f64::MIN_POSITIVE),
+            symmetry: self.symmetry(of),
+            signals: signals(&of.terms),
+            picture: None,
+            in_place_of: replaced
+                .map(|c| searched.candidates[c.candidate].effect.clone())
+                .collect(),
+        }
+    }
+}
+
+fn range(shape: &ShapeNumber) -> Shape {
+    let [from, to] = if shape.name.starts_with('n') {
+        WAVE
+    } else {
+        AROUND
+    };
+    Shape {
+        name: shape.name.clone(),
+        unit: shape.unit.clone(),
+        range: [from * shape.value, to * shape.value],
+    }
+}
+
+/// Signals that terms are functions of, each once, those of the first terms first.
+fn signals(terms: &[FormulaTerm]) -> Vec<(FormulaSignal, usize)> {
+    let mut all = Vec::new();
+    for source in terms.iter().flat_map(FormulaTerm::sources) {
+        let own = match source {
+            Source::Signal(of, j) | Source::State(of, j, _) => vec![(of, j)],
+            Source::Sum(i, j) => vec![(FormulaSignal::Position, i), (FormulaSignal::Position, j)],
+        };
+        all.extend(
+            own.into_iter()
+                .filter(|s| !all.contains(s))
+                .collect::<Vec<_>>(),
+        );
+    }
+    all
+}

@@ -1,0 +1,306 @@
+//! The formula of what is left of a joint: few terms of a library, found on blocks left out, judged as every effect is.
+//!
+//! ```text
+//! what is left of a joint beside the effects that are confirmed (or beside none of its own)
+//!      -> library: functions of signals, and products of two, whose units one constant makes right
+//!      -> select: the greatest gain on blocks left out, exchanged, pruned
+//!      -> chance: the same search where whole parts of the residual have another sign
+//!      -> judged: its shapes refined, then parts, held-out data, no joint worse
+//! ```
+//!
+//! Regression with few terms on a library (Brunton, Proctor and Kutz 2016), and not by evolution of trees: a library's
+//! columns stand beside the declared ones in the same sums of products, so that every block can be left out and every
+//! null can be drawn without a look at a row. What there is in Rust evolves trees on the squared error of all rows
+//! (`symbolic_regression` 0.12, after SymbolicRegression.jl, is the best kept): no declared parameter is refitted beside a tree, no
+//! block is left out, and a null of 99 searches would take hours. `exmex` evaluates what is found, as it does a user's
+//! formulas.
+//!
+//! | file | does |
+//! |---|---|
+//! | `term` | functions of signals, products of them, units, names |
+//! | `library` | the terms that are searched |
+//! | `select` | few of them |
+//! | `judged` | a formula as an effect of the user's own, before the judge |
+//! | `symmetry` | what kind of physics it is, whatever its terms |
+//! | `picture` | it over its first signal, on data set aside |
+
+mod columns;
+mod judged;
+mod library;
+mod picture;
+mod select;
+mod symmetry;
+mod term;
+#[cfg(test)]
+mod tests;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use self::columns::Columns;
+use self::judged::SearchedFormulas;
+use self::library::{Around, library};
+use self::select::{Products, Selected, gram};
+use self::term::{FormulaTerm, Names};
+use super::error::DiagnoseError;
+use super::outcome::Diagnosis;
+use super::prepared::PreparedCase;
+use super::problem::pass::{Candidate, Made, RowsOfJoint, joint_rows};
+use super::search::Chosen;
+use super::searched::SearchedCase;
+use super::steps::Judged;
+use super::watch::Watch;
+use crate::effect::Place;
+use crate::judge::{LEAST_PARTS, TimeBlock, compare};
+
+/// A formula of a joint before the judge.
+pub struct Proposed {
+    pub joint: usize,
+    pub terms: Vec<FormulaTerm>,
+    pub selected: Selected,
+    /// Chance of a gain as large where whole parts of the residual have another sign.
+    pub p_value: f64,
+    /// Effects of the catalogue that stay beside it.
+    pub beside: Vec<Chosen>,
+}
+
+impl PreparedCase<'_> {
+    /// Formulas of joints whose residual is above its noise.
+    pub(super) fn formulas(
+        &self,
+        (searched, judged): (&SearchedCase, &Judged),
+        found: &Diagnosis,
+        watch: Watch,
+    ) -> Result<SearchedFormulas, DiagnoseError> {
+        let joints: Vec<usize> = match self.blocks.parts >= LEAST_PARTS {
+            true => found.structured_joints().collect(),
+            false => Vec::new(),
+        };
+        let confirmed = searched.chosen.iter().zip(&judged.steps);
+        let confirmed = confirmed.filter(|(_, step)| step.judged.is_some());
+        let confirmed: Vec<Chosen> = confirmed.map(|(c, _)| c.clone()).collect();
+        let part = watch.part("formulas", joints.len());
+        let mut proposed = Vec::new();
+        for j in joints {
+            if (watch.stop)() {
+                return Err(DiagnoseError::Interrupted);
+            }
+            proposed.extend(self.proposed(searched, &confirmed, j)?);
+            part.step();
+        }
+        drop(part);
+        self.judged_formulas(searched, &confirmed, proposed)
+    }
+
+    /// The formula of a joint that is to be judged: beside what the catalogue found at the joint, or in its place where it
+    /// explains as much by itself.
+    fn proposed(
+        &self,
+        searched: &SearchedCase,
+        confirmed: &[Chosen],
+        j: usize,
+    ) -> Result<Option<Proposed>, DiagnoseError> {
+        let of_joint = OfJoint::of(self, searched, confirmed, j);
+        let terms = self.with_names(j, |names| library(&self.around(names)));
+        let rows = self.joint_rows(searched, &of_joint.candidates, &terms, j)?;
+        let gram = gram(&rows.more);
+        let search = |with_own: bool| -> Result<Option<Proposed>, DiagnoseError> {
+            let kept = of_joint.kept(with_own);
+            let (ridge, rows) = (self.case.numbers.ridge, (&rows, &gram, kept.as_slice()));
+            let products = self.with_names(j, |names| Products::of(&terms, rows, names, ridge));
+            let Some(products) = products else {
+                return Ok(None);
+            };
+            let Some(selected) = self.selected(&products, None) else {
+                return Ok(None);
+            };
+            let p_value = self.chance(&products, &selected);
+            let terms = selected.terms.iter().map(|t| terms[*t].clone()).collect();
+            let (terms, selected) =
+                self.reshaped(searched, (&of_joint, &kept), (terms, selected))?;
+            let stays = |c: &&Chosen| with_own || !of_joint.is_own(searched, c);
+            Ok(Some(Proposed {
+                joint: j,
+                terms,
+                selected,
+                p_value,
+                beside: confirmed.iter().filter(stays).cloned().collect(),
+            }))
+        };
+        let beside = search(true)?;
+        let alone = match of_joint.own.contains(&true) {
+            true => search(false)?,
+            false => None,
+        };
+        Ok(match (beside, alone) {
+            (Some(beside), Some(alone)) => {
+                let gain = compare(&alone.selected.left, &beside.selected.left, &[1.0]);
+                let more = gain.is_beyond(self.case.numbers.screen, None);
+                Some(if more { beside } else { alone })
+            }
+            (beside, alone) => alone.or(beside),
+        })
+    }
+
+    fn selected(&self, products: &Products, signs: Option<&[f64]>) -> Option<Selected> {
+        let plain = vec![1.0; self.blocks.list.len()];
+        let numbers = (&self.case.formula, &self.case.numbers);
+        products.select(signs.unwrap_or(&plain), numbers)
+    }
+
+    /// Terms chosen anew of those that were chosen and of these with shapes between those of the library, twice, closer
+    /// each time: what only made good for a wrong shape falls out.
+    fn reshaped(
+        &self,
+        searched: &SearchedCase,
+        (of_joint, kept): (&OfJoint, &[usize]),
+        (mut terms, mut selected): (Vec<FormulaTerm>, Selected),
+    ) -> Result<(Vec<FormulaTerm>, Selected), DiagnoseError> {
+        let j = of_joint.joint;
+        for by in CLOSER {
+            let mut near = terms.clone();
+            near.extend(terms.iter().flat_map(|t| t.reshaped(&by)));
+            if near.len() == terms.len() {
+                break;
+            }
+            let rows = self.joint_rows(searched, &of_joint.candidates, &near, j)?;
+            let gram = gram(&rows.more);
+            let (ridge, rows) = (self.case.numbers.ridge, (&rows, &gram, kept));
+            let products = self.with_names(j, |names| Products::of(&near, rows, names, ridge));
+            let Some(found) = products.and_then(|p| self.selected(&p, None)) else {
+                break;
+            };
+            terms = found.terms.iter().map(|t| near[*t].clone()).collect();
+            selected = found;
+        }
+        Ok((terms, selected))
+    }
+
+    fn around<'b>(&'b self, names: &'b Names<'b>) -> Around<'b> {
+        let stretches = &self.case.stretches;
+        let joints = 0..self.cover.joints.len();
+        let moving = joints.clone().filter(|k| !self.cover.joints[*k].stationary);
+        let spread = |k: usize| {
+            let all = stretches.iter().flat_map(|s| &s.temperature[k]);
+            let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+                [a.min(*x), b.max(*x)]
+            });
+            high - low
+        };
+        let known = joints.filter(|k| stretches.iter().all(|s| s.has_temperature(*k)));
+        Around {
+            joint: names.joint,
+            cover: &self.cover,
+            names,
+            moving: moving.collect(),
+            warm: known
+                .map(|k| (k, spread(k)))
+                .filter(|(_, s)| *s > 0.0)
+                .collect(),
+        }
+    }
+
+    /// Rows of a joint with the columns of all terms.
+    fn joint_rows(
+        &self,
+        searched: &SearchedCase,
+        candidates: &[Candidate],
+        terms: &[FormulaTerm],
+        j: usize,
+    ) -> Result<RowsOfJoint, DiagnoseError> {
+        let columns = Columns::of(terms);
+        let made = Made {
+            series: &|scene| columns.series(scene),
+            column: &|series, i| columns.column(series, i),
+            count: columns.count(),
+        };
+        let rows = joint_rows(
+            &searched.summed.about,
+            (&self.unknowns, candidates),
+            (&self.data, &self.blocks.list),
+            (j, self.case.formula.rows),
+            &made,
+        )?;
+        Ok(rows)
+    }
+
+    /// Chance of a gain as large where whole parts of the residual have another sign: the whole search each time, until
+    /// it is too large to be told.
+    fn chance(&self, products: &Products, selected: &Selected) -> f64 {
+        let numbers = &self.case.formula;
+        let mut chance = ChaCha8Rng::seed_from_u64(numbers.seed);
+        let mut signs = || {
+            let sign = |_| if chance.random::<bool>() { 1.0 } else { -1.0 };
+            let of_parts: Vec<f64> = (0..self.blocks.parts).map(sign).collect();
+            let of_block = |b: &TimeBlock| of_parts[b.part];
+            self.blocks.list.iter().map(of_block).collect::<Vec<f64>>()
+        };
+        let draws: Vec<Vec<f64>> = (0..numbers.draws).map(|_| signs()).collect();
+        let (mut drawn, mut as_good) = (0, 0);
+        for some in draws.chunks(TOGETHER) {
+            let found = some
+                .par_iter()
+                .map(|signs| self.selected(products, Some(signs)));
+            let found: Vec<Option<Selected>> = found.collect();
+            let gains = found.iter().flatten().filter(|s| s.even >= selected.even);
+            (drawn, as_good) = (drawn + some.len(), as_good + gains.count());
+            if (1 + as_good) as f64 > numbers.chance * (1 + numbers.draws) as f64 {
+                break;
+            }
+        }
+        (1 + as_good) as f64 / (1 + drawn) as f64
+    }
+}
+
+/// What the model has at a joint beside a formula.
+struct OfJoint {
+    joint: usize,
+    /// Effects that are confirmed.
+    candidates: Vec<Candidate>,
+    /// Of each declared column: whether it is of an effect of the joint itself.
+    own: Vec<bool>,
+}
+
+impl OfJoint {
+    fn of(
+        prepared: &PreparedCase,
+        searched: &SearchedCase,
+        confirmed: &[Chosen],
+        joint: usize,
+    ) -> Self {
+        let candidates = confirmed
+            .iter()
+            .map(|c| searched.candidates[c.candidate].clone());
+        let candidates: Vec<Candidate> = candidates.collect();
+        let mut own = vec![false; prepared.unknowns.columns[joint].len()];
+        for candidate in candidates.iter().filter(|c| c.effect.place.touches(joint)) {
+            let is_own = candidate.effect.place == Place::Joint(joint);
+            own.extend(vec![
+                is_own;
+                candidate.bounds.len() + candidate.slopes.len()
+            ]);
+        }
+        OfJoint {
+            joint,
+            candidates,
+            own,
+        }
+    }
+
+    fn is_own(&self, searched: &SearchedCase, chosen: &Chosen) -> bool {
+        searched.candidates[chosen.candidate].effect.place == Place::Joint(self.joint)
+    }
+
+    /// Declared columns, with those of the joint's own effects or without.
+    fn kept(&self, with_own: bool) -> Vec<usize> {
+        let all = 0..self.own.len();
+        all.filter(|i| with_own || !self.own[*i]).collect()
+    }
+}
+
+/// Numbers by which shapes are multiplied to be tried between those of the library, the second time closer.
+const CLOSER: [[f64; 4]; 2] = [[0.6, 0.78, 1.28, 1.65], [0.88, 0.94, 1.06, 1.13]];
+
+/// Draws that are searched side by side.
+const TOGETHER: usize = 11;
