@@ -250,7 +250,7 @@ def main():
     if len(words) > 1:
         rows = [{"cases": kind, "number": many, "not as they must be": sum(fault["of"] == kind for fault in faults)}
                 for kind, many in counts.items()]  # fmt: skip
-        result = {"study": "files that nobody should give", "command": "benches/quality/run.sh files", "rows": rows}
+        result = {"study": "files that nobody should give" + ", short form" * short, "command": "benches/quality/run.sh files", "rows": rows}
         Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
     for fault in faults[:40]:
         print(fault)

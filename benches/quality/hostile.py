@@ -137,7 +137,7 @@ def product(bench, faults, containers, commands, each):
     return rows
 
 
-def summary(rows):
+def summary(rows, short):
     """How many cases of a group of faults ended in which way."""
     groups = {}
     for row in rows:
@@ -149,7 +149,7 @@ def summary(rows):
             "refused for something else", "wrong without a word", "fault")  # fmt: skip
     table = [{"faults": name} | {way: group[way] for way in ways} for name, group in groups.items()]
     table.append({"faults": "all"} | {way: sum(row[way] for row in table) for way in ways})
-    return {"study": "faults of a log in six containers, fitted", "command": "benches/quality/run.sh hostile", "rows": table}
+    return {"study": "faults of a log in six containers, fitted" + ", short form" * short, "command": "benches/quality/run.sh hostile", "rows": table}
 
 
 def main():
@@ -162,7 +162,7 @@ def main():
             faults = {name: FAULTS[name] for k, name in enumerate(FAULTS) if k % 7 == 0}
         rows = product(bench, faults, list(arm_logs.CONTAINERS), () if short or "--fits" in sys.argv else COMMANDS, 4)
     if len(words) > 1:
-        Path(words[1]).write_text(json.dumps(summary(rows), indent=1, ensure_ascii=False) + "\n")
+        Path(words[1]).write_text(json.dumps(summary(rows, short), indent=1, ensure_ascii=False) + "\n")
     if "--all" in sys.argv:
         Path("hostile_rows.json").write_text(json.dumps(rows, indent=1))
     bad = [row for row in rows if row["outcome"] in ("fault", "wrong without a word")]

@@ -78,7 +78,8 @@ def kills(tool, folder, name, many, chance):
 def main():
     words = [word for word in sys.argv[1:] if not word.startswith("--")]
     tool = str(Path(words[0]).resolve())
-    many = 12 if "--short" in sys.argv else KILLS
+    short = "--short" in sys.argv
+    many = 12 if short else KILLS
     rows, faults = [], []
     for name in CASES:
         with tempfile.TemporaryDirectory() as folder:
@@ -93,7 +94,7 @@ def main():
     for fault in faults[:30]:
         print(fault)
     if len(words) > 1:
-        result = {"study": "kill -9 at random moments", "command": "benches/quality/run.sh interrupted", "rows": rows}
+        result = {"study": "kill -9 at random moments" + ", short form" * short, "command": "benches/quality/run.sh interrupted", "rows": rows}
         Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
     return bool(faults)
 

@@ -164,7 +164,7 @@ def main():
     if len(words) > 1:
         columns = list(dict.fromkeys(key for row in rows for key in row))
         rows = [{key: row.get(key) for key in columns} for row in rows]
-        result = {"study": "long and many logs", "command": "benches/quality/run.sh large", "rows": rows}
+        result = {"study": "long and many logs" + ", short form" * short, "command": "benches/quality/run.sh large", "rows": rows}
         Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
     return not all(row["held"] for row in rows)
 

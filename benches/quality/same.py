@@ -79,7 +79,7 @@ def main():
     digest = hashlib.sha256(b"".join(base[path] for path in sorted(base))).hexdigest()
     print("all documents:", digest)
     if len(words) > 1:
-        result = {"study": "what changes between runs", "command": "benches/quality/run.sh same", "rows": rows}
+        result = {"study": "what changes between runs" + ", short form" * short, "command": "benches/quality/run.sh same", "rows": rows}
         Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
     return bool(bad)
 
