@@ -89,8 +89,9 @@ fn search(seed: u64, torque: &dyn Fn(&[Vec<f64>], usize) -> f64) -> Option<Selec
             .map(|b| b * ROWS / BLOCKS..(b + 1) * ROWS / BLOCKS)
             .collect(),
     };
-    let products =
-        with_names(|names| Products::of(&terms, (&rows, &[0, 1, 2, 3]), names, NUMBERS.ridge))?;
+    let gram = gram(&rows.more);
+    let rows = (&rows, &gram, &[0, 1, 2, 3][..]);
+    let products = with_names(|names| Products::of(&terms, rows, names, NUMBERS.ridge))?;
     products.select(&[1.0; BLOCKS], (&FORMULA_NUMBERS, &NUMBERS))
 }
 
