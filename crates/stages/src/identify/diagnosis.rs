@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 use super::diagnose::{DataFault, Diagnosed};
-use super::formulas::{FormulaResult, formula_result};
+use super::formulas::{EffectValueFound, FormulaResult, JointGain, formula_result};
 use super::logged_robot::LoggedRobot;
 use super::next_motion::separating_command;
 use crate::open_loop::FreeRun;
@@ -112,14 +112,6 @@ pub struct DiagnosisStep {
     pub joints: Vec<JointChange>,
 }
 
-/// What a joint gains.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct JointGain {
-    pub joint: String,
-    pub value: f64,
-    pub se: f64,
-}
-
 /// How the data were divided.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct BlocksResult {
@@ -141,17 +133,6 @@ pub struct ChangeResult {
     pub by: f64,
     /// Gain on blocks left out over its standard error.
     pub certainty: f64,
-}
-
-/// One number of an effect.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct EffectValueFound {
-    pub value: f64,
-    pub std: Option<f64>,
-    pub unit: String,
-    /// It is held at a bound, for these data do not determine it.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub bound: bool,
 }
 
 /// Errors on the logs that were fitted and on held-out data.

@@ -6,7 +6,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::diagnose::Diagnosed;
-use super::diagnosis::{EffectValueFound, JointGain};
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::diagnose::{FormulaEnd, FoundFormula, JointChange, Symmetry};
 use cft_ident_core::effect::EffectNumber;
@@ -14,6 +13,25 @@ use cft_ident_core::effect::formula::{Definition, Shape};
 use cft_ident_core::number;
 use cft_ident_core::robot::FormulaSignal;
 use cft_ident_files::config::candidates::{self, CandidateSection, ShapeRange};
+
+/// What a joint gains.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct JointGain {
+    pub joint: String,
+    pub value: f64,
+    pub se: f64,
+}
+
+/// One number of an effect.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct EffectValueFound {
+    pub value: f64,
+    pub std: Option<f64>,
+    pub unit: String,
+    /// It is held at a bound, for these data do not determine it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub bound: bool,
+}
 
 /// The formula of what is left of a joint.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
