@@ -68,7 +68,7 @@ fn faults() -> Vec<Fault> {
             rows.filter(|(k, _)| chance(*k, 5) < share)
                 .for_each(|(_, row)| row[2] = f64::NAN);
         };
-        let words = &["nan", "NaN", "no number"];
+        let words = &["nan", "NaN", "no number", "lack a channel"];
         add(&of("torques that are no numbers"), Box::new(none), words);
     }
     for every in [1, 10] {

@@ -206,7 +206,7 @@ fn a_search_finds_the_formula_and_writes_it_where_the_user_accepts_it() {
     done(at, &words.split(' ').collect::<Vec<_>>());
     let (status, message, _) = run(at, &[&search[..], &["--accept", "formula:wrist"]].concat());
     assert!(
-        status == 3 && message.contains("no formula was found there"),
+        status == 4 && message.contains("no formula was found there"),
         "{status} {message}"
     );
 }

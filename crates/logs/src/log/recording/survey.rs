@@ -388,7 +388,8 @@ fn missing(
     let index = lacking.map_or(0, |index| index - range.start);
     let joint = layout.name_in_messages(index).unwrap_or_default();
     let column = channels.get(index).map_or("", |c| c.column.as_str());
-    if lacking.is_some() && best.names.iter().any(|name| name == joint) {
+    // the names of a message of temperatures may be those of the joints too
+    if !layout.temperatures && lacking.is_some() && best.names.iter().any(|name| name == joint) {
         return (
             format!(
                 "messages of {} name {}, and hold no number as its {what}",

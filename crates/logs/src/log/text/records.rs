@@ -194,7 +194,14 @@ impl Records {
             (size, count, taken) = (size + written, count + fields, taken + read);
             match result {
                 ReadRecordResult::InputEmpty => {}
-                ReadRecordResult::OutputFull => record.bytes.resize(2 * record.bytes.len(), 0),
+                ReadRecordResult::OutputFull => {
+                    let room = (2 * record.bytes.len()).min(LONGEST_ROW + 2 * BUFFER);
+                    if room == record.bytes.len() {
+                        return Err(io::ErrorKind::FileTooLarge.into());
+                    }
+                    record.bytes.reserve_exact(room - record.bytes.len());
+                    record.bytes.resize(room, 0);
+                }
                 ReadRecordResult::OutputEndsFull => self.ends.resize(2 * self.ends.len(), 0),
                 ReadRecordResult::Record => break,
                 ReadRecordResult::End => {
