@@ -22,7 +22,13 @@ pub enum DiagnoseError {
     #[error("no effect {name} can be accepted: {why}")]
     Accept { name: String, why: String },
     #[error(transparent)]
-    Formula(#[from] FormulaError),
+    Formula(Box<FormulaError>),
     #[error("interrupted")]
     Interrupted,
+}
+
+impl From<FormulaError> for DiagnoseError {
+    fn from(error: FormulaError) -> Self {
+        Self::Formula(Box::new(error))
+    }
 }

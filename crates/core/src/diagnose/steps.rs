@@ -124,7 +124,9 @@ impl Judging<'_> {
             let count = way.verified.amplitude.len();
             let own = estimates.values.rows(at, count);
             way.verified.amplitude = own.iter().copied().collect();
-            way.amplitude = Some(own.iter().map(|x| factor * x).collect());
+            // beside the others a bound may hold all of it
+            let there = own.iter().any(|x| *x != 0.0);
+            way.amplitude = there.then(|| own.iter().map(|x| factor * x).collect());
             at += count;
         }
         Ok(())

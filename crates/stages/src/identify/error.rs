@@ -66,7 +66,7 @@ pub enum IdentifyError {
         of: String,
         error: MotionError,
         /// What was left out of the log before, and why.
-        left_out: Option<String>,
+        left_out: Option<Box<str>>,
     },
     #[error(
         "{log}: more than {most} rows; the friction filter passes over a one-joint log many times and holds it in memory; give a span of it, such as FILE@0..600s: minutes are enough for friction"

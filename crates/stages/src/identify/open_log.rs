@@ -168,7 +168,8 @@ impl OpenLog<'_> {
                 of: self.name.clone(),
                 left_out: matches!(error, MotionError::NoSegment { .. })
                     .then(|| self.costs(0).or_else(|| self.reader.warnings().pop()))
-                    .flatten(),
+                    .flatten()
+                    .map(String::into_boxed_str),
                 error,
             },
         }

@@ -106,7 +106,7 @@ fn a_product_that_is_there_is_the_formula() {
     for seed in 0..5 {
         let found = search(seed, &|columns, k| 0.5 * columns[place][k]).unwrap();
         assert_eq!(found.terms, [place], "{seed}: {:?}", found.terms);
-        assert!(found.gain.is_beyond(5.0, None));
+        assert!(found.gain.is_beyond(NUMBERS.screen, None));
     }
 }
 

@@ -354,10 +354,13 @@ impl<'a> Window<'a> {
     }
 }
 
+/// A column, of series and its place.
+type ColumnOf<'a> = dyn Fn(&[Vec<f64>], usize) -> Vec<f64> + Sync + 'a;
+
 /// Columns that are made of series along a scene.
 pub struct Made<'a> {
     pub series: &'a (dyn Fn(&Scene) -> Vec<Vec<f64>> + Sync),
-    pub column: &'a (dyn Fn(&[Vec<f64>], usize) -> Vec<f64> + Sync),
+    pub column: &'a ColumnOf<'a>,
     pub count: usize,
 }
 
