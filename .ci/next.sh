@@ -40,7 +40,8 @@ one() {
       continue
     fi
     while IFS= read -r next; do
-      next=${next//LOG/$held}
+      # a search takes logs that are long enough to fit
+      case $next in *" --search"*) next=${next//LOG/$log} ;; *) next=${next//LOG/$held} ;; esac
       next=${next//ROBOT.toml/$robot}
       queue+=("$next")
     done < <(proposed < said)

@@ -112,7 +112,7 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed, path: &str) -> String {
         .max_by(|a, b| share(a).total_cmp(&share(b)));
     match worst {
         Some(j) if !found.searched => format!(
-            "Next: search a formula for what is left of {}: `cft-ident diagnose LOG... -m {path} --search`.",
+            "Next: search a formula for what is left of {}: `cft-ident diagnose LOG -m {path} --search`.",
             machine.robot.joint_names()[j]
         ),
         Some(j) => format!(
