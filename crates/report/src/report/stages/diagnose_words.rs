@@ -22,7 +22,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             return (text.to_owned(), false);
         }
         _ if !d.long_enough() => format!(
-            "These logs are too short to confirm an effect: they give {} independent parts of {} s, where {} are usual, and so few must agree the better.",
+            "These logs are too short to confirm an effect: they give {} independent parts of {} s, where {} are usual (fewer must agree more closely), and nothing is written.",
             d.parts,
             number::significant(d.block_s, 2),
             d.parts_needed
@@ -47,6 +47,11 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     if !is_exact(d) {
         text += &format!(" {}", usual::words(machine.file.log.torque_is));
     }
+    let unusual = errors(d.errors_now()).1.overall.mean_relative_error
+        > usual::band(machine.file.log.torque_is)[1];
+    if unusual {
+        text += " That is more than usual.";
+    }
     if let Some(left) = most_is_left(machine, d) {
         text += &format!(" {left}");
     }
@@ -58,8 +63,6 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             worse.join(", ")
         );
     }
-    let unusual = errors(d.errors_now()).1.overall.mean_relative_error
-        > usual::band(machine.file.log.torque_is)[1];
     let good = !gains_nothing
         && worse.is_empty()
         && !unusual
@@ -201,7 +204,10 @@ fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let error = number::percent(errors(d.errors_now()).1.joints[worst].relative_error);
     let place = match names.len() {
         1 => format!("More than noise is left ({error} of the torque)"),
-        _ => format!("Most is left in {} ({error} of its torque)", names[worst]),
+        _ => format!(
+            "Beyond noise, most is left in {} (its error is {error})",
+            names[worst]
+        ),
     };
     let dependence = d.dependence.iter().find(|of| of.joint == worst);
     let on = dependence.map(|of| {
