@@ -8,16 +8,14 @@ every container. A JSON document of a command, given where a model or a robot st
 """
 
 import itertools
-import json
 import random
 import re
 import sys
 import tempfile
 from collections import Counter
-from pathlib import Path
 
 import arm_logs
-from tool import Tool, complaint
+from tool import Tool, complaint, record
 
 ROBOT = """\
 [robot]
@@ -247,11 +245,9 @@ def main():
             faults += found
             counts += many
             print(many, len(found), flush=True)
-    if len(words) > 1:
-        rows = [{"cases": kind, "number": many, "not as they must be": sum(fault["of"] == kind for fault in faults)}
-                for kind, many in counts.items()]  # fmt: skip
-        result = {"study": "files that nobody should give" + ", short form" * short, "command": "benches/quality/run.sh files", "rows": rows}
-        Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
+    rows = [{"cases": kind, "number": many, "not as they must be": sum(fault["of"] == kind for fault in faults)}
+            for kind, many in counts.items()]  # fmt: skip
+    record(words, "files that nobody should give", "files", rows, short)
     for fault in faults[:40]:
         print(fault)
     return bool(faults)

@@ -20,7 +20,7 @@ import numpy as np
 
 import arm_logs
 from log_faults import FAULTS
-from tool import Tool, complaint
+from tool import Tool, complaint, record
 
 # A fit is wrong beyond: times the error of the sound fit; standard deviations and share of a parameter.
 ERROR, STDS, SHARE = 2.0, 5.0, 0.05
@@ -137,7 +137,7 @@ def product(bench, faults, containers, commands, each):
     return rows
 
 
-def summary(rows, short):
+def summary(rows):
     """How many cases of a group of faults ended in which way."""
     groups = {}
     for row in rows:
@@ -149,7 +149,7 @@ def summary(rows, short):
             "refused for something else", "wrong without a word", "fault")  # fmt: skip
     table = [{"faults": name} | {way: group[way] for way in ways} for name, group in groups.items()]
     table.append({"faults": "all"} | {way: sum(row[way] for row in table) for way in ways})
-    return {"study": "faults of a log in six containers, fitted" + ", short form" * short, "command": "benches/quality/run.sh hostile", "rows": table}
+    return table
 
 
 def main():
@@ -161,8 +161,7 @@ def main():
         if short:
             faults = {name: FAULTS[name] for k, name in enumerate(FAULTS) if k % 7 == 0}
         rows = product(bench, faults, list(arm_logs.CONTAINERS), () if short or "--fits" in sys.argv else COMMANDS, 4)
-    if len(words) > 1:
-        Path(words[1]).write_text(json.dumps(summary(rows, short), indent=1, ensure_ascii=False) + "\n")
+    record(words, "faults of a log in six containers, fitted", "hostile", summary(rows), short)
     if "--all" in sys.argv:
         Path("hostile_rows.json").write_text(json.dumps(rows, indent=1))
     bad = [row for row in rows if row["outcome"] in ("fault", "wrong without a word")]

@@ -7,7 +7,6 @@ its own name must be byte for byte that of the run before or of a run that ended
 that no command takes, and is gone after a run of a minute later.
 """
 
-import json
 import os
 import random
 import re
@@ -18,6 +17,7 @@ import time
 from pathlib import Path
 
 import arm_logs
+from tool import record
 
 KILLS = 200
 CASES = {
@@ -93,9 +93,7 @@ def main():
             print(rows[-1], flush=True)
     for fault in faults[:30]:
         print(fault)
-    if len(words) > 1:
-        result = {"study": "kill -9 at random moments" + ", short form" * short, "command": "benches/quality/run.sh interrupted", "rows": rows}
-        Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
+    record(words, "kill -9 at random moments", "interrupted", rows, short)
     return bool(faults)
 
 

@@ -6,18 +6,16 @@ A log of so many MB (2048) and one of an eighth of it, as text and as a recordin
 length, and time must be in proportion to it.
 """
 
-import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
 
 import arm_logs
-from tool import Tool
+from tool import Tool, record
 
 MB = 1 << 20
 # Most memory of a command [MB]; `diagnose` holds rows of its logs in a thinned form.
@@ -161,11 +159,9 @@ def main():
         assert ended.status == 0, ended.said
         rows = long_logs(tool, megabytes, COMMANDS[:4] if short else COMMANDS)
         rows += many_logs(tool, int(logs)) + endless(tool, hours)
-    if len(words) > 1:
-        columns = list(dict.fromkeys(key for row in rows for key in row))
-        rows = [{key: row.get(key) for key in columns} for row in rows]
-        result = {"study": "long and many logs" + ", short form" * short, "command": "benches/quality/run.sh large", "rows": rows}
-        Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    rows = [{key: row.get(key) for key in columns} for row in rows]
+    record(words, "long and many logs", "large", rows, short)
     return not all(row["held"] for row in rows)
 
 

@@ -6,7 +6,6 @@
 """
 
 import hashlib
-import json
 import re
 import subprocess
 import sys
@@ -14,6 +13,7 @@ import tempfile
 from pathlib import Path
 
 import arm_logs
+from tool import record
 
 LINES = (
     "inspect first.csv second.mcap -r arm.toml --json inspect.json",
@@ -78,9 +78,7 @@ def main():
             print(rows[-1], differ, alike, flush=True)
     digest = hashlib.sha256(b"".join(base[path] for path in sorted(base))).hexdigest()
     print("all documents:", digest)
-    if len(words) > 1:
-        result = {"study": "what changes between runs" + ", short form" * short, "command": "benches/quality/run.sh same", "rows": rows}
-        Path(words[1]).write_text(json.dumps(result, indent=1) + "\n")
+    record(words, "what changes between runs", "same", rows, short)
     return bool(bad)
 
 

@@ -61,6 +61,14 @@ class Tool:
         return Ended(line, os.waitstatus_to_exitcode(status), *texts, time, used.ru_maxrss / 1024)
 
 
+def record(words, study, name, rows, short):
+    """Writes the rows of a study where a second word names the file."""
+    if len(words) > 1:
+        study += ", short form" * short
+        result = {"study": study, "command": f"benches/quality/run.sh {name}", "rows": rows}
+        Path(words[1]).write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n")
+
+
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\u202e]")
 
 

@@ -20,6 +20,13 @@ pub fn write(path: &Path, text: &str) -> Result<(), StudyError> {
     })
 }
 
+pub fn read(path: &Path) -> Result<String, StudyError> {
+    std::fs::read_to_string(path).map_err(|source| StudyError::File {
+        path: path.to_owned(),
+        source,
+    })
+}
+
 /// `t,q_<joint>,..,tau_<joint>,..` with nine digits, as data loggers write.
 pub fn log_text(machine: &Machine, run: &Run) -> String {
     let n = machine.plant.joints;
@@ -51,10 +58,7 @@ pub fn log_text(machine: &Machine, run: &Run) -> String {
 /// The robot file that `new` would leave, with its questions answered.
 /// A motion as `excite --samples` writes it: t, then positions, speeds and accelerations of the joints.
 pub fn read_path(path: &Path, joints: usize) -> Result<crate::path::Path, StudyError> {
-    let text = std::fs::read_to_string(path).map_err(|source| StudyError::File {
-        path: path.to_owned(),
-        source,
-    })?;
+    let text = read(path)?;
     let mut of = vec![Vec::new(); joints];
     let mut times = Vec::new();
     for (line, row) in text.lines().enumerate().skip(1) {

@@ -10,12 +10,12 @@ use serde_json::{Value, json};
 
 use crate::added::Shape;
 use crate::chance::Chance;
-use crate::drive::{Controller, Run};
+use crate::drive::Run;
 use crate::judge::{LIMITS, Share};
 use crate::lab::{Lab, errors};
-use crate::machine::{Drive, Kind, LawKind, Machine};
+use crate::machine::Kind;
 use crate::path::Motion;
-use crate::planted::{band, put_in};
+use crate::planted::{band, put_in, sized};
 use crate::signal::{beside, rms};
 use crate::study::{Rows, StudyError};
 use crate::tool::Tool;
@@ -200,11 +200,7 @@ impl Subject {
     }
 
     pub fn cell(&self, size: f64) -> String {
-        format!(
-            "{} / {} / {size}",
-            self.name,
-            crate::coverage::word(self.kind)
-        )
+        sized(self.name, self.kind, size)
     }
 
     pub fn run(
@@ -215,9 +211,7 @@ impl Subject {
         number: u64,
     ) -> Result<Value, StudyError> {
         let mut chance = Chance::of(&format!("formula {}", self.cell(size)), number);
-        let machine = Machine::draw(self.kind, Drive::Direct, LawKind::Coulomb, 0.0, &mut chance);
-        let mut lab = Lab::new(machine, Controller::FeedForward, true, &mut chance);
-        lab.sensing.rate_hz = 500.0;
+        let mut lab = Lab::for_an_effect(self.kind, &mut chance);
         if let Some(law) = self.law {
             let course = lab.course(Motion::SlowSines, &mut chance);
             let run = course.logged(&lab.machine, &lab.sensing, &mut chance);
@@ -356,9 +350,7 @@ impl Subject {
         (folder, lab): (&File, &Lab),
         unseen: &Run,
     ) -> Result<Option<f64>, StudyError> {
-        let path = folder.join("with.toml");
-        let text =
-            std::fs::read_to_string(&path).map_err(|source| StudyError::File { path, source })?;
+        let text = crate::files::read(&folder.join("with.toml"))?;
         let without = silent(&text);
         crate::files::write(&folder.join("without.toml"), &without)?;
         let mut torques = Vec::new();
@@ -436,10 +428,7 @@ fn taken_up(run: &Run, joint: usize, moves: &dyn Fn(usize) -> f64) -> Vec<Vec<f6
 
 /// A column of a table.
 fn column(path: &File, name: &str) -> Result<Vec<f64>, StudyError> {
-    let text = std::fs::read_to_string(path).map_err(|source| StudyError::File {
-        path: path.to_owned(),
-        source,
-    })?;
+    let text = crate::files::read(path)?;
     let mut lines = text.lines();
     let at = lines
         .next()

@@ -8,7 +8,7 @@ use crate::chance::Chance;
 use crate::drive::{Controller, Course, Run, Sensing};
 use crate::files;
 use crate::friction::Law;
-use crate::machine::Machine;
+use crate::machine::{Drive, Kind, LawKind, Machine};
 use crate::path::{Motion, Path};
 use crate::study::StudyError;
 use crate::tool::{Answer, Tool};
@@ -40,6 +40,14 @@ impl Lab {
             controller,
             sensing,
         }
+    }
+
+    /// One that effects are put into: direct drives with the declared friction, computed torque, fine sensors at 500 Hz.
+    pub fn for_an_effect(kind: Kind, chance: &mut Chance) -> Self {
+        let machine = Machine::draw(kind, Drive::Direct, LawKind::Coulomb, 0.0, chance);
+        let mut lab = Self::new(machine, Controller::FeedForward, true, chance);
+        lab.sensing.rate_hz = 500.0;
+        lab
     }
 
     /// Writes robot file, URDF and, in a file of its own, the truth.
@@ -75,9 +83,7 @@ impl Lab {
         folder: &File,
         log: &str,
     ) -> Result<Vec<f64>, StudyError> {
-        let path = folder.join("model.toml");
-        let model =
-            std::fs::read_to_string(&path).map_err(|source| StudyError::File { path, source })?;
+        let model = files::read(&folder.join("model.toml"))?;
         files::write(
             &folder.join("true.toml"),
             &files::with_truth(&self.machine, &model),

@@ -31,10 +31,7 @@ pub struct Covariance {
 
 impl Model {
     pub fn read(path: &Path) -> Result<Self, StudyError> {
-        let text = std::fs::read_to_string(path).map_err(|source| StudyError::File {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = crate::files::read(path)?;
         toml::from_str(&text).map_err(|error| StudyError::Line {
             path: path.to_owned(),
             line: 0,

@@ -63,7 +63,10 @@ impl Cell {
         if fit.exit != 0 {
             return Ok(json!({ "exit": fit.exit, "said": fit.last_words() }));
         }
-        files::write(&folder.join("robot.toml"), &without_channels(&robot)?)?;
+        let plain = without_channels(File::new(&robot))?;
+        files::write(&folder.join("robot.toml"), &plain)?;
+        let plain = without_channels(&folder.join("true.toml"))?;
+        files::write(&folder.join("plain.toml"), &plain)?;
         let mut fitted = Vec::new();
         for (k, part) in parts.iter().enumerate() {
             for words in [
@@ -71,10 +74,6 @@ impl Cell {
                 &["validate", part, "-m", "true.toml", "-o", "left.csv"],
                 &["torque", "part.csv", "-m", "plain.toml", "-o", "asked.csv"],
             ] {
-                if words[0] == "torque" {
-                    let model = read(&folder.join("true.toml"))?;
-                    files::write(&folder.join("plain.toml"), &plain(&model)?)?;
-                }
                 let done = tool.run(folder, words)?;
                 if done.exit != 0 {
                     return Ok(json!({ "exit": done.exit, "said": done.last_words() }));
@@ -98,33 +97,19 @@ impl Cell {
     }
 }
 
-fn read(path: &File) -> Result<String, StudyError> {
-    std::fs::read_to_string(path).map_err(|source| StudyError::File {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-fn parsed(text: &str) -> Result<toml::Table, StudyError> {
-    text.parse()
+/// A robot or model file without the names and units of channels: `convert` writes the usual ones.
+fn without_channels(path: &File) -> Result<String, StudyError> {
+    let mut table: toml::Table = files::read(path)?
+        .parse()
         .map_err(|error: toml::de::Error| StudyError::Line {
-            path: "robot or model file".into(),
+            path: path.to_owned(),
             line: 0,
             message: error.to_string(),
-        })
-}
-
-/// A table without the names and units of channels: `convert` writes the usual ones.
-fn plain(text: &str) -> Result<String, StudyError> {
-    let mut table = parsed(text)?;
+        })?;
     if let Some(log) = table.get_mut("log").and_then(toml::Value::as_table_mut) {
         log.retain(|key, _| key.starts_with("torque_"));
     }
     Ok(table.to_string())
-}
-
-fn without_channels(robot: &str) -> Result<String, StudyError> {
-    plain(&read(File::new(robot))?)
 }
 
 /// Columns of a table by their names, without those that are not there in every row.
@@ -135,7 +120,7 @@ struct Columns {
 
 impl Columns {
     fn read(path: &File) -> Result<Self, StudyError> {
-        let text = read(path)?;
+        let text = files::read(path)?;
         let mut lines = text.lines();
         let names = lines.next().unwrap_or_default().split(',');
         let number = |word: &str| word.parse().unwrap_or(f64::NAN);

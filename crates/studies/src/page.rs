@@ -8,10 +8,7 @@ use crate::{clean, coverage, formula, next_motion, nulls, payload, planted, rota
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
-    let mut text = std::fs::read_to_string(page).map_err(|source| StudyError::File {
-        path: page.to_owned(),
-        source,
-    })?;
+    let mut text = crate::files::read(page)?;
     for (name, table) in [
         ("coverage", coverage::table as fn(&Rows) -> String),
         ("clean", clean::table),

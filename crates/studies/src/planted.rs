@@ -12,11 +12,11 @@ use crate::added::{Added, Shape};
 use crate::campaign::{Campaign, is_done};
 use crate::chance::Chance;
 use crate::clean::worst;
-use crate::drive::{Controller, Run};
+use crate::drive::Run;
 use crate::friction::Law;
 use crate::judge::{LIMITS, Share};
 use crate::lab::Lab;
-use crate::machine::{Drive, Kind, LawKind, Machine};
+use crate::machine::Kind;
 use crate::path::Motion;
 use crate::signal::{beside, low_passed, rms};
 use crate::study::{Rows, StudyError};
@@ -108,13 +108,14 @@ pub fn members() -> Vec<Member> {
     ]
 }
 
+/// Name of the cell of what is put into a machine at a size over the noise.
+pub fn sized(name: &str, kind: Kind, size: f64) -> String {
+    format!("{name} / {} / {size}", crate::coverage::word(kind))
+}
+
 impl Member {
     pub fn cell(&self, size: f64) -> String {
-        format!(
-            "{} / {} / {size}",
-            self.name,
-            crate::coverage::word(self.kind)
-        )
+        sized(self.name, self.kind, size)
     }
 
     pub fn run(
@@ -145,9 +146,7 @@ impl Member {
 
     /// A machine with the effect in it, and the share of its torque that is beside the declared columns.
     pub fn lab(&self, size: f64, chance: &mut Chance) -> (Lab, Option<f64>) {
-        let machine = Machine::draw(self.kind, Drive::Direct, LawKind::Coulomb, 0.0, chance);
-        let mut lab = Lab::new(machine, Controller::FeedForward, true, chance);
-        lab.sensing.rate_hz = 500.0;
+        let mut lab = Lab::for_an_effect(self.kind, chance);
         let own_share = self.plant(&mut lab, size, chance);
         (lab, own_share)
     }

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::campaign::{Campaign, is_done};
 use crate::chance::Chance;
+use crate::clean::worst;
 use crate::measured::{MACHINES, Measured};
 use crate::study::{Rows, StudyError};
 use crate::tool::Tool;
@@ -240,18 +241,13 @@ fn line(name: &str, tool: &str, row: &Value) -> String {
         .collect();
     let (before, after) = (list(row, "unseen_before"), list(row, "unseen_after"));
     let mean = |x: &[f64]| 100.0 * x.iter().sum::<f64>() / x.len().max(1) as f64;
-    let worst = (before.iter().zip(&after))
-        .map(|(b, a)| a / b)
-        .fold(f64::NAN, f64::max);
     let ends = match (is_done(row), before.is_empty()) {
         (false, _) => format!("not done ({})", row["exit"]),
         (true, true) => "nothing is written".to_owned(),
         (true, false) => format!("{:.2} -> {:.2} %", mean(&before), mean(&after)),
     };
-    let worst = match worst.is_nan() {
-        true => "-".to_owned(),
-        false => format!("{:+.1} %", 100.0 * (worst - 1.0)),
-    };
+    let worst = worst(row, "unseen_after", "unseen_before")
+        .map_or("-".to_owned(), |w| format!("{:+.1} %", 100.0 * (w - 1.0)));
     format!(
         "| {name} | {tool} | {} | {ends} | {worst} |\n",
         written.join(", ")

@@ -81,6 +81,11 @@ impl HeldOutRows<'_> {
         Ok(errors::summed(model, units, (&pieces, self.together)))
     }
 
+    /// Mean relative error of a model over the joints; none where there are no such rows.
+    pub fn mean_error(&self, model: &AugmentedModel) -> Result<Option<f64>, MotionError> {
+        Ok(errors::mean_relative_error(&self.pieces(model)?))
+    }
+
     /// What the second model changes; none where there are no such rows.
     pub fn change(
         &self,

@@ -135,7 +135,7 @@ pub struct FoundFormula {
 }
 
 /// Parts of what a formula adds, by its terms' squares.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Symmetry {
     /// It flips where the motion is reversed: friction.
     pub odd: f64,

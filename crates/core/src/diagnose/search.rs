@@ -86,9 +86,7 @@ impl Field<'_> {
             let Some(mut next) = next else {
                 return Some((chosen, looked));
             };
-            let errors = left_out.errors();
-            let weighted = errors.iter().map(|e| e.iter().zip(&terms.weights));
-            next.error = weighted.flatten().map(|(e, w)| e * w).sum();
+            next.error = left_out.error();
             chosen.push(next);
         }
     }

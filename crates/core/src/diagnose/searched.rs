@@ -12,7 +12,7 @@ use super::search::{Chosen, Field, Looked};
 use super::tables::verified;
 use super::watch::{UNWATCHED, Watch};
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{BlockSums, BlocksLeftOut, LEAST_PARTS, Terms, compare};
+use crate::judge::{BlockSums, BlocksLeftOut, LEAST_PARTS, Terms, compare, weighted};
 use crate::motion::MotionError;
 
 /// Sums of products about a model.
@@ -100,8 +100,7 @@ impl PreparedCase<'_> {
         let weights = &summed.declared.weights;
         let determined =
             compare(&torque_squares(&summed), &errors, weights).is_beyond(numbers.screen, None);
-        let error = errors.iter().flat_map(|e| e.iter().zip(weights));
-        let error = error.map(|(e, w)| e * w).sum();
+        let error = weighted(&errors, weights);
         let (mut chosen, mut looked) = (Vec::new(), Vec::new());
         let mut directions = Vec::new();
         if self.blocks.parts >= LEAST_PARTS {

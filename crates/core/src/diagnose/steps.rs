@@ -230,12 +230,6 @@ impl Judging<'_> {
                 let change = |role| self.prepared.held_out(role).change([&without, &with]);
                 found.push((*i, change(LogRole::Holdout)?, change(vetoing)?));
             }
-            let given_model = &self.prepared.case.given;
-            let whole = self
-                .prepared
-                .held_out(vetoing)
-                .change([given_model, &with])?;
-            let rises = whole.is_some_and(|c| c.mean[1] > c.mean[0]);
             let mut worse: Vec<(usize, f64)> = Vec::new();
             let mut costs: Vec<(usize, f64)> = Vec::new();
             for (i, holdout, veto) in found {
@@ -246,7 +240,7 @@ impl Judging<'_> {
                 worse.extend(veto.worst().filter(|_| given).map(|by| (i, by)));
                 costs.push((i, veto.mean[1] - veto.mean[0]));
             }
-            if worse.is_empty() && rises {
+            if worse.is_empty() && self.rises(&with, vetoing)? {
                 worse = costs;
             }
             match worse.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -254,6 +248,16 @@ impl Judging<'_> {
                 None => return Ok(()),
             }
         }
+    }
+
+    /// Whether a model is worse than the given one on rows of a use.
+    fn rises(&self, model: &AugmentedModel, role: LogRole) -> Result<bool, DiagnoseError> {
+        let rows = self.prepared.held_out(role);
+        let [before, after] = [
+            rows.mean_error(&self.prepared.case.given)?,
+            rows.mean_error(model)?,
+        ];
+        Ok(after > before)
     }
 
     /// The midpoint to the given model, where the user wants it.

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::problem::unknowns::{Unknowns, step};
 use super::search::{Chosen, Field, own_joint};
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{Agreement, Blocks, BlocksLeftOut, Terms, agreement};
+use crate::judge::{Agreement, Blocks, BlocksLeftOut, ErrorGain, Terms, agreement};
 
 /// An effect that was chosen, with what its parts say.
 #[derive(Debug, Clone)]
@@ -76,14 +76,23 @@ pub fn verified(
 
 /// Whether an effect passes the screen beside all the others, those that came after it too.
 fn is_needed(field: &Field, declared: &Terms, chosen: &[Chosen], at: usize) -> bool {
+    let place = field.candidates[chosen[at].candidate].effect.place;
+    beside_the_others(field, declared, chosen, at)
+        .is_some_and(|(gain, _)| gain.is_beyond(field.numbers.screen, own_joint(place)))
+}
+
+/// Gain of an effect beside all the others, and the squared error without it; none where these data determine nothing.
+pub fn beside_the_others(
+    field: &Field,
+    declared: &Terms,
+    chosen: &[Chosen],
+    at: usize,
+) -> Option<(ErrorGain, f64)> {
     let mut others = chosen.to_vec();
     let own = others.remove(at).candidate;
     let terms = declared.with(&field.terms_of(&others));
-    let place = field.candidates[own].effect.place;
-    BlocksLeftOut::new(field.sums, field.judging, &terms).is_some_and(|left_out| {
-        let gain = left_out.gain(&field.terms[own]);
-        gain.is_beyond(field.numbers.screen, own_joint(place))
-    })
+    let left_out = BlocksLeftOut::new(field.sums, field.judging, &terms)?;
+    Some((left_out.gain(&field.terms[own]), left_out.error()))
 }
 
 impl Estimates {

@@ -59,6 +59,12 @@ impl ErrorGain {
     }
 }
 
+/// Sum of errors `[block][joint]` in the weights of the joints.
+pub fn weighted(errors: &[Vec<f64>], weights: &[f64]) -> f64 {
+    let each = errors.iter().flat_map(|e| e.iter().zip(weights));
+    each.map(|(e, w)| e * w).sum()
+}
+
 /// A sum over blocks, and its standard error from their scatter.
 fn sum_and_error(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     let count = values.clone().count() as f64;
@@ -131,6 +137,11 @@ impl<'a> BlocksLeftOut<'a> {
         let of_block =
             |(w, block): (&Without, &Vec<DMatrix<f64>>)| self.terms.squares(block, &w.values);
         blocks.map(of_block).collect()
+    }
+
+    /// Squared error of all blocks and joints, in the weights of the joints.
+    pub fn error(&self) -> f64 {
+        weighted(&self.errors(), &self.terms.weights)
     }
 
     /// Values of the terms without each fitted block.

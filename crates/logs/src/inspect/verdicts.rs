@@ -24,6 +24,7 @@ impl LogJudge {
             track.part();
         }
         self.repeats.part();
+        self.replays.part();
         conclude(&self)
     }
 }

@@ -6,7 +6,10 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 use super::diagnose::{DataFault, Diagnosed};
-use super::formulas::{EffectValueFound, FormulaResult, JointGain, formula_result};
+use super::formulas::{
+    EffectValueFound, FormulaResult, JointGain, formula_result, gain_of_each, numbers_of,
+    values_found,
+};
 use super::logged_robot::LoggedRobot;
 use super::next_motion::separating_command;
 use crate::open_loop::FreeRun;
@@ -309,43 +312,23 @@ impl Diagnosed {
     fn step(&self, machine: &LoggedRobot, step: &FoundEffect) -> DiagnosisStep {
         let robot = &machine.robot;
         let effect = &step.estimate;
-        let number = |t: cft_ident_core::effect::EffectNumber| {
-            let found = EffectValueFound {
-                value: t.value,
-                std: t.std,
-                unit: t.unit,
-                bound: t.bound,
-            };
-            (t.key, found)
-        };
         let alternatives: Vec<&str> = step.alternatives.iter().map(|c| c.name()).collect();
         let alike = !alternatives.is_empty();
         // the coefficient that says most
         let size = |k: &usize| effect.linear[*k].abs();
         let largest = (0..effect.linear.len()).max_by(|a, b| size(a).total_cmp(&size(b)));
         let part = |p: &Vec<f64>| p.get(largest?).copied();
-        let gains = robot.joint_names().iter().zip(&step.gain.joints);
         DiagnosisStep {
             effect: effect.name(),
             family: effect.family().name(),
             joint: effect.place.name(robot),
-            parameters: self
-                .numbers_of(machine, step)
-                .into_iter()
-                .map(number)
-                .collect(),
+            parameters: values_found(numbers_of(machine, step)).collect(),
             alternatives,
             status: step.status,
             written: step.written.is_some(),
             shrinkage: step.shrinkage,
             parts: step.parts.iter().filter_map(part).collect(),
-            gain: gains
-                .map(|(joint, [value, se])| JointGain {
-                    joint: joint.clone(),
-                    value: *value,
-                    se: *se,
-                })
-                .collect(),
+            gain: gain_of_each(robot.joint_names(), &step.gain),
             accepted_by_user: step.accepted_by_user,
             separate_command: alike
                 .then(|| separating_command(effect, robot, "MODEL.toml"))

@@ -7,9 +7,10 @@ use serde::Serialize;
 
 use super::diagnose::Diagnosed;
 use super::logged_robot::LoggedRobot;
-use cft_ident_core::diagnose::{FormulaEnd, FoundFormula, JointChange, Symmetry};
+use cft_ident_core::diagnose::{FormulaEnd, FoundEffect, FoundFormula, JointChange, Symmetry};
 use cft_ident_core::effect::EffectNumber;
 use cft_ident_core::effect::formula::{Definition, Shape};
+use cft_ident_core::judge::ErrorGain;
 use cft_ident_core::number;
 use cft_ident_core::robot::FormulaSignal;
 use cft_ident_files::config::candidates::{self, CandidateSection, ShapeRange};
@@ -33,6 +34,40 @@ pub struct EffectValueFound {
     pub bound: bool,
 }
 
+/// Numbers of an effect, each with its key.
+pub(super) fn values_found(
+    numbers: Vec<EffectNumber>,
+) -> impl Iterator<Item = (String, EffectValueFound)> {
+    let value = |n: EffectNumber| {
+        let found = EffectValueFound {
+            value: n.value,
+            std: n.std,
+            unit: n.unit,
+            bound: n.bound,
+        };
+        (n.key, found)
+    };
+    numbers.into_iter().map(value)
+}
+
+/// What each joint gains.
+pub(super) fn gain_of_each(names: &[String], gain: &ErrorGain) -> Vec<JointGain> {
+    let each = names.iter().zip(&gain.joints);
+    let of = each.map(|(joint, [value, se])| JointGain {
+        joint: joint.clone(),
+        value: *value,
+        se: *se,
+    });
+    of.collect()
+}
+
+/// Estimated parameters of an effect with units and standard deviations.
+pub fn numbers_of(machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
+    let effect = &step.estimate;
+    let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+    effect.numbers(&machine.robot, unit, Some(&step.covariance))
+}
+
 /// The formula of what is left of a joint.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct FormulaResult {
@@ -45,7 +80,7 @@ pub struct FormulaResult {
     pub signals: Vec<String>,
     /// What kind of physics it is by its symmetries, in words.
     pub kind: String,
-    pub symmetry: SymmetryShares,
+    pub symmetry: Symmetry,
     /// Formula of each coefficient.
     pub formulas: BTreeMap<String, String>,
     /// Its numbers, by key.
@@ -63,30 +98,6 @@ pub struct FormulaResult {
     pub in_place_of: Vec<&'static str>,
     /// As a file for `--candidates`.
     pub candidate: String,
-}
-
-/// Parts of what a formula adds.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct SymmetryShares {
-    /// It flips where the motion is reversed.
-    pub odd: f64,
-    /// It goes round with the joint's position.
-    pub periodic: f64,
-    /// It goes by an acceleration.
-    pub inertial: f64,
-    /// It takes a signal of another joint.
-    pub coupled: f64,
-}
-
-impl From<&Symmetry> for SymmetryShares {
-    fn from(of: &Symmetry) -> Self {
-        SymmetryShares {
-            odd: of.odd,
-            periodic: of.periodic,
-            inertial: of.inertial,
-            coupled: of.coupled,
-        }
-    }
 }
 
 /// A formula as a table of a candidates file.
@@ -121,17 +132,7 @@ pub(super) fn written_sections(found: &Diagnosed) -> Vec<CandidateSection> {
 /// A formula in words and numbers.
 pub fn formula_result(machine: &LoggedRobot, found: &FoundFormula) -> FormulaResult {
     let names = machine.robot.joint_names();
-    let numbers = numbers(machine, found);
-    let value = |n: EffectNumber| {
-        let found = EffectValueFound {
-            value: n.value,
-            std: n.std,
-            unit: n.unit,
-            bound: n.bound,
-        };
-        (n.key, found)
-    };
-    let gains = names.iter().zip(&found.step.gain.joints);
+    let numbers = numbers_of(machine, &found.step);
     let signals = found.signals.iter();
     FormulaResult {
         joint: names[found.joint].clone(),
@@ -141,31 +142,17 @@ pub fn formula_result(machine: &LoggedRobot, found: &FoundFormula) -> FormulaRes
             .map(|s| formula_signal_words(names, found.joint, *s))
             .collect(),
         kind: found.symmetry.words(),
-        symmetry: (&found.symmetry).into(),
+        symmetry: found.symmetry,
         formulas: formula_section(&found.definition).formulas,
-        parameters: numbers.into_iter().map(value).collect(),
+        parameters: values_found(numbers).collect(),
         share: found.share,
         p_value: found.p_value,
         shrinkage: found.step.shrinkage,
-        gain: gains
-            .map(|(joint, [value, se])| JointGain {
-                joint: joint.clone(),
-                value: *value,
-                se: *se,
-            })
-            .collect(),
+        gain: gain_of_each(names, &found.step.gain),
         joints: found.step.joints.clone(),
         in_place_of: found.in_place_of.iter().map(|e| e.name()).collect(),
         candidate: candidates::to_toml(&[formula_section(&found.definition)]).unwrap_or_default(),
     }
-}
-
-/// Its numbers with units and deviations.
-fn numbers(machine: &LoggedRobot, found: &FoundFormula) -> Vec<EffectNumber> {
-    let unit = machine.file.torque_unit(found.joint);
-    let step = &found.step;
-    step.estimate
-        .numbers(&machine.robot, unit, Some(&step.covariance))
 }
 
 /// The torque as it would be written by hand: coefficients with three digits before their formulas, shapes in them.

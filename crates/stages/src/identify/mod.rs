@@ -91,7 +91,7 @@ pub use diagnosis::{DiagnosisResult, DiagnosisVerdict, signal_words};
 pub use error::{IdentifyError, ReadError};
 pub use error_kind::ErrorKind;
 pub use estimate::{Account, JointAccount};
-pub use formulas::{FormulaResult, SymmetryShares, formula_result, formula_section};
+pub use formulas::{FormulaResult, formula_result, formula_section, numbers_of};
 pub use friction::{
     FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
 };

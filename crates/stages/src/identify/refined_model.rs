@@ -3,13 +3,13 @@
 use super::consistent::project_by;
 use super::diagnose::Diagnosed;
 use super::error::IdentifyError;
-use super::formulas::written_sections;
+use super::formulas::{numbers_of, written_sections};
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
 use crate::open_loop::{FreeRun, RunSpan, free_run};
-use cft_ident_core::diagnose::{Case, FoundEffect, LogRole, SplitErrors, Unknown, errors_of};
-use cft_ident_core::effect::{AugmentedModel, EffectNumber};
+use cft_ident_core::diagnose::{Case, LogRole, SplitErrors, Unknown, errors_of};
+use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::model::JointFriction;
@@ -87,13 +87,6 @@ impl Diagnosed {
             true => whole(stretches),
             false => spans,
         }
-    }
-
-    /// Estimated parameters of an effect with their standard deviations.
-    pub fn numbers_of(&self, machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
-        let effect = &step.estimate;
-        let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
-        effect.numbers(&machine.robot, unit, Some(&step.covariance))
     }
 
     /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
@@ -222,7 +215,7 @@ impl Diagnosed {
             else {
                 continue;
             };
-            let estimated = self.numbers_of(machine, step);
+            let estimated = numbers_of(machine, step);
             let whole = effect.linear == step.estimate.linear;
             let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
             let numbers = match whole {

@@ -12,10 +12,11 @@ use crate::diagnose::problem::pass::Candidate;
 use crate::diagnose::search::Chosen;
 use crate::diagnose::searched::SearchedCase;
 use crate::diagnose::steps::{Judged, judge};
+use crate::diagnose::tables::beside_the_others;
 use crate::diagnose::watch::UNWATCHED;
 use crate::effect::formula::{Definition, Shape};
 use crate::effect::{Added, Place, own};
-use crate::judge::{BlocksLeftOut, Bound};
+use crate::judge::Bound;
 use crate::robot::FormulaSignal;
 
 /// A shape is refined from half to twice its value on the grid; a wave within so much of it.
@@ -121,19 +122,13 @@ impl PreparedCase<'_> {
         let summed = self.summed(about, &candidates, &searched.directions)?;
         let summed = self.polished(&mut candidates, &summed, &chosen, &searched.directions)?;
         let first = chosen.len() - taken.len();
+        let field = self.field(&candidates, &summed, UNWATCHED);
         for at in first..chosen.len() {
-            let field = self.field(&candidates, &summed, UNWATCHED);
-            let mut others = chosen.clone();
-            let own = others.remove(at).candidate;
-            let terms = summed.declared.with(&field.terms_of(&others));
-            let left_out = BlocksLeftOut::new(&summed.sums, self.judging(), &terms);
-            let left_out = left_out.ok_or(DiagnoseError::NothingDetermined {
+            let judged = beside_the_others(&field, &summed.declared, &chosen, at);
+            let judged = judged.ok_or(DiagnoseError::NothingDetermined {
                 unknowns: self.unknowns.len(),
             })?;
-            let errors = left_out.errors();
-            let weighted = errors.iter().flat_map(|e| e.iter().zip(&terms.weights));
-            chosen[at].error = weighted.map(|(e, w)| e * w).sum();
-            chosen[at].gain = left_out.gain(&field.terms[own]);
+            (chosen[at].gain, chosen[at].error) = judged;
         }
         let case = SearchedCase {
             candidates,

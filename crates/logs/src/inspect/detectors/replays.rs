@@ -49,12 +49,15 @@ impl Replays {
     #[inline]
     pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
         self.rows += 1;
+        if others.is_empty() {
+            return;
+        }
         let place = sum(positions, 1);
         let own = sum(others, place);
         let [place_before, own_before] = self.before;
         self.before = [place, own];
         // what stands still repeats itself
-        if place == place_before || others.is_empty() {
+        if place == place_before {
             return;
         }
         let pair = own_before.rotate_left(32) ^ own;
@@ -94,17 +97,15 @@ impl Replays {
     }
 
     /// The stretch that is followed is at its end.
-    fn part(&mut self) {
+    pub(in crate::inspect) fn part(&mut self) {
         let long = |run: &Replay| run.hits >= MIN_HITS && run.last.0 - run.first.0 >= MIN_ROWS;
         self.found.extend(self.run.take().filter(long));
     }
 
-    /// Stretches that stand in the log before them.
+    /// Stretches that stand in the log before them, those that have ended.
     pub(in crate::inspect) fn found(&self) -> Episodes {
-        let mut all = self.clone();
-        all.part();
         let mut episodes = Episodes::default();
-        for run in &all.found {
+        for run in &self.found {
             let rows = run.last.0 - run.first.0 + 1;
             episodes.add(run.first.1, run.last.1, rows, 0.0);
         }
@@ -130,6 +131,7 @@ mod tests {
                 &[torque],
             );
         }
+        replays.part();
         let found = replays.found();
         found.iter().map(|e| (e.from, e.to, e.rows)).collect()
     }

@@ -110,7 +110,7 @@ pub fn diagnosed(
         detail.line("");
     }
     for (i, step) in d.steps.iter().enumerate() {
-        step_told(&mut detail, machine, found, (i + 1, step));
+        step_told(&mut detail, machine, (i + 1, step));
     }
     free_run::section(&mut detail, found.free_run.as_ref());
     detail.list(doubts(machine, found));
@@ -184,18 +184,13 @@ fn changes(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
 }
 
 /// One effect that was found, for a terminal.
-fn step_told(
-    terminal: &mut Writer,
-    machine: &LoggedRobot,
-    found: &Diagnosed,
-    (number, step): (usize, &FoundEffect),
-) {
+fn step_told(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usize, &FoundEffect)) {
     let effect = &step.estimate;
     let name = format!(
         "{} ({}): {}",
         effect.title(&machine.robot),
         effect.family().name(),
-        in_words(machine, found, step)
+        in_words(machine, step)
     );
     terminal.note(&format!("{number:>3}. "), &name, 7);
     terminal.note(MARGIN, &grade(step, effect), 7);

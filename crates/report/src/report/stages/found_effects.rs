@@ -62,7 +62,7 @@ fn table(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let row = |step: &FoundEffect| {
         vec![
             step.estimate.title(&machine.robot),
-            in_words(machine, found, step),
+            in_words(machine, step),
             number::percent(step.share),
             grade(step, &step.estimate),
         ]

@@ -3,7 +3,7 @@
 use cft_ident_core::diagnose::{FoundEffect, StepStatus};
 use cft_ident_core::effect::Added;
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
+use cft_ident_stages::identify::{LoggedRobot, numbers_of};
 
 /// The joints that an effect makes worse on held-out data, with the change of their errors; nothing where there is
 /// none.
@@ -70,8 +70,8 @@ pub(super) fn chance(p: f64) -> String {
 }
 
 /// Estimated parameters of an effect in words: `order = 14.0 1/m, ..`.
-pub(super) fn in_words(machine: &LoggedRobot, found: &Diagnosed, step: &FoundEffect) -> String {
-    let words = found.numbers_of(machine, step).into_iter().map(|t| {
+pub(super) fn in_words(machine: &LoggedRobot, step: &FoundEffect) -> String {
+    let words = numbers_of(machine, step).into_iter().map(|t| {
         let (scale, unit) = match t.unit == "m" && t.value.abs() < number::MILLIMETRES {
             true => (1e3, "mm"),
             false => (1.0, t.unit.as_ref()),
