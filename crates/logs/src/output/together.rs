@@ -2,14 +2,15 @@
 //!
 //! Each is written whole under a temporary name in its own folder first. A rename cannot be made of several
 //! files at once: a machine that loses its power between two of them leaves some new files beside old ones,
-//! each of them whole, and the old ones that were replaced under `.cft-ident-*.part.old`.
+//! each of them whole, and the old ones that were replaced under `.cft-ident-*_old.part`.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use tempfile::NamedTempFile;
 
-use super::{AtomicFile, LogWriter, OutputError, unfinished};
+use super::{AtomicFile, LogWriter, OutputError, SUFFIX, unfinished};
 
 /// Files that are ready, and the folders that were made for them.
 #[derive(Debug, Default)]
@@ -36,7 +37,13 @@ struct Ready {
 struct Renamed {
     path: PathBuf,
     /// What had the name before, under another.
-    old: Option<PathBuf>,
+    old: Option<SecondName>,
+}
+
+/// A second name of a file that is replaced, held for as long as this value lives.
+struct SecondName {
+    name: PathBuf,
+    _held: Option<File>,
 }
 
 impl Together {
@@ -108,7 +115,8 @@ impl Together {
             };
             if let Err(error) = file.persist(&path) {
                 // what stands under the other name is the same file
-                old.iter().for_each(|old| drop(std::fs::remove_file(old)));
+                old.iter()
+                    .for_each(|old| drop(std::fs::remove_file(&old.name)));
                 renamed.into_iter().rev().for_each(Renamed::undo);
                 return Err(OutputError::new(&named, error.error));
             }
@@ -116,7 +124,7 @@ impl Together {
         }
         for old in renamed.into_iter().filter_map(|file| file.old) {
             // one that is left is a file too many, and no half one
-            let _ = std::fs::remove_file(old);
+            let _ = std::fs::remove_file(old.name);
         }
         Ok(())
     }
@@ -130,18 +138,21 @@ impl Renamed {
     fn undo(self) {
         // As far as the system lets us: it has just refused something.
         let _ = match self.old {
-            Some(old) => std::fs::rename(old, self.path),
+            Some(old) => std::fs::rename(old.name, self.path),
             None => std::fs::remove_file(self.path),
         };
     }
 }
 
-/// A second name for the file at `path`, where there is one and the disk knows second names.
-fn kept(path: &Path, temporary: &Path) -> Option<PathBuf> {
-    let mut old = temporary.as_os_str().to_owned();
-    old.push(".old");
-    let old = PathBuf::from(old);
-    std::fs::hard_link(path, &old).ok().map(|()| old)
+/// A second name for the file at `path`, where there is one and the disk knows second names. It is held before it is
+/// named, so that no other run takes it for abandoned.
+fn kept(path: &Path, temporary: &Path) -> Option<SecondName> {
+    let own = temporary.file_name()?.to_str()?.strip_suffix(SUFFIX)?;
+    let name = temporary.with_file_name(format!("{own}_old{SUFFIX}"));
+    let held = File::open(path).ok();
+    let _ = held.as_ref().map(File::try_lock);
+    std::fs::hard_link(path, &name).ok()?;
+    Some(SecondName { name, _held: held })
 }
 
 impl Drop for Together {
@@ -180,6 +191,23 @@ mod tests {
         files.commit().unwrap();
         assert_eq!(names(folder.path()), ["a", "b"]);
         assert_eq!(std::fs::read_to_string(at("a")).unwrap(), "new");
+    }
+
+    #[test]
+    fn a_second_name_is_held_and_one_that_a_killed_run_left_is_abandoned() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(600);
+        let old = |name: &str| {
+            let file = File::create(at(name)).unwrap();
+            file.set_modified(long_ago).unwrap();
+            kept(&at(name), &at(&format!(".cft-ident-{name}.part"))).unwrap()
+        };
+        let (living, killed) = (old("a"), old("b"));
+        drop(killed);
+        drop(AtomicFile::create(&at("c")).unwrap());
+        assert_eq!(names(folder.path()), [".cft-ident-a_old.part", "a", "b"]);
+        assert_eq!(living.name, at(".cft-ident-a_old.part"));
     }
 
     #[test]
