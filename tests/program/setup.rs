@@ -374,6 +374,37 @@ fn what_leaves_more_than_sound_machines_do_is_a_warning_with_both_readings_and_t
 }
 
 #[test]
+fn a_zero_that_no_torque_shows_is_named_by_the_limits_of_the_file() {
+    let Some(log) = shared("panda/panda_exciting.csv") else {
+        return;
+    };
+    let turned = |by: f64| {
+        Altered::new(&log, "configs/panda.toml", |log| {
+            log.map("q7", |q| q + by);
+        })
+    };
+    // links of a last joint that turn with its zero fit as well
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let mut log = turned(-quarter);
+    assert!(log.told().is_empty());
+    let limits = "\n[limits.q7]\nposition = [-2.8973, 2.8973]\n";
+    let with_limits = |log: &mut Altered| {
+        let robot = log.folder.path().join("robot.toml");
+        let text = std::fs::read_to_string(&log.robot).unwrap() + limits;
+        std::fs::write(&robot, text).unwrap();
+        log.robot = robot;
+    };
+    with_limits(&mut log);
+    let told = &log.told()[0];
+    assert_eq!(short(told), ("zero", "position", "q7", false));
+    let readings = told["tied_with"].to_string() + &told["remedy"].to_string();
+    assert!(readings.contains("position_offset = 1.57079"), "{told}");
+    let mut right = turned(0.0);
+    with_limits(&mut right);
+    assert!(right.told().is_empty());
+}
+
+#[test]
 fn a_factor_that_is_no_ratio_is_an_estimate_and_a_ratio_is_written() {
     let Some(log) = shared("ur10/ur10_exciting.csv") else {
         return;

@@ -94,6 +94,9 @@ fn known(machine: &LoggedRobot) -> KnownBeforehand {
         torque: (names.iter())
             .map(|name| file.limits.of.get(name).and_then(|limits| limits.torque))
             .collect(),
+        position: (names.iter())
+            .map(|name| file.limits.of.get(name).and_then(|limits| limits.position))
+            .collect(),
         ratios: (written.flat_map(either))
             .filter(|x| x.is_finite() && *x > 1.0)
             .collect(),

@@ -273,6 +273,10 @@ impl Words<'_> {
     /// What the model misses, as declared and put right.
     fn missed(&self, found: &Found) -> String {
         let [before, after] = &found.errors;
+        let joints = |of: &[usize]| {
+            let names = of.iter().map(|j| self.joints[*j].as_str());
+            names.collect::<Vec<_>>().join(", ")
+        };
         let right = overall(after).map(percent).unwrap_or_default();
         let Some(declared) = overall(before) else {
             return format!(
@@ -284,6 +288,13 @@ impl Words<'_> {
         let each: Vec<String> = changed
             .map(|(joint, (b, a))| format!("{joint} {} -> {}", percent(*b), percent(*a)))
             .collect();
+        if !found.beyond_limits.is_empty() {
+            return format!(
+                ": as declared the positions of {} go beyond the limits in the robot file, with that put right none do; the model misses {} of the torque as declared and {right} with it",
+                joints(&found.beyond_limits),
+                percent(declared)
+            );
+        }
         let each = match each.is_empty() {
             true => ", and friction drives no joint any more".to_owned(),
             false => format!(" ({})", each.join(", ")),

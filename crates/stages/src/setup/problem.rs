@@ -15,6 +15,8 @@ use cft_ident_core::robot::Robot;
 pub struct KnownBeforehand {
     /// Largest torque of each joint \[N or N m\].
     pub torque: Vec<Option<f64>>,
+    /// Least and greatest position of each joint \[m or rad\].
+    pub position: Vec<Option<[f64; 2]>>,
     /// Gear ratios and factors that stand in the file.
     pub ratios: Vec<f64>,
     /// Inertial parameters by the file's own masses.
@@ -101,6 +103,24 @@ impl<'a> Problem<'a> {
     /// Channels whose signs and units are asked for.
     pub(super) fn channels_that_move(&self) -> Vec<usize> {
         (0..self.moving.len()).filter(|j| self.moving[*j]).collect()
+    }
+
+    /// Joints that are beyond the limits of the robot file under a correction.
+    pub(super) fn beyond_limits(&self, by: &Correction) -> Vec<usize> {
+        let n = self.robot.joints();
+        let mut carried = Carried::new(n);
+        let mut beyond = vec![false; n];
+        for k in 0..self.sample.len() {
+            if !(self.channels).carry(self.robot, self.sample.row(k), by, &mut carried) {
+                continue;
+            }
+            let limits = self.known.position.iter().zip(&carried.q).enumerate();
+            for (j, (limits, q)) in limits {
+                let off = limits.map_or(0.0, |[low, high]| (low - q).max(q - high));
+                beyond[j] |= off > LIMITS.still;
+            }
+        }
+        (0..n).filter(|j| beyond[*j]).collect()
     }
 
     /// The robot in the gravity of a correction.

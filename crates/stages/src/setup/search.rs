@@ -29,6 +29,8 @@ pub struct Found {
     pub tied: Vec<Change>,
     /// Joints of them that move in proportion.
     pub together: Option<[usize; 2]>,
+    /// Joints that are beyond the limits of the file as declared, where that is what shows it.
+    pub beyond_limits: Vec<usize>,
 }
 
 /// What a search found.
@@ -88,7 +90,8 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
     {
         out.without_gravity = look.without_gravity(&declared.trial);
         out.weights = weights(problem);
-        if out.estimate.is_none() {
+        out.found.extend(look.within_limits(&declared));
+        if out.estimate.is_none() && out.found.is_empty() {
             out.undecided = undecided(problem, &declared.trial);
         }
     }
@@ -347,6 +350,49 @@ impl Look<'_> {
             change,
             open,
             together,
+            beyond_limits: Vec::new(),
+        })
+    }
+
+    /// A mistake that the errors do not show, and the limits of the file do: as declared joints are beyond them, with it
+    /// none is, and no joint fits worse. A factor is for the fit to tell.
+    fn within_limits(&self, declared: &Judged) -> Option<Found> {
+        let beyond_limits = self.problem.beyond_limits(&declared.trial.by);
+        if beyond_limits.is_empty() {
+            return None;
+        }
+        let before = declared.trial.errors();
+        let mends = |change: &Change| -> Option<Trial> {
+            let by = declared.trial.by.with(change);
+            if change.times(1.0).is_some() || !self.problem.beyond_limits(&by).is_empty() {
+                return None;
+            }
+            let trial = self
+                .whole(&declared.trial.by, Some(change), Some(&declared.trial))?
+                .trial;
+            let worse = |(b, a): (&f64, &f64)| *a > b * (1.0 + LIMITS.same);
+            let after = trial.errors();
+            (!before.iter().zip(&after).any(worse)).then_some(trial)
+        };
+        let mut all: Vec<Trial> = (hypotheses::all(self.problem).iter())
+            .filter_map(mends)
+            .collect();
+        all.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
+        let (best, others) = all.split_first()?;
+        let change = best.change.clone()?;
+        let everyone = self.problem.channels_that_move();
+        let tied = others
+            .iter()
+            .filter(|j| !j.gain(best, &everyone).is_beyond(NUMBERS.screen, None));
+        let tied: Vec<Change> = tied.filter_map(|j| j.change.clone()).collect();
+        Some(Found {
+            errors: [before, best.errors()],
+            sure: false,
+            open: !tied.iter().all(|other| same_place(&change, other)),
+            tied,
+            change,
+            together: None,
+            beyond_limits,
         })
     }
 
