@@ -77,15 +77,24 @@ impl Free {
         }
     }
 
-    /// What these joints may have beside the list.
-    fn all(problem: &Problem, joints: &[usize], errors: &[f64]) -> Vec<Free> {
+    /// What these joints may have beside the list; `scaled` is one that a factor of the list fits best, whose neighbours
+    /// may fit better.
+    fn all(
+        problem: &Problem,
+        joints: &[usize],
+        errors: &[f64],
+        scaled: Option<usize>,
+    ) -> Vec<Free> {
         let mut out = Vec::new();
         let zeros = problem.has_zeros();
         for &j in joints {
             out.push(Self::Factor(Torque, j));
             // a position that is none leaves nothing explained
-            if errors[j] > LIMITS.sound {
+            let none = errors[j] > LIMITS.sound;
+            if none || scaled == Some(j) {
                 out.extend([Position, Both].map(|side| Self::Factor(side, j)));
+            }
+            if none {
                 out.push(Self::Begins(j));
                 out.extend(zeros.then_some(Self::Zero(j)));
             }
@@ -125,10 +134,10 @@ impl SetupEstimate {
 pub(super) fn estimates(
     problem: &Problem,
     base: &Correction,
-    joints: &[usize],
+    (joints, scaled): (&[usize], Option<usize>),
     (few, whole): (&Trial, &Trial),
 ) -> Vec<SetupEstimate> {
-    let cases = Free::all(problem, joints, &whole.errors());
+    let cases = Free::all(problem, joints, &whole.errors(), scaled);
     let of = |free: &Free| best(problem, base, *free, (few, whole));
     cases.par_iter().filter_map(of).collect()
 }

@@ -146,7 +146,13 @@ impl Look<'_> {
         let mut fitted: Option<(SetupEstimate, Trial)> = None;
         if let (Some(few), Some(whole), true) = (&few, declared, moving.len() > 1) {
             let both = (few, &whole.trial);
-            for estimate in estimates(self.problem, base, &doubt, both) {
+            let best = list
+                .iter()
+                .min_by(|a, b| a.trial.whole().total_cmp(&b.trial.whole()));
+            let change = best.and_then(|j| j.trial.change.as_ref());
+            let scaled = change.filter(|c| c.times(1.0).is_some());
+            let scaled = scaled.and_then(|c| c.joints().first().copied());
+            for estimate in estimates(self.problem, base, (&doubt, scaled), both) {
                 let mistakes = estimate.mistakes(&self.problem.known.ratios);
                 let known = |c: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(c));
                 let new: Vec<Change> = mistakes.into_iter().filter(|c| !known(c)).collect();
@@ -161,8 +167,9 @@ impl Look<'_> {
                 }
             }
         }
-        list.retain(|judged| self.has_a_factor(base, judged, declared));
-        let mut found = self.decide(declared, &list, fitted.as_ref().map(|f| &f.1));
+        let free = self.take_free(base, &mut list, declared);
+        let fitted_trial = fitted.as_ref().map(|f| &f.1);
+        let mut found = self.decide(declared, &list, (fitted_trial, free.as_ref()));
         // two mistakes are sure where one is: beside what is absurd
         let absurd = declared.is_some_and(|d| {
             let errors = d.trial.errors();
@@ -171,8 +178,8 @@ impl Look<'_> {
         if absurd && found.as_ref().is_none_or(|f| !f.sure) {
             let pairs = self.pairs(&list);
             let mut list = self.judged(base, pairs, (few.as_ref(), declared));
-            list.retain(|judged| self.has_a_factor(base, judged, declared));
-            let both = self.decide(declared, &list, None);
+            let free = self.take_free(base, &mut list, declared);
+            let both = self.decide(declared, &list, (None, free.as_ref()));
             found = both.filter(|f| f.sure).or(found);
         }
         let told = fitted
@@ -213,6 +220,21 @@ impl Look<'_> {
             .collect()
     }
 
+    /// Takes readings out of a list whose factor the data do not determine; the best of them.
+    fn take_free(
+        &self,
+        base: &Correction,
+        list: &mut Vec<Judged>,
+        declared: Option<&Judged>,
+    ) -> Option<Trial> {
+        let all = std::mem::take(list).into_iter();
+        let (known, free): (Vec<_>, Vec<_>) =
+            all.partition(|judged| self.has_a_factor(base, judged, declared));
+        *list = known;
+        let trials = free.into_iter().map(|judged| judged.trial);
+        trials.min_by(|a, b| a.whole().total_cmp(&b.whole()))
+    }
+
     /// Whether the data determine the factor of a hypothesis: any that is far off frees a joint from all others.
     fn has_a_factor(&self, base: &Correction, judged: &Judged, declared: Option<&Judged>) -> bool {
         let trial = &judged.trial;
@@ -249,12 +271,13 @@ impl Look<'_> {
             .collect()
     }
 
-    /// The reading of the list that is reported, if any. `fitted` is the best value that is on no list.
+    /// The reading of the list that is reported, if any. `fitted` is the best value that is on no list, `free` the best
+    /// reading whose factor the data do not determine.
     fn decide(
         &self,
         declared: Option<&Judged>,
         list: &[Judged],
-        fitted: Option<&Trial>,
+        (fitted, free): (Option<&Trial>, Option<&Trial>),
     ) -> Option<Found> {
         let everyone = self.problem.channels_that_move();
         // what physics breaks counts first, then the error; the simplest of equals is first in the list
@@ -298,6 +321,10 @@ impl Look<'_> {
             }
         }
         if fitted.is_some_and(|f| f.square(&seen) * LIMITS.far < best.trial.square(&seen)) {
+            return None;
+        }
+        // nor does a lesser one take the place of what is wrong by a factor that these data leave open
+        if !mended && free.is_some_and(|f| f.whole() * LIMITS.far < best.trial.whole()) {
             return None;
         }
         let untold = |j: &Trial| !j.gain(&best.trial, &seen).is_beyond(NUMBERS.screen, None);
