@@ -119,6 +119,19 @@ impl Change {
         }
     }
 
+    /// The joint of a factor, or of where a velocity begins.
+    pub(super) fn joint_of_value(&self) -> Option<usize> {
+        match self {
+            Self::Velocity(j, _) => Some(*j),
+            other => other.times(1.0)?.joints().first().copied(),
+        }
+    }
+
+    /// Whether it is another one in a better value.
+    pub(super) fn replaces(&self, other: &Change) -> bool {
+        matches!((self, other), (Self::Velocity(a, _), Self::Velocity(b, _)) if a == b)
+    }
+
     /// The same with its factor multiplied, where it has one.
     pub(super) fn times(&self, by: f64) -> Option<Change> {
         match self {

@@ -77,24 +77,20 @@ impl Free {
         }
     }
 
-    /// What these joints may have beside the list; `scaled` is one that a factor of the list fits best, whose neighbours
-    /// may fit better.
+    /// What these joints may have beside the list; of one that a value of the list fits best, neighbours may fit better.
     fn all(
         problem: &Problem,
         joints: &[usize],
         errors: &[f64],
-        scaled: Option<usize>,
+        listed: Option<usize>,
     ) -> Vec<Free> {
         let mut out = Vec::new();
         let zeros = problem.has_zeros();
         for &j in joints {
             out.push(Self::Factor(Torque, j));
             // a position that is none leaves nothing explained
-            let none = errors[j] > LIMITS.sound;
-            if none || scaled == Some(j) {
+            if errors[j] > LIMITS.sound || listed == Some(j) {
                 out.extend([Position, Both].map(|side| Self::Factor(side, j)));
-            }
-            if none {
                 out.push(Self::Begins(j));
                 out.extend(zeros.then_some(Self::Zero(j)));
             }
@@ -134,10 +130,10 @@ impl SetupEstimate {
 pub(super) fn estimates(
     problem: &Problem,
     base: &Correction,
-    (joints, scaled): (&[usize], Option<usize>),
+    (joints, listed): (&[usize], Option<usize>),
     (few, whole): (&Trial, &Trial),
 ) -> Vec<SetupEstimate> {
-    let cases = Free::all(problem, joints, &whole.errors(), scaled);
+    let cases = Free::all(problem, joints, &whole.errors(), listed);
     let of = |free: &Free| best(problem, base, *free, (few, whole));
     cases.par_iter().filter_map(of).collect()
 }

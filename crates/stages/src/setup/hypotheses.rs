@@ -42,6 +42,7 @@ pub(super) fn all(problem: &Problem) -> Vec<Change> {
     }
     out.extend(units(problem, &moving));
     out.extend(zeros(problem, &moving));
+    out.extend(velocities(problem, &moving));
     out.extend(gravities(problem));
     out
 }
@@ -87,6 +88,21 @@ fn zeros(problem: &Problem, moving: &[usize]) -> Vec<Change> {
     let turns = |j: &&usize| problem.robot.joint_kind(**j) == JointKind::Revolute;
     let of = |j: &usize| [FRAC_PI_2, -FRAC_PI_2, PI].map(|angle| Change::Zero(*j, angle));
     moving.iter().filter(turns).flat_map(of).collect()
+}
+
+/// Velocities that are taken for positions, about the middle of the travel that the file allows.
+fn velocities(problem: &Problem, moving: &[usize]) -> Vec<Change> {
+    if problem.channels.drive != Drive::Joints {
+        return Vec::new();
+    }
+    let rows = problem.sample.len().max(1) as f64;
+    let of = |j: &usize| {
+        let limits = problem.known.position.get(*j).copied().flatten();
+        let middle = limits.map_or(0.0, |[low, high]| 0.5 * (low + high));
+        let mean = problem.sample.product(|row| row.sum[*j]) / rows;
+        Change::Velocity(*j, middle - mean)
+    };
+    moving.iter().map(of).collect()
 }
 
 /// Gravity along the axes of the base but the declared one.

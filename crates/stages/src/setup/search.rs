@@ -150,13 +150,17 @@ impl Look<'_> {
                 .iter()
                 .min_by(|a, b| a.trial.whole().total_cmp(&b.trial.whole()));
             let change = best.and_then(|j| j.trial.change.as_ref());
-            let scaled = change.filter(|c| c.times(1.0).is_some());
-            let scaled = scaled.and_then(|c| c.joints().first().copied());
-            for estimate in estimates(self.problem, base, (&doubt, scaled), both) {
+            let listed = change.and_then(Change::joint_of_value);
+            for estimate in estimates(self.problem, base, (&doubt, listed), both) {
                 let mistakes = estimate.mistakes(&self.problem.known.ratios);
                 let known = |c: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(c));
                 let new: Vec<Change> = mistakes.into_iter().filter(|c| !known(c)).collect();
                 let of = |c: &Change| self.whole(base, Some(c), Some(&whole.trial));
+                let better = |j: &Judged| {
+                    let old = j.trial.change.as_ref();
+                    new.iter().any(|c| old.is_some_and(|old| c.replaces(old)))
+                };
+                list.retain(|j| !better(j));
                 list.extend(new.iter().filter_map(of));
                 if let Some(judged) = of(&estimate.change)
                     && fitted
