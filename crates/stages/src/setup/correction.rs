@@ -127,6 +127,15 @@ impl Change {
         }
     }
 
+    /// Whether both are factors of the same channel.
+    pub(super) fn is_value_of(&self, other: &Change) -> bool {
+        match (self, other) {
+            (Self::Scale(a, of, _), Self::Scale(b, also, f)) => a == b && of == also && *f != -1.0,
+            (Self::Gear(a, _), Self::Gear(b, _)) => a == b,
+            _ => false,
+        }
+    }
+
     /// Whether it is another one in a better value.
     pub(super) fn replaces(&self, other: &Change) -> bool {
         matches!((self, other), (Self::Velocity(a, _), Self::Velocity(b, _)) if a == b)

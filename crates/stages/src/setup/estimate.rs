@@ -77,19 +77,14 @@ impl Free {
         }
     }
 
-    /// What these joints may have beside the list; of one that a value of the list fits best, neighbours may fit better.
-    fn all(
-        problem: &Problem,
-        joints: &[usize],
-        errors: &[f64],
-        listed: Option<usize>,
-    ) -> Vec<Free> {
+    /// What these joints may have beside the list; positions of those in `asked`, whatever is missed.
+    fn all(problem: &Problem, joints: &[usize], errors: &[f64], asked: &[usize]) -> Vec<Free> {
         let mut out = Vec::new();
         let zeros = problem.has_zeros();
         for &j in joints {
             out.push(Self::Factor(Torque, j));
             // a position that is none leaves nothing explained
-            if errors[j] > LIMITS.sound || listed == Some(j) {
+            if errors[j] > LIMITS.sound || asked.contains(&j) {
                 out.extend([Position, Both].map(|side| Self::Factor(side, j)));
                 out.push(Self::Begins(j));
                 out.extend(zeros.then_some(Self::Zero(j)));
@@ -130,10 +125,10 @@ impl SetupEstimate {
 pub(super) fn estimates(
     problem: &Problem,
     base: &Correction,
-    (joints, listed): (&[usize], Option<usize>),
+    (joints, asked): (&[usize], &[usize]),
     (few, whole): (&Trial, &Trial),
 ) -> Vec<SetupEstimate> {
-    let cases = Free::all(problem, joints, &whole.errors(), listed);
+    let cases = Free::all(problem, joints, &whole.errors(), asked);
     let of = |free: &Free| best(problem, base, *free, (few, whole));
     cases.par_iter().filter_map(of).collect()
 }

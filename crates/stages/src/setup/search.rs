@@ -150,8 +150,10 @@ impl Look<'_> {
                 .iter()
                 .min_by(|a, b| a.trial.whole().total_cmp(&b.trial.whole()));
             let change = best.and_then(|j| j.trial.change.as_ref());
-            let listed = change.and_then(Change::joint_of_value);
-            for estimate in estimates(self.problem, base, (&doubt, listed), both) {
+            // neighbours of a listed value may fit better, and what is beyond its limits has some other factor
+            let mut asked = self.problem.beyond_limits(base);
+            asked.extend(change.and_then(Change::joint_of_value));
+            for estimate in estimates(self.problem, base, (&doubt, &asked), both) {
                 let mistakes = estimate.mistakes(&self.problem.known.ratios);
                 let known = |c: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(c));
                 let new: Vec<Change> = mistakes.into_iter().filter(|c| !known(c)).collect();
@@ -325,6 +327,19 @@ impl Look<'_> {
             }
         }
         if fitted.is_some_and(|f| f.square(&seen) * LIMITS.far < best.trial.square(&seen)) {
+            return None;
+        }
+        // another value of the same thing, clearly better, contradicts that of the list
+        let contradicts = |f: &Trial| {
+            let same = f.change.as_ref().is_some_and(|c| c.is_value_of(&change));
+            let less = f.whole() * (1.0 + LIMITS.same) < best.trial.whole();
+            same && less
+                && best
+                    .trial
+                    .gain(f, &everyone)
+                    .is_beyond(NUMBERS.screen, None)
+        };
+        if fitted.is_some_and(contradicts) {
             return None;
         }
         // nor does a lesser one take the place of what is wrong by a factor that these data leave open
