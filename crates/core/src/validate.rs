@@ -3,9 +3,14 @@
 //! Measured and reconstructed torque run through the model's declared parallel filter alike; the
 //! errors of every filtered, decimated row and of every raw sample are summed as they pass.
 
+mod sums;
+mod traces;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use self::sums::{ErrorSums, ratio};
+use self::traces::append;
 use crate::block::Block;
 use crate::motion::{self, FilterSettings, Parallel, Stretch, Summary, rest};
 use crate::robot::model::{JointFriction, Model};
@@ -94,92 +99,6 @@ pub struct TorqueTraces {
     /// Measured and reconstructed torque, points x joints, row-major.
     pub measured: Vec<f64>,
     pub reconstructed: Vec<f64>,
-}
-
-/// ErrorSums of one joint.
-#[derive(Debug, Clone, Copy, Default)]
-struct ErrorSums {
-    error: f64,
-    torque: f64,
-    mean: f64,
-    scatter: f64,
-    largest: f64,
-    rows: u64,
-    raw_error: f64,
-    raw_torque: f64,
-    /// Raw samples, those inside the band, and the sum of its half widths.
-    raw_rows: u64,
-    inside: u64,
-    widths: f64,
-    /// Squared error and torque of the rows in which the joint moves, as a fit weighs them.
-    moving: [f64; 2],
-    /// Squared error and torque of the rows in which the joint rests, and their number.
-    rest: [f64; 2],
-    resting: u64,
-}
-
-impl ErrorSums {
-    /// A row, `weighted` as a fit has it: measured and reconstructed.
-    fn add(&mut self, [measured, reconstructed]: [f64; 2], weighted: [f64; 2], rests: bool) {
-        let e = measured - reconstructed;
-        if rests {
-            self.rest[0] += e * e;
-            self.rest[1] += measured * measured;
-            self.resting += 1;
-        } else {
-            self.moving[0] += (weighted[0] - weighted[1]).powi(2);
-            self.moving[1] += weighted[0].powi(2);
-        }
-        self.error += e * e;
-        self.torque += measured * measured;
-        self.largest = self.largest.max(e.abs());
-        self.rows += 1;
-        // Welford 1962: the scatter about the running mean
-        let d = measured - self.mean;
-        self.mean += d / self.rows as f64;
-        self.scatter += d * (measured - self.mean);
-    }
-
-    /// Adds the rows of another log.
-    fn merge(&mut self, other: &Self) {
-        // Chan, Golub and LeVeque 1983: the scatter about the mean of both
-        let rows = (self.rows + other.rows).max(1) as f64;
-        let apart = other.mean - self.mean;
-        self.scatter += other.scatter + apart * apart * self.rows as f64 * other.rows as f64 / rows;
-        self.mean += apart * other.rows as f64 / rows;
-        self.error += other.error;
-        self.torque += other.torque;
-        self.largest = self.largest.max(other.largest);
-        self.rows += other.rows;
-        self.raw_error += other.raw_error;
-        self.raw_torque += other.raw_torque;
-        self.raw_rows += other.raw_rows;
-        self.inside += other.inside;
-        self.widths += other.widths;
-        self.moving[0] += other.moving[0];
-        self.moving[1] += other.moving[1];
-        self.rest[0] += other.rest[0];
-        self.rest[1] += other.rest[1];
-        self.resting += other.resting;
-    }
-
-    fn add_raw(&mut self, measured: f64, reconstructed: f64, half_width: f64) {
-        let e = measured - reconstructed;
-        self.raw_rows += 1;
-        self.inside += u64::from(e.abs() <= half_width);
-        self.widths += half_width;
-        self.raw_error += e * e;
-        self.raw_torque += measured * measured;
-    }
-}
-
-/// norm(tau - tau_hat) / norm(tau) from the squares of both, where there are rows.
-fn ratio(error: f64, torque: f64, rows: u64) -> Option<f64> {
-    let relative = match torque > 0.0 {
-        true => (error / torque).sqrt(),
-        false => f64::NAN,
-    };
-    (rows > 0).then_some(relative)
 }
 
 /// One row of raw torques, handed to the caller for a residual file.
@@ -546,53 +465,4 @@ impl<'a> Reconstruction<'a> {
             joints,
         }
     }
-}
-
-/// Most points of a trace; beyond it neighbouring pairs of extremes merge.
-const MOST_POINTS: usize = 16_384;
-
-/// Appends a row to the traces; thins them by two where they are too many.
-fn append(traces: &mut TorqueTraces, t: f64, filtered: &[f64], n: usize) {
-    traces.t.push(t);
-    traces.measured.extend_from_slice(&filtered[..n]);
-    traces.reconstructed.extend_from_slice(&filtered[n..]);
-    if traces.t.len() >= MOST_POINTS {
-        halve(traces, n);
-    }
-}
-
-/// Of every four points keeps the two whose first-joint error is smallest and largest, in order
-/// of time; stretches keep their borders.
-fn halve(traces: &mut TorqueTraces, n: usize) {
-    let mut out = TorqueTraces::default();
-    let mut bounds = traces.breaks.clone();
-    bounds.push(traces.t.len());
-    for pair in bounds.windows(2) {
-        out.breaks.push(out.t.len());
-        let mut k = pair[0];
-        while k < pair[1] {
-            let end = (k + 4).min(pair[1]);
-            let size = |i: &usize| -> f64 {
-                (0..n)
-                    .map(|j| traces.measured[i * n + j] - traces.reconstructed[i * n + j])
-                    .sum()
-            };
-            let lo = (k..end).min_by(|a, b| size(a).total_cmp(&size(b)));
-            let hi = (k..end).max_by(|a, b| size(a).total_cmp(&size(b)));
-            let (Some(lo), Some(hi)) = (lo, hi) else {
-                break;
-            };
-            let mut kept = [lo.min(hi), lo.max(hi)].to_vec();
-            kept.dedup();
-            for i in kept {
-                out.t.push(traces.t[i]);
-                out.measured
-                    .extend_from_slice(&traces.measured[i * n..(i + 1) * n]);
-                out.reconstructed
-                    .extend_from_slice(&traces.reconstructed[i * n..(i + 1) * n]);
-            }
-            k = end;
-        }
-    }
-    *traces = out;
 }

@@ -20,6 +20,7 @@ pub mod problem;
 mod propagate;
 pub mod score;
 mod slope;
+mod smoothing;
 mod start;
 mod thinned;
 #[cfg(test)]

@@ -26,6 +26,7 @@ mod error;
 pub mod experiment;
 pub mod integrate;
 pub mod joint_friction;
+mod log_layout;
 pub mod mechanism;
 pub mod moving;
 pub mod one_joint;

@@ -71,6 +71,7 @@ mod temperatures;
 mod torque;
 mod track;
 mod track_error;
+mod track_source;
 mod unknowns;
 mod validate;
 mod watch;
@@ -122,10 +123,10 @@ pub use residual::{JointResidual, RelativeError};
 pub use setup::{CheckedSetup, check_setup};
 pub use torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use track::{
-    FleetDifference, RobotSources, TrackSource, Tracked, TrackedChange, TrackedParameter,
-    TrackedRobot, track,
+    FleetDifference, RobotSources, Tracked, TrackedChange, TrackedParameter, TrackedRobot, track,
 };
 pub use track_error::TrackError;
+pub use track_source::TrackSource;
 pub use unknowns::FittedUnknown;
 pub use validate::{ErrorsByUse, ErrorsOfLogs, Validated, not_a_validation, used_for, validate};
 pub use watch::{

@@ -1,8 +1,6 @@
 //! The parameters of robots over their logs: what each log says by itself, followed in order of time.
 
 use std::collections::BTreeMap;
-use std::slice::from_ref;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -11,9 +9,9 @@ use serde::Serialize;
 use super::control::Control;
 use super::error::IdentifyError;
 use super::one_log::{OneEstimate, Source};
-use super::reduced::reduced_log::{MadeWith, ReducedLog};
+use super::reduced::reduced_log::MadeWith;
 use super::track_error::TrackError;
-use cft_ident_files::config::ModelFile;
+use super::track_source::TrackSource;
 use cft_ident_fleet::track::{
     ChangeKind, Course, Level, LogEstimate, ParameterChange, apart, follow_together,
 };
@@ -27,19 +25,6 @@ const ALARMS: f64 = 0.0002;
 const DIFFERENCES: f64 = 0.01;
 /// A time between two logs over the usual one from which on the clock is doubted.
 const JUMP: f64 = 1000.0;
-
-/// What a robot's parameters are taken from.
-#[derive(Debug, Clone)]
-pub enum TrackSource {
-    /// A reduced log; `file` counts the files in the order in which they are given.
-    Part { log: Arc<ReducedLog>, file: usize },
-    /// A model that was identified.
-    Model {
-        name: String,
-        file: Box<ModelFile>,
-        provenance: Provenance,
-    },
-}
 
 /// One robot, and its logs or models.
 #[derive(Debug, Clone)]
@@ -164,61 +149,6 @@ pub fn track(robots: &[RobotSources], control: &Control) -> Result<Tracked, Iden
         inputs,
         warnings,
     })
-}
-
-impl TrackSource {
-    fn name(&self) -> &str {
-        match self {
-            Self::Part { log, .. } => log.name(),
-            Self::Model { name, .. } => name,
-        }
-    }
-
-    fn provenance(&self) -> &Provenance {
-        match self {
-            Self::Part { log, .. } => &log.provenance,
-            Self::Model { provenance, .. } => provenance,
-        }
-    }
-
-    /// Its name with the span of a log.
-    fn shown(&self) -> String {
-        match (self, &self.provenance().span) {
-            (Self::Part { .. }, Some(span)) => format!("{}@{span}", self.name()),
-            _ => self.name().to_owned(),
-        }
-    }
-
-    /// The logs that it is from; the model file itself where it names none.
-    fn rows(&self) -> &[Provenance] {
-        match self {
-            Self::Model { file, .. } if !file.provenance.inputs.is_empty() => {
-                &file.provenance.inputs
-            }
-            _ => from_ref(self.provenance()),
-        }
-    }
-
-    /// Whether both are from the same rows: parts of any, models of all.
-    fn same_rows(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Part { log: a, .. }, Self::Part { log: b, .. }) => a.shares_rows(b),
-            _ => {
-                let (a, b) = (self.rows(), other.rows());
-                let same =
-                    |(a, b): (&Provenance, &Provenance)| a.sha256 == b.sha256 && a.span == b.span;
-                a.len() == b.len() && a.iter().zip(b).all(same)
-            }
-        }
-    }
-
-    /// First and last time, where it is known.
-    fn bounds(&self) -> Option<[f64; 2]> {
-        match self {
-            Self::Part { log, .. } => Some(log.bounds_s),
-            Self::Model { .. } => None,
-        }
-    }
 }
 
 /// Sources in order of time, and their times.
