@@ -1,17 +1,19 @@
 //! `cft-ident export`: a model for other programs, as C header, Rust module, URDF or file of a simulator.
 
+mod words;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use self::words::{about_effects, beside_urdf, beyond_table, effects, never_driving};
 use super::files::ReadFile;
 use super::{CliError, Context, Outcome, arguments, controller, files};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::no_torque;
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::number;
 use cft_ident_export::export::arm::{Arm, Says};
 use cft_ident_export::export::dissipative::below_zero;
 use cft_ident_export::export::left_out::{self, Elsewhere};
@@ -141,15 +143,6 @@ fn name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// The effects of a model, as a person names them.
-fn effects(file: &ModelFile) -> Vec<String> {
-    let of = |e: &cft_ident_files::config::model_file::EffectSection| match &e.joint {
-        Some(joint) => format!("{} of {}", escape(&e.name), escape(joint)),
-        None => escape(&e.name),
-    };
-    file.effects.iter().map(of).collect()
-}
-
 /// A format of a simulator that is asked for.
 struct Format<'a> {
     path: &'a Path,
@@ -244,29 +237,6 @@ fn controller_names(file: &ModelFile) -> BTreeMap<String, String> {
     named.collect()
 }
 
-/// What the files of simulators cannot say, as a table.
-fn beyond_table(beyond: &[Beyond]) -> String {
-    if beyond.is_empty() {
-        return String::new();
-    }
-    let mut table = Table::new(&[
-        ("file", Align::Left),
-        ("what it cannot say", Align::Left),
-        ("% of torque", Align::Decimal),
-        ("at", Align::Left),
-    ]);
-    for part in beyond {
-        let percent = part.percent_of_torque;
-        table.row([
-            part.file.as_str(),
-            &part.what,
-            &percent.map_or("-".to_owned(), |x| number::significant(x, 3)),
-            part.joint.as_deref().unwrap_or("-"),
-        ]);
-    }
-    format!("\n{table}")
-}
-
 /// The file, with or without its effects.
 fn without(file: &ModelFile, effects: bool) -> ModelFile {
     let mut file = file.clone();
@@ -274,62 +244,6 @@ fn without(file: &ModelFile, effects: bool) -> ModelFile {
         file.effects.clear();
     }
     file
-}
-
-/// What a header or module says of effects.
-fn about_effects(program: &Program, left_out: &[String]) -> Vec<String> {
-    if !left_out.is_empty() {
-        let all = left_out.join(", ");
-        return vec![format!("NOT in here, though the model has it: {all}.")];
-    }
-    let mut lines = vec!["Nothing of the model is left out.".to_owned()];
-    let effects = &program.effects;
-    if !effects.told.is_empty() {
-        let told: Vec<String> = effects.told.iter().map(|name| escape(name)).collect();
-        lines.push(format!("Effects: {}.", told.join(", ")));
-    }
-    if effects.remember_anything() {
-        lines.push("Some remember the motion: init, then step once a sample.".to_owned());
-    }
-    let late = effects.lead_s.iter().zip(&program.joints);
-    for (lead, joint) in late.filter(|(lead, _)| **lead != 0.0) {
-        lines.push(format!(
-            "The logged torque of {} is late by {} s, {} samples at 1 kHz: these functions give the torque \
-             without it; send it that much earlier.",
-            escape(joint),
-            number::significant(*lead, 6),
-            number::significant(1000.0 * lead, 4),
-        ));
-    }
-    lines
-}
-
-/// Where the friction of the model would drive a joint, which no code of it does.
-fn never_driving(program: &Program) -> Vec<String> {
-    let each = program.joints.iter().zip(&program.kinds);
-    let each = each.zip(&program.drives_at);
-    let told = each.filter_map(|((joint, kind), speeds)| {
-        let [low, high] = (*speeds)?.map(|v| number::significant(v, 2));
-        Some(format!(
-            "the friction of {} drives it between {low} and {high} {}/s in the model: there it is 0 in the code",
-            escape(joint),
-            kind.position_unit()
-        ))
-    });
-    told.collect()
-}
-
-/// What a URDF says of effects.
-fn beside_urdf(file: &ModelFile, left_out: &[String]) -> Vec<String> {
-    let (own, all) = (effects(file), left_out.join(", "));
-    match (own.is_empty(), left_out.is_empty()) {
-        (_, false) => vec![format!("NOT in here, though the model has it: {all}.")],
-        (true, true) => vec!["Nothing of the model is left out.".to_owned()],
-        (false, true) => vec![format!(
-            "Effects are in the file beside the URDF alone: {}.",
-            own.join(", ")
-        )],
-    }
 }
 
 /// Runs the command.

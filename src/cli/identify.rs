@@ -435,11 +435,8 @@ fn by_names(campaign: &Campaign) -> String {
     ] {
         for log in logs {
             if let Ok(spec) = LogSpec::from_str(log) {
-                let span = spec
-                    .span
-                    .label()
-                    .map_or(String::new(), |span| format!("@{span}"));
-                *log = spec.name() + &span;
+                let span = spec.span.label().map(|span| format!("@{span}"));
+                *log = spec.name() + &span.unwrap_or_default();
             }
         }
     }

@@ -7,7 +7,9 @@ mod criterion;
 mod given;
 mod judge;
 mod names;
+mod one_joint;
 mod samples;
+mod search;
 
 use std::path::{Path, PathBuf};
 
@@ -16,27 +18,25 @@ use super::error::CliError;
 use super::exit::Exit;
 use super::outcome::Outcome;
 use super::{arguments, files, keep_what_there_is};
-use cft_ident_files::config::trajectory::FourierSection;
 use cft_ident_files::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_plant::excite::blend::Blend;
-use cft_ident_plant::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
+use cft_ident_plant::excite::ladder::foresee_ladder;
 use cft_ident_plant::excite::machine::ForeseenRobot;
-use cft_ident_plant::excite::search::{FoundMotion, Task, design};
-use cft_ident_plant::excite::series::Series;
 use cft_ident_plant::excite::usage::check_pose;
 use cft_ident_plant::excite::{
     ExciteError, GivenInformation, Judgement, Judgements, LawForeseen, Motion, PriorInformation,
-    foresee, machine, series_of, trajectory, usual_torque,
+    foresee, machine, usual_torque,
 };
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::{Report, stages};
 
 use aim::Aim;
-use criterion::{criterion, weights};
+use criterion::weights;
 use judge::{head, judged, refuse_broken};
 use names::Names;
+use one_joint::{ladder, ladder_task};
+use search::{blended, searched, task};
 
 const EXAMPLE: &str = "\
 Example:
@@ -348,54 +348,6 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
     })
 }
 
-fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
-    let (seconds, part) = match &bench.aim {
-        Some(Aim::Ladder { seconds, part, .. }) => (*seconds, *part),
-        _ => (bench.args.seconds, 1.0),
-    };
-    LadderTask {
-        joint: joint.to_owned(),
-        seconds,
-        part,
-        seed: bench.args.seed,
-        rate_hz: bench.rate_hz,
-        reserve: bench.args.margin,
-    }
-}
-
-/// Designs the one-joint experiment of a joint.
-fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError> {
-    let bar = bench.context.progress("designing", None);
-    let found = design_ladder(&bench.machine, &ladder_task(bench, joint))?;
-    drop(bar);
-    bench.context.check()?;
-    let trajectory = Trajectory::SingleJoint(found.file);
-    let args = bench.args;
-    let seconds = ladder_task(bench, joint).seconds;
-    let motion = Motion::of_file(&bench.machine, &trajectory, seconds, args.seed)?;
-    let friction = LawForeseen {
-        joint: joint.to_owned(),
-        parameters: found.expected,
-        usual_relative_std: Some(found.usual),
-    };
-    let channels = &bench.machine.channels;
-    let mut judged = judged(bench, &motion, channels, None, Some(friction))?;
-    judged.evaluations = Some(found.evaluations);
-    refuse_broken(&judged)?;
-    let file = names.trajectory.clone().unwrap_or_default();
-    let shown = file.display().to_string();
-    let mut report = written(bench, &motion, &judged, names, &shown)?;
-    bench
-        .context
-        .write_text(&file, &trajectory.to_toml(&head(&judged)))?;
-    report.terminal().line(&format!("written: {shown}"));
-    Ok(Outcome {
-        text: report.text_for(bench.context.detail()),
-        document: Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
-        missed: Vec::new(),
-    })
-}
-
 /// Designs one motion after the other, each with those before it given.
 fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     let args = bench.args;
@@ -460,59 +412,6 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     })
 }
 
-/// What the command line asks for, with nothing known before.
-fn task(bench: &mut Bench) -> Result<Task, CliError> {
-    let args = bench.args;
-    Ok(Task {
-        criterion: criterion(bench)?,
-        fundamental_hz: bench.frequency_hz,
-        harmonics: usize::from(args.harmonics),
-        offsets: offsets(bench)?,
-        reserve: args.margin,
-        prior: None,
-        starts: usize::from(args.starts),
-        evaluations: args.evaluations,
-        seed: args.seed,
-    })
-}
-
-/// The search, with its bar.
-fn searched(bench: &Bench, task: &Task) -> Result<FoundMotion, CliError> {
-    let context = bench.context;
-    let bar = context.progress("designing", Some(task.most_evaluations()));
-    let found = design(
-        &bench.machine,
-        task,
-        &|steps| bar.advance(steps),
-        context.stop_flag(),
-    );
-    found.map_err(|error| match context.interrupted() {
-        true => CliError::interrupted(),
-        false => error.into(),
-    })
-}
-
-/// The motion from rest to rest, and as a file.
-fn blended(bench: &Bench, series: Series) -> Result<(Motion, FourierSection), CliError> {
-    let (args, machine) = (bench.args, &bench.machine);
-    let reserved = machine.channels.iter().map(|c| c.reserved(args.margin));
-    let reserved: Vec<_> = reserved.collect();
-    let blend = Blend::within(
-        machine,
-        &reserved,
-        &series,
-        args.periods,
-        args.from.as_deref(),
-    )?;
-    let fourier = FourierSection {
-        start_s: Some(blend.start),
-        blend_s: Some(blend.seconds),
-        periods: blend.periods,
-        ..trajectory(machine, &series)
-    };
-    Ok((Motion::Periodic { series, blend }, fourier))
-}
-
 /// The report of a motion, after page, picture and samples were written where they are asked for;
 /// `shown` is the trajectory's path.
 fn written(
@@ -554,28 +453,4 @@ fn written(
             .line(&format!("written: {}", path.display()));
     }
     Ok(report)
-}
-
-/// Offsets that a file fixes.
-fn offsets(bench: &mut Bench) -> Result<Vec<Option<f64>>, CliError> {
-    let n = bench.machine.coordinates();
-    let Some(path) = &bench.args.offsets else {
-        return Ok(vec![None; n]);
-    };
-    let given = files::trajectory(path)?;
-    bench.inputs.push(given.provenance);
-    let Trajectory::Fourier(file) = &given.value else {
-        return Err(
-            CliError::input(format!("{} is no Fourier series", given.name))
-                .hint("give a trajectory of kind \"fourier\" for --offsets"),
-        );
-    };
-    let series = series_of(&bench.machine, file)?;
-    let names = bench.machine.coordinate_names();
-    Ok((0..n)
-        .map(|i| {
-            let named = file.series.iter().any(|c| c.name == names[i]);
-            named.then_some(series.offset[i])
-        })
-        .collect())
 }

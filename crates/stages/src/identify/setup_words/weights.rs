@@ -3,8 +3,7 @@
 use super::{Words, hint};
 use crate::setup::ChannelKind::Torque;
 use crate::setup::{
-    Change, Finding, FindingKind, FindingSeverity, LIMITS, Problem, Setting, Weight,
-    WeightGain,
+    Change, Finding, FindingKind, FindingSeverity, LIMITS, Problem, Setting, Weight, WeightGain,
 };
 use cft_ident_core::number::significant;
 

@@ -1,0 +1,96 @@
+//! What exported files and the terminal say of what is left out.
+
+use super::Beyond;
+use cft_ident_core::number;
+use cft_ident_export::export::Program;
+use cft_ident_files::config::ModelFile;
+use cft_ident_logs::log::escape;
+use cft_ident_report::report::table::{Align, Table};
+
+/// The effects of a model, as a person names them.
+pub(super) fn effects(file: &ModelFile) -> Vec<String> {
+    let of = |e: &cft_ident_files::config::model_file::EffectSection| match &e.joint {
+        Some(joint) => format!("{} of {}", escape(&e.name), escape(joint)),
+        None => escape(&e.name),
+    };
+    file.effects.iter().map(of).collect()
+}
+
+/// What the files of simulators cannot say, as a table.
+pub(super) fn beyond_table(beyond: &[Beyond]) -> String {
+    if beyond.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new(&[
+        ("file", Align::Left),
+        ("what it cannot say", Align::Left),
+        ("% of torque", Align::Decimal),
+        ("at", Align::Left),
+    ]);
+    for part in beyond {
+        let percent = part.percent_of_torque;
+        table.row([
+            part.file.as_str(),
+            &part.what,
+            &percent.map_or("-".to_owned(), |x| number::significant(x, 3)),
+            part.joint.as_deref().unwrap_or("-"),
+        ]);
+    }
+    format!("\n{table}")
+}
+
+/// What a header or module says of effects.
+pub(super) fn about_effects(program: &Program, left_out: &[String]) -> Vec<String> {
+    if !left_out.is_empty() {
+        let all = left_out.join(", ");
+        return vec![format!("NOT in here, though the model has it: {all}.")];
+    }
+    let mut lines = vec!["Nothing of the model is left out.".to_owned()];
+    let effects = &program.effects;
+    if !effects.told.is_empty() {
+        let told: Vec<String> = effects.told.iter().map(|name| escape(name)).collect();
+        lines.push(format!("Effects: {}.", told.join(", ")));
+    }
+    if effects.remember_anything() {
+        lines.push("Some remember the motion: init, then step once a sample.".to_owned());
+    }
+    let late = effects.lead_s.iter().zip(&program.joints);
+    for (lead, joint) in late.filter(|(lead, _)| **lead != 0.0) {
+        lines.push(format!(
+            "The logged torque of {} is late by {} s, {} samples at 1 kHz: these functions give the torque \
+             without it; send it that much earlier.",
+            escape(joint),
+            number::significant(*lead, 6),
+            number::significant(1000.0 * lead, 4),
+        ));
+    }
+    lines
+}
+
+/// Where the friction of the model would drive a joint, which no code of it does.
+pub(super) fn never_driving(program: &Program) -> Vec<String> {
+    let each = program.joints.iter().zip(&program.kinds);
+    let each = each.zip(&program.drives_at);
+    let told = each.filter_map(|((joint, kind), speeds)| {
+        let [low, high] = (*speeds)?.map(|v| number::significant(v, 2));
+        Some(format!(
+            "the friction of {} drives it between {low} and {high} {}/s in the model: there it is 0 in the code",
+            escape(joint),
+            kind.position_unit()
+        ))
+    });
+    told.collect()
+}
+
+/// What a URDF says of effects.
+pub(super) fn beside_urdf(file: &ModelFile, left_out: &[String]) -> Vec<String> {
+    let (own, all) = (effects(file), left_out.join(", "));
+    match (own.is_empty(), left_out.is_empty()) {
+        (_, false) => vec![format!("NOT in here, though the model has it: {all}.")],
+        (true, true) => vec!["Nothing of the model is left out.".to_owned()],
+        (false, true) => vec![format!(
+            "Effects are in the file beside the URDF alone: {}.",
+            own.join(", ")
+        )],
+    }
+}
