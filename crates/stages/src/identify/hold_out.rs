@@ -293,7 +293,7 @@ impl<'a> Trial<'a> {
         let position = each.copied().fold(plain, f64::min);
         let settings = self.settings.with_one_position_filter(position);
         let uncertain = Directions::of(self.file, &self.model.model, held);
-        let mut quiet: Option<Quiet> = None;
+        let mut quiet = Quiet::default();
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
             let mut open = self.machine.open(log, self.control)?;
@@ -313,16 +313,15 @@ impl<'a> Trial<'a> {
                     self.observed[index].keep(&mut block, first);
                 }
                 for watched in &mut watched {
-                    let taken = watched.take(&block, !more, folds).map_err(failed)?;
-                    if taken.is_empty() {
-                        continue;
+                    let push = &mut |sample: QuietSample| quiet.push(sample);
+                    (watched.take(&block, !more, folds, push)).map_err(failed)?;
+                    if quiet.step_s == 0.0 && watched.next > f64::NEG_INFINITY {
+                        quiet.step_s = watched.kept_s();
                     }
-                    let quiet = quiet.get_or_insert_with(|| Quiet::new(watched.kept_s()));
-                    taken.into_iter().for_each(|sample| quiet.push(sample));
                 }
             }
         }
-        let learnt = quiet.and_then(|quiet| quiet.learn(held, cutoff, position));
+        let learnt = quiet.learn(held, cutoff, position);
         if learnt.is_none() {
             // torques of too few samples: those of the band stand for them
             for held in held.iter_mut() {
@@ -373,18 +372,20 @@ impl Watched {
         })
     }
 
-    /// The samples of its block that these rows of the log determine; `last` ends the log.
+    /// Hands on the samples of its block that these rows of the log determine; `last` ends the log.
     fn take(
         &mut self,
         rows: &Block,
         last: bool,
         folds: &Folds,
-    ) -> Result<Vec<QuietSample>, MotionError> {
+        push: &mut dyn FnMut(QuietSample),
+    ) -> Result<(), MotionError> {
         let of = |t: f64| folds.of_time(self.log, t);
-        let (fold, every, mut taken) = (self.fold, self.every, Vec::new());
+        let (fold, every) = (self.fold, self.every);
+        let mut variance = Vec::new();
         let reached = |t: &f64| of(*t + self.lead) >= fold;
         if self.done || !(last || rows.t.last().is_some_and(reached)) {
-            return Ok(taken);
+            return Ok(());
         }
         let mut own = rows.clone();
         own.retain(|t| of(t) == fold || of(t + self.lead) == fold);
@@ -396,17 +397,16 @@ impl Watched {
                 return;
             }
             self.next = o.t + every * (1.0 - 1e-6);
-            let mut variance = vec![0.0; o.q.len()];
+            variance.resize(o.q.len(), 0.0);
             self.uncertain.variances([o.q, o.v, o.a], &mut variance);
-            taken.push(QuietSample {
+            push(QuietSample {
                 t: o.t,
                 begins: std::mem::take(&mut self.begins),
-                external: o.external.to_vec(),
-                speed: o.speed.to_vec(),
-                variance,
+                external: o.external,
+                speed: o.speed,
+                variance: &variance,
             });
-        })?;
-        Ok(taken)
+        })
     }
 
     /// Time between the samples that are kept: a multiple of the sampling step, where that is known \[s\].

@@ -24,35 +24,48 @@ pub fn hold_s(cutoff_hz: f64) -> f64 {
 }
 
 /// External torques and speeds of one sample, and whether one went before it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct QuietSample {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QuietSample<'a> {
     pub t: f64,
     pub begins: bool,
-    pub external: Vec<f64>,
-    pub speed: Vec<f64>,
+    pub external: &'a [f64],
+    pub speed: &'a [f64],
     /// Variance of the model's torque by its parameters \[N^2 or Nm^2\].
-    pub variance: Vec<f64>,
+    pub variance: &'a [f64],
 }
 
-/// External torques of a robot that nothing touched.
+/// External torques of a robot that nothing touched, the samples one behind the other.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Quiet {
-    samples: Vec<QuietSample>,
+    times: Vec<(f64, bool)>,
+    /// External torques, speeds and variances of each sample.
+    numbers: Vec<f64>,
     /// From one to the next \[s\].
-    step_s: f64,
+    pub step_s: f64,
 }
 
 impl Quiet {
-    /// Samples `step_s` seconds apart.
-    pub fn new(step_s: f64) -> Self {
-        Self {
-            samples: Vec::new(),
-            step_s,
+    pub fn push(&mut self, sample: QuietSample) {
+        self.times.push((sample.t, sample.begins));
+        for numbers in [sample.external, sample.speed, sample.variance] {
+            self.numbers.extend_from_slice(numbers);
         }
     }
 
-    pub fn push(&mut self, sample: QuietSample) {
-        self.samples.push(sample);
+    fn samples(&self) -> impl Iterator<Item = QuietSample<'_>> + Clone {
+        let width = self.numbers.len() / self.times.len().max(1);
+        let rows = self.numbers.chunks_exact(width.max(1));
+        self.times.iter().zip(rows).map(move |((t, begins), row)| {
+            let (external, rest) = row.split_at(width / 3);
+            let (speed, variance) = rest.split_at(width / 3);
+            QuietSample {
+                t: *t,
+                begins: *begins,
+                external,
+                speed,
+                variance,
+            }
+        })
     }
 
     /// Completes what was held out with deviations of external torques, and returns their excesses; none where there
@@ -63,17 +76,17 @@ impl Quiet {
         cutoff_hz: f64,
         position_cutoff_hz: f64,
     ) -> Option<Excesses> {
-        if self.samples.len() < MIN_SAMPLES {
+        if self.times.len() < MIN_SAMPLES {
             return None;
         }
         for (j, held) in held.iter_mut().enumerate() {
             let squares = |range: Option<usize>| {
-                let own = |s: &&QuietSample| {
+                let own = |s: &QuietSample| {
                     let of = |edge: &&f64| s.speed[j] > **edge;
                     let at = held.speed_edges.iter().take_while(of).count();
                     range.is_none_or(|range| range == at)
                 };
-                let chosen = self.samples.iter().filter(own);
+                let chosen = self.samples().filter(own);
                 let (sum, own, count) = chosen.fold((0.0, 0.0, 0usize), |(sum, own, n), s| {
                     let square = s.external[j] * s.external[j];
                     (sum + square, own + square - s.variance[j], n + 1)
@@ -88,20 +101,19 @@ impl Quiet {
                 _ => all,
             });
             held.external_std = each.collect();
-            let share = |s: &QuietSample| {
-                s.external[j].abs() / held.external_std(s.speed[j], s.variance[j])
-            };
-            let mut shares: Vec<f64> = self.samples.iter().map(share).collect();
+            let share =
+                |s: QuietSample| s.external[j].abs() / held.external_std(s.speed[j], s.variance[j]);
+            let mut shares: Vec<f64> = self.samples().map(share).collect();
             held.external_99 = quantile(&mut shares, 0.99).max(f64::MIN_POSITIVE);
         }
-        let greatest = |s: &QuietSample| {
+        let greatest = |s: QuietSample| {
             let each = held.iter().enumerate().map(|(j, held)| {
                 s.external[j].abs()
                     / (held.external_std(s.speed[j], s.variance[j]) * held.external_99)
             });
             each.fold(0.0, f64::max)
         };
-        let sizes: Vec<f64> = self.samples.iter().map(greatest).collect();
+        let sizes: Vec<f64> = self.samples().map(greatest).collect();
         let mut sorted = sizes.clone();
         let tried: Vec<(f64, Vec<f64>)> = LEVELS
             .iter()
@@ -120,7 +132,7 @@ impl Quiet {
         }
         let (scale, shape) = pareto(peaks.iter().map(|peak| peak - level).collect());
         Some(Excesses {
-            observed_s: self.samples.len() as f64 * self.step_s,
+            observed_s: self.times.len() as f64 * self.step_s,
             position_cutoff_hz,
             level: *level,
             clusters: peaks.len() as u64,
@@ -134,7 +146,7 @@ impl Quiet {
     fn peaks(&self, sizes: &[f64], level: f64, hold_s: f64) -> Vec<f64> {
         let mut peaks: Vec<f64> = Vec::new();
         let mut last = f64::NEG_INFINITY;
-        for (s, size) in self.samples.iter().zip(sizes) {
+        for (s, size) in self.samples().zip(sizes) {
             if s.begins {
                 last = f64::NEG_INFINITY;
             }
@@ -207,19 +219,23 @@ mod tests {
     fn the_threshold_is_crossed_as_often_as_was_stated() {
         // bursts of 10 samples whose sizes have exponential tails, one joint, 100 Hz
         let burst = |k: usize| -(1.0 - uniform(k / 10)).ln();
-        let sample = |k: usize| QuietSample {
-            t: k as f64 * 0.01,
-            begins: k == 0,
-            external: vec![if k % 100 < 10 {
-                burst(k / 10 * 10)
-            } else {
-                0.01
-            }],
-            speed: vec![0.1],
-            variance: vec![0.0],
+        let mut quiet = Quiet {
+            step_s: 0.01,
+            ..Quiet::default()
         };
-        let mut quiet = Quiet::new(0.01);
-        (0..200_000).for_each(|k| quiet.push(sample(k)));
+        for k in 0..200_000 {
+            let external = match k % 100 < 10 {
+                true => burst(k / 10 * 10),
+                false => 0.01,
+            };
+            quiet.push(QuietSample {
+                t: k as f64 * 0.01,
+                begins: k == 0,
+                external: &[external],
+                speed: &[0.1],
+                variance: &[0.0],
+            });
+        }
         let mut held = [HeldOut {
             joint: "a".to_owned(),
             ..HeldOut::default()
