@@ -195,8 +195,8 @@ impl Model {
     /// Name, joint, value, standard deviation, value in use and unit of every parameter.
     #[getter]
     fn parameters(&self) -> Vec<(String, Option<String>, f64, Option<f64>, f64, String)> {
-        let told = self.file.parameters.iter();
-        told.map(|p| {
+        let shown = self.file.parameters.iter();
+        shown.map(|p| {
             (
                 p.name.clone(),
                 p.joint.clone(),
@@ -243,7 +243,7 @@ impl Part {
     /// Name, SHA-256, samples, seconds, first and last time, and kept blocks of every log.
     #[getter]
     fn logs(&self) -> Vec<(String, String, u64, f64, [f64; 2], usize)> {
-        let told = self.logs.logs().iter().map(|log| {
+        let shown = self.logs.logs().iter().map(|log| {
             let p = &log.provenance;
             let (name, sha) = (p.name.clone(), p.sha256.clone());
             (
@@ -255,7 +255,7 @@ impl Part {
                 log.blocks(),
             )
         });
-        told.collect()
+        shown.collect()
     }
 
     /// The same as a log for `lsq` and `validate`.

@@ -322,7 +322,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .collect();
     let along = Along::read(args, &given, context)?;
     let source = args.urdf_source.as_deref().map(source).transpose()?;
-    let mut told = Vec::new();
+    let mut described = Vec::new();
     // every text is made before the first is written
     let mut texts: Vec<(&Path, &str, String)> = Vec::new();
     let mut beyond = Vec::new();
@@ -366,7 +366,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if beside {
             texts.push((side, "model file of the URDF", made.side));
         } else {
-            told.push(format!(
+            described.push(format!(
                 "{}: joints have other names there than in the model, so no model file stands beside {}",
                 source.as_ref().map_or("", |source| source.name.as_str()),
                 name(path)
@@ -448,7 +448,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut inputs = vec![given.provenance];
     inputs.extend(source.map(|source| source.provenance));
     inputs.extend(along.inputs);
-    warnings.extend(told);
+    warnings.extend(described);
     warnings.extend(along.warnings);
     let mut text = table.to_string();
     text += &beyond_table(&result.beyond);

@@ -52,7 +52,7 @@ pub fn model(path: &Path, context: &Context) -> Result<ReadFile<ModelFile>, CliE
         .notes
         .0
         .iter()
-        .for_each(|told| context.warn(told));
+        .for_each(|shown| context.warn(shown));
     Ok(model)
 }
 

@@ -121,8 +121,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         bytes: bytes.len() as u64,
         setup: checked.report.findings.clone(),
     };
-    let told = found.logs().iter().flat_map(|log| log.warnings.clone());
-    let warnings: Vec<String> = checked.warnings.iter().cloned().chain(told).collect();
+    let shown = found.logs().iter().flat_map(|log| log.warnings.clone());
+    let warnings: Vec<String> = checked.warnings.iter().cloned().chain(shown).collect();
     let inputs: Vec<Provenance> = found.logs().iter().map(|l| l.provenance.clone()).collect();
     let document = Document::new("reduce", &inputs, &warnings, &result)?;
     checked.write(context)?;

@@ -164,13 +164,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
     let names = (file_name(&args.output), file_name(&truth_path));
     let result = SimulationResult::of(&simulated, args.seed, &log, &names);
-    let told = [robot.notes.0.clone(), warnings(&simulated)].concat();
+    let shown = [robot.notes.0.clone(), warnings(&simulated)].concat();
     Ok(Outcome {
         text: context.text(
             render(&robot, &log, &names.0),
             &format!("written: {}", names.0),
         ),
-        document: Document::new("simulate", &inputs, &told, &result)?,
+        document: Document::new("simulate", &inputs, &shown, &result)?,
         missed: Vec::new(),
     })
 }

@@ -28,14 +28,14 @@ fn a_damaged_recording_is_told_as_damaged_without_a_robot_file_too() {
                     continue;
                 }
                 assert_eq!(ended.status, Some(3), "{line}, {part}: {}", ended.stderr);
-                let told = &ended.stderr;
+                let shown = &ended.stderr;
                 assert!(
-                    !told.contains("no topic holds sensor_msgs"),
-                    "{line}, {part}: {told}"
+                    !shown.contains("no topic holds sensor_msgs"),
+                    "{line}, {part}: {shown}"
                 );
                 assert!(
-                    told.contains("bad.mcap") && told.contains("hint: "),
-                    "{told}"
+                    shown.contains("bad.mcap") && shown.contains("hint: "),
+                    "{shown}"
                 );
                 damaged += 1;
             }
@@ -83,9 +83,9 @@ fn a_parameter_without_a_torque_worth_mentioning_is_negligible_and_not_counted_a
     let rated = |p: &&serde_json::Value| p["verdict"] == "identified";
     let negligible = all.iter().filter(rated).filter(uncertain).count();
     let certain = all.iter().filter(rated).count() - negligible;
-    let told = format!(
+    let shown = format!(
         "{certain} of {} parameters are identified, {negligible} negligible",
         all.len()
     );
-    assert!(page.contains(&told), "no `{told}`");
+    assert!(page.contains(&shown), "no `{shown}`");
 }

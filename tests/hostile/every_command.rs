@@ -262,7 +262,7 @@ fn complaint(line: &str, name: &str, ended: &Ended) -> Option<String> {
     }
     let fault = said
         .lines()
-        .filter(|told| !told.starts_with("warning"))
+        .filter(|shown| !shown.starts_with("warning"))
         .collect::<String>();
     // a robot or model that can be read may ask a good log for what it lacks
     // of a motion, or have no motion at all
@@ -353,9 +353,9 @@ fn every_command_ends_well_on_every_kind_of_bad_file() {
                     complaint = Some(format!("files {:?}", after.keys().collect::<Vec<_>>()));
                 }
                 if let Some(complaint) = complaint {
-                    let told = ended.stderr.lines().take(3).collect::<Vec<_>>().join(" | ");
-                    let told = format!("{line}, case {case}: {complaint}: {told}");
-                    faults.lock().unwrap().insert(told);
+                    let shown = ended.stderr.lines().take(3).collect::<Vec<_>>().join(" | ");
+                    let shown = format!("{line}, case {case}: {complaint}: {shown}");
+                    faults.lock().unwrap().insert(shown);
                 }
                 for left in fs::read_dir(bench.folder()).unwrap().map(Result::unwrap) {
                     if left.file_name().to_string_lossy().starts_with("out") {
@@ -375,7 +375,7 @@ fn every_command_ends_well_on_every_kind_of_bad_file() {
         }
     });
     let faults = faults.into_inner().unwrap();
-    let told: Vec<&String> = faults.iter().take(60).collect();
-    assert!(faults.is_empty(), "{} faults:\n{told:#?}", faults.len());
+    let shown: Vec<&String> = faults.iter().take(60).collect();
+    assert!(faults.is_empty(), "{} faults:\n{shown:#?}", faults.len());
     assert!(cases.into_inner() >= 2000);
 }

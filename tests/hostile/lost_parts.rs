@@ -88,8 +88,8 @@ fn a_model_file_of_version_0_1_is_read_with_a_warning_and_checked_by_its_robot()
     );
     let document: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
     let warnings = document["warnings"].as_array().unwrap();
-    let told = |w: &serde_json::Value| w.as_str().is_some_and(|w| w.contains("no [contents]"));
-    assert_eq!(warnings.iter().filter(|w| told(w)).count(), 1);
+    let shown = |w: &serde_json::Value| w.as_str().is_some_and(|w| w.contains("no [contents]"));
+    assert_eq!(warnings.iter().filter(|w| shown(w)).count(), 1);
     // cut where the table of the offset begins: the robot file asks for one
     let offset = old.find("name = \"offset\"").unwrap();
     let cut = old[..offset].rfind("[[parameter]]").unwrap();

@@ -68,11 +68,11 @@ fn commands_that_only_look_warn_of_a_log_that_is_given_twice() {
         assert_eq!(ended.status, Some(0), "{line}: {}", ended.stderr);
         let document: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
         let warnings = document["warnings"].as_array().unwrap();
-        let told = |w: &serde_json::Value| {
+        let shown = |w: &serde_json::Value| {
             w == "copy.csv holds rows that good.csv holds: they count twice"
         };
         assert_eq!(
-            warnings.iter().filter(|w| told(w)).count(),
+            warnings.iter().filter(|w| shown(w)).count(),
             1,
             "{line}: {warnings:?}"
         );

@@ -63,7 +63,7 @@ fn meshes_without_end_and_without_number_leave_links_without_capsules_and_memory
     // 56 MB of vertices and blanks, named again and again
     let line = format!("v 1 2 3{}\n", " ".repeat(120));
     bench.file("dense.obj", line.repeat(56 << 13));
-    let told = |files: &[&str]| {
+    let shown = |files: &[&str]| {
         let shape = |file| {
             format!("<collision><geometry><mesh filename=\"{file}\"/></geometry></collision>")
         };
@@ -78,10 +78,10 @@ fn meshes_without_end_and_without_number_leave_links_without_capsules_and_memory
         std::fs::remove_file(bench.path("arm.toml")).unwrap();
         ended.stderr
     };
-    let odd = told(&["zero.stl", "huge.obj"]);
+    let odd = shown(&["zero.stl", "huge.obj"]);
     assert!(odd.contains("there is no file zero.stl"), "{odd}");
     assert!(odd.contains("huge.obj: more than 64 MB"), "{odd}");
-    let many = told(&["dense.obj"; 1000]);
+    let many = shown(&["dense.obj"; 1000]);
     let too_much = "dense.obj: the meshes of this URDF have more than 128 MB";
     assert!(
         many.contains(too_much) && many.contains("and 996 more of the kind"),

@@ -172,9 +172,9 @@ fn a_log_that_is_too_short_and_a_robot_of_two_joints_are_refused_with_what_to_do
             .args(line)
             .output()
             .unwrap();
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(status), "{told}");
-        assert!(told.contains(word), "{told}");
+        let shown = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(status), "{shown}");
+        assert!(shown.contains(word), "{shown}");
         assert!(!here.join("m.toml").exists());
     };
     let long = [

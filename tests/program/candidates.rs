@@ -384,12 +384,12 @@ fn friction_that_is_held_stays_to_the_last_bit_and_its_deviation_reaches_what_go
     let truth = fs::read_to_string(at.join("truth.toml")).unwrap();
     let viscous = "name = \"viscous\"\njoint = \"shoulder\"\nvalue = 2.0\n";
     assert!(truth.contains(viscous));
-    let told = |std: f64| {
+    let shown = |std: f64| {
         let with = format!("{}std = {std:?}\n", viscous.replace("2.0", "2.1"));
         truth.replace(viscous, &with)
     };
-    fs::write(at.join("sure.toml"), told(1e-6)).unwrap();
-    fs::write(at.join("unsure.toml"), told(0.1)).unwrap();
+    fs::write(at.join("sure.toml"), shown(1e-6)).unwrap();
+    fs::write(at.join("unsure.toml"), shown(0.1)).unwrap();
     let diagnosed = |model: &str, to: &str, more: &[&str]| {
         let words = [
             "diagnose",
@@ -405,8 +405,8 @@ fn friction_that_is_held_stays_to_the_last_bit_and_its_deviation_reaches_what_go
         let steps = found["steps"].as_array().unwrap();
         let drag = steps.iter().find(|s| s["effect"] == "cross-drag").unwrap();
         let of = &drag["parameters"]["c"];
-        let told = [of["value"].as_f64().unwrap(), of["std"].as_f64().unwrap()];
-        (parameters(at, to), told)
+        let shown = [of["value"].as_f64().unwrap(), of["std"].as_f64().unwrap()];
+        (parameters(at, to), shown)
     };
     let (sure, [value, small]) = diagnosed("sure.toml", "held_sure.toml", &["--hold-friction"]);
     let (unsure, [same, large]) =

@@ -99,7 +99,7 @@ fn without_a_urdf_the_panda_gets_rows_to_be_filled_in() {
     assert_eq!(text.matches("[[robot.link]]").count(), 7);
     assert!(text.contains("TO BE FILLED IN"), "{text}");
     // nobody fits zeros: neither the rows as they are written, nor all of them zero
-    for (value, told) in [("nan", "is not filled in yet"), ("0.0", "7 rows of zeros")] {
+    for (value, shown) in [("nan", "is not filled in yet"), ("0.0", "7 rows of zeros")] {
         let name = format!("{value}.toml");
         std::fs::write(
             folder.path().join(&name),
@@ -112,7 +112,7 @@ fn without_a_urdf_the_panda_gets_rows_to_be_filled_in() {
             .args(["-r", &name, "-o", "model.toml"])
             .assert()
             .code(3)
-            .stderr(contains(told));
+            .stderr(contains(shown));
     }
 }
 
@@ -147,8 +147,8 @@ fn a_time_column_says_its_unit_in_brackets_or_behind_its_name() {
             .assert()
             .success();
         let text = std::fs::read_to_string(folder.path().join("mine.toml")).unwrap();
-        let told = format!("time_unit = \"{unit}\"");
-        assert!(text.contains(&told), "{time}: {text}");
+        let shown = format!("time_unit = \"{unit}\"");
+        assert!(text.contains(&shown), "{time}: {text}");
         command(folder.path())
             .args(["inspect", "log.csv", "--json", "found.json", "-q"])
             .assert()

@@ -99,9 +99,9 @@ fn the_document_has_its_schema_with_logs_and_without() {
     let folder = bench();
     let schema = schema(Kind::Compare);
     for line in ["compare a.toml b.toml", "compare a.toml b.toml log.csv"] {
-        let told = json(folder.path(), line);
-        assert_eq!(wrong(&told, &schema, &schema, ""), None, "{line}");
-        assert_eq!(told["logs"].is_null(), !line.ends_with("log.csv"));
+        let shown = json(folder.path(), line);
+        assert_eq!(wrong(&shown, &schema, &schema, ""), None, "{line}");
+        assert_eq!(shown["logs"].is_null(), !line.ends_with("log.csv"));
     }
     let mut less = json(folder.path(), "compare a.toml b.toml");
     less["parameters"][0]["a"] = Value::Null;
@@ -111,11 +111,11 @@ fn the_document_has_its_schema_with_logs_and_without() {
 #[test]
 fn a_difference_is_told_in_root_summed_variances_and_is_null_where_one_is_unknown() {
     let folder = bench();
-    let told = json(folder.path(), "compare a.toml b.toml");
-    assert_eq!(told["schema"], "cft-ident/compare/1");
-    assert_eq!(told["models"][1]["name"], "b.toml");
-    assert_eq!(told["inputs"].as_array().unwrap().len(), 2);
-    let found = told["parameters"].as_array().unwrap();
+    let shown = json(folder.path(), "compare a.toml b.toml");
+    assert_eq!(shown["schema"], "cft-ident/compare/1");
+    assert_eq!(shown["models"][1]["name"], "b.toml");
+    assert_eq!(shown["inputs"].as_array().unwrap().len(), 2);
+    let found = shown["parameters"].as_array().unwrap();
     assert_eq!(found.len(), 3);
     // 11 - 10 over sqrt(0.3^2 + 0.4^2)
     assert_eq!(found[0]["name"], "inertia");
@@ -129,11 +129,11 @@ fn a_difference_is_told_in_root_summed_variances_and_is_null_where_one_is_unknow
         (&"coulomb".into(), &0.0.into())
     );
     assert!(coulomb["difference_std"].is_null() && coulomb["deviation"].is_null());
-    assert_eq!(told["logs"], Value::Null);
-    assert!(told["only_in_a"].as_array().unwrap().is_empty());
+    assert_eq!(shown["logs"], Value::Null);
+    assert!(shown["only_in_a"].as_array().unwrap().is_empty());
     // without a log the speeds are assumed, and the document says so
-    assert_eq!(told["friction"][0]["speeds_from"], "assumed");
-    let curve = told["friction"][0]["curve"].as_array().unwrap();
+    assert_eq!(shown["friction"][0]["speeds_from"], "assumed");
+    let curve = shown["friction"][0]["curve"].as_array().unwrap();
     assert_eq!(curve.len(), 100);
     assert_eq!(
         (&curve[0]["v"], &curve[99]["a"]),
@@ -145,8 +145,8 @@ fn a_difference_is_told_in_root_summed_variances_and_is_null_where_one_is_unknow
 fn both_models_are_judged_on_the_same_rows_as_validate_judges_them() {
     let folder = bench();
     let at = folder.path();
-    let told = json(at, "compare a.toml b.toml log.csv");
-    let joint = &told["logs"]["joints"][0];
+    let shown = json(at, "compare a.toml b.toml log.csv");
+    let joint = &shown["logs"]["joints"][0];
     for (side, file) in [("a", "a.toml"), ("b", "b.toml")] {
         let alone = json(at, &format!("validate log.csv -m {file}"));
         for key in ["relative_error", "rmse", "max_abs", "r2"] {
@@ -167,7 +167,7 @@ fn both_models_are_judged_on_the_same_rows_as_validate_judges_them() {
         "{low} {difference} {high}"
     );
     assert_eq!(joint["unit"], "N");
-    assert_eq!(told["friction"][0]["speeds_from"], "logs");
+    assert_eq!(shown["friction"][0]["speeds_from"], "logs");
     tool(at, "compare a.toml b.toml log.csv")
         .assert()
         .code(0)
@@ -192,9 +192,9 @@ fn other_laws_and_effects_stand_apart() {
     let mut text = model("q1", "double-tanh", &smooth);
     text += "\n[[effect]]\nname = \"torque-offset\"\njoint = \"q1\"\n\n[effect.parameters.c]\nvalue = 0.4\nstd = 0.1\nunit = \"N\"\n";
     fs::write(at.join("smooth.toml"), text).unwrap();
-    let told = json(at, "compare a.toml smooth.toml log.csv");
+    let shown = json(at, "compare a.toml smooth.toml log.csv");
     let names = |list: &str| -> Vec<String> {
-        let list = told[list].as_array().unwrap().iter();
+        let list = shown[list].as_array().unwrap().iter();
         list.map(|p| p["name"].as_str().unwrap().to_owned())
             .collect()
     };
@@ -208,7 +208,7 @@ fn other_laws_and_effects_stand_apart() {
         "torque-offset.c",
     ];
     assert_eq!(names("only_in_b"), expected);
-    assert_eq!(told["only_in_b"][0]["reason"], "absent");
+    assert_eq!(shown["only_in_b"][0]["reason"], "absent");
 }
 
 #[test]

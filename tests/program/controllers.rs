@@ -76,9 +76,9 @@ fn tool(folder: &Path, line: &str) -> String {
 /// What the loop leaves: rms and largest error of following, way and switches of the command at rest.
 fn followed(folder: &Path, name: &str, gains: [f64; 2]) -> Vec<f64> {
     let gains = gains.map(|x| x.to_string());
-    let told = run(Command::new(folder.join(name)).args(gains));
-    let told = String::from_utf8(told).unwrap();
-    let numbers = told.split_whitespace().map(|x| x.parse().unwrap());
+    let shown = run(Command::new(folder.join(name)).args(gains));
+    let shown = String::from_utf8(shown).unwrap();
+    let numbers = shown.split_whitespace().map(|x| x.parse().unwrap());
     numbers.collect()
 }
 

@@ -128,7 +128,7 @@ fn the_few_strokes_of_a_short_log_agree_on_asymmetric_friction_and_unseen_data_g
     assert!(after < 0.8 * before, "{before} {after}");
     // what is left has its signals, the strongest first, each beyond chance
     let dependence = found["dependence"].as_array().unwrap();
-    let share = |told: &Value| told["share"].as_f64().unwrap();
+    let share = |shown: &Value| shown["share"].as_f64().unwrap();
     assert!(!dependence.is_empty());
     assert!(dependence.windows(2).all(|w| share(&w[0]) >= share(&w[1])));
 }

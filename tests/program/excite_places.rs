@@ -75,14 +75,14 @@ fn the_way_from_a_given_pose_is_held_against_every_limit() {
     fs::write(folder.path().join("nod.toml"), NOD).unwrap();
     let check = "-r arm.toml --check nod.toml --rate 50 --trajectory-message m.yaml";
     let near = format!("{check} --from -0.5,0.4");
-    let told = "NOT CHECKED: what stands around the robot, but for floor at tip.";
+    let shown = "NOT CHECKED: what stands around the robot, but for floor at tip.";
     excite(folder.path(), &near)
         .assert()
         .code(0)
-        .stdout(contains(told));
+        .stdout(contains(shown));
     let yaml = fs::read_to_string(folder.path().join("m.yaml")).unwrap();
     assert!(yaml.starts_with("# TORQUES ARE NOT FORESEEN"), "{yaml}");
-    assert!(yaml.contains(&format!("\n# {told}\n")), "{yaml}");
+    assert!(yaml.contains(&format!("\n# {shown}\n")), "{yaml}");
     assert!(yaml.contains("motion and on the straight way from the given pose."));
     // from below the floor: the pose itself is the farthest
     let lowest = 0.5 - 1.0_f64.sin() - 0.5 * 0.8_f64.sin();
@@ -185,11 +185,11 @@ fn links_of_the_cft_robot_are_placed_by_its_chain_and_a_single_joint_has_none() 
             "did you mean `speed`?",
         ),
     ];
-    for (text, told) in cases {
+    for (text, shown) in cases {
         write(text);
         excite(folder.path(), "-r r.toml -o d.toml")
             .assert()
             .code(3)
-            .stderr(contains(told));
+            .stderr(contains(shown));
     }
 }

@@ -89,9 +89,9 @@ fn compare(language: &str, case: &Case, bytes: &[u8], rows: usize) {
     let width = 4 * N + 1;
     assert_eq!(numbers.len(), width * rows);
     let found: Vec<&[f64]> = numbers.chunks_exact(width).collect();
-    let told = found.iter().filter(|row| row[4 * N] > 0.0).count();
-    assert_eq!(told, case.lines.len(), "{language}");
-    assert!(told > rows / 2);
+    let shown = found.iter().filter(|row| row[4 * N] > 0.0).count();
+    assert_eq!(shown, case.lines.len(), "{language}");
+    assert!(shown > rows / 2);
     let of_joints = &case.program.observer.as_ref().unwrap().joints;
     let mut worst = 0.0f64;
     for (t, external, std) in &case.lines {
@@ -184,10 +184,10 @@ fn compiled_observers_give_the_lines_of_watch_and_models_without_held_out_data_g
         }
     }
     file.held_out.clear();
-    let told = watch_recipe(&machine, ("old.toml", &file, &plain), STEP, PER_HOUR);
-    let told = told.unwrap_err().to_string();
+    let shown = watch_recipe(&machine, ("old.toml", &file, &plain), STEP, PER_HOUR);
+    let shown = shown.unwrap_err().to_string();
     assert!(
-        told.contains("old.toml") && told.contains("fit it again"),
-        "{told}"
+        shown.contains("old.toml") && shown.contains("fit it again"),
+        "{shown}"
     );
 }

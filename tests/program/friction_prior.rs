@@ -227,11 +227,11 @@ fn speeds_beyond_those_of_the_one_joint_logs_are_told_with_the_torque_that_is_op
         ..FrictionPrior::default()
     };
     model.friction_prior = vec![speeds([0.002, 0.27])];
-    let told = |found: &IdentifiedDynamics| {
+    let shown = |found: &IdentifiedDynamics| {
         let mut all = found.warnings.iter();
         all.any(|w| w.contains("its one-joint logs at up to 0.27"))
     };
-    assert!(told(&fitted(&model, 15, EstimatorKind::Wls)));
+    assert!(shown(&fitted(&model, 15, EstimatorKind::Wls)));
     model.friction_prior = vec![speeds([0.002, 1.5])];
-    assert!(!told(&fitted(&model, 15, EstimatorKind::Wls)));
+    assert!(!shown(&fitted(&model, 15, EstimatorKind::Wls)));
 }

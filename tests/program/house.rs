@@ -120,11 +120,15 @@ fn imports_run_one_way() {
 fn no_imports_go_in_a_circle() {
     let sources = sources();
     let circles = Imports::read(&sources, shipped).circles();
-    let told: Vec<String> = circles
+    let shown: Vec<String> = circles
         .iter()
         .map(|(circle, ties)| format!("{circle}\n  {}", ties.join("\n  ")))
         .collect();
-    assert!(told.is_empty(), "imports in a circle:\n{}", told.join("\n"));
+    assert!(
+        shown.is_empty(),
+        "imports in a circle:\n{}",
+        shown.join("\n")
+    );
 }
 
 #[test]

@@ -343,11 +343,12 @@ fn a_position_that_equals_the_command_or_has_no_noise_is_told() {
     let smooth = (0..20_000).map(|k| (f64::from(k) * 1e-3).sin()).collect();
     *log.column("q_q2") = smooth;
     let found = log.inspected(CFT);
-    let told = found["faults"].as_array().unwrap();
+    let shown = found["faults"].as_array().unwrap();
     assert!(
-        told.iter()
+        shown
+            .iter()
             .any(|f| f["kind"] == "command-as-measurement" && f["channel"] == "q_q2"),
-        "{told:?}"
+        "{shown:?}"
     );
 }
 
@@ -435,22 +436,22 @@ fn torques_that_are_late_are_told_and_with_a_model_precisely() {
         "{found:?}"
     );
     let model = identified();
-    let told = |rows: usize| -> Option<f64> {
+    let shown = |rows: usize| -> Option<f64> {
         let found = late(rows).inspected_by(&model.path().join("model.toml"));
         let all = found["faults"].as_array().unwrap();
         let delay = all.iter().find(|fault| fault["kind"] == "delay")?;
         let words = delay["effect"].as_str().unwrap().split(' ');
         words.filter_map(|word| word.parse().ok()).next()
     };
-    assert_eq!(told(0), None);
-    let ms = told(5).unwrap();
+    assert_eq!(shown(0), None);
+    let ms = shown(5).unwrap();
     assert!((ms - 5.0).abs() < 0.5, "{ms}");
 }
 
 #[test]
 fn joints_that_are_turned_or_exchanged_are_told_by_a_model() {
     let model = identified();
-    let told = |alter: &dyn Fn(&mut Log)| -> Option<String> {
+    let shown = |alter: &dyn Fn(&mut Log)| -> Option<String> {
         let mut log = all_move();
         alter(&mut log);
         let found = log.inspected_by(&model.path().join("model.toml"));
@@ -466,21 +467,21 @@ fn joints_that_are_turned_or_exchanged_are_told_by_a_model() {
         let second = std::mem::replace(log.column(b), first);
         *log.column(a) = second;
     };
-    assert_eq!(told(&|_| {}), None);
+    assert_eq!(shown(&|_| {}), None);
     assert_eq!(
-        told(&|log| turn(log, "tau_q2")).as_deref(),
+        shown(&|log| turn(log, "tau_q2")).as_deref(),
         Some("torques of q2 have the other sign")
     );
     assert_eq!(
-        told(&|log| turn(log, "q_q1")).as_deref(),
+        shown(&|log| turn(log, "q_q1")).as_deref(),
         Some("positions of q1 have the other sign")
     );
     assert_eq!(
-        told(&|log| swap(log, "tau_q4", "tau_q5")).as_deref(),
+        shown(&|log| swap(log, "tau_q4", "tau_q5")).as_deref(),
         Some("torques of q4 and q5 are exchanged")
     );
     assert_eq!(
-        told(&|log| {
+        shown(&|log| {
             swap(log, "q_q2", "q_q5");
             swap(log, "tau_q2", "tau_q5");
         })

@@ -99,8 +99,8 @@ fn positions_without_noise_are_told_as_what_may_be_a_command() {
     let found = inspect(&path, None);
     assert_faults(&found, &[]);
     let all = found["faults"].as_array().unwrap();
-    let told = all
+    let shown = all
         .iter()
         .filter(|fault| fault["kind"] == "command-as-measurement");
-    assert_eq!(told.count(), 6);
+    assert_eq!(shown.count(), 6);
 }

@@ -257,14 +257,14 @@ fn recordings_of_others_become_tables() {
     let positions = shuffled.bits("q_q1");
     for name in &a.names[1..] {
         let rows = shuffled.bits(name).into_iter().zip(&positions);
-        let told: Vec<u64> = rows
+        let shown: Vec<u64> = rows
             .filter(|(_, position)| **position != none)
             .map(|(bits, _)| bits)
             .collect();
         let own = a.bits(name);
-        assert_eq!(told.len(), own.len(), "{name}");
-        let equal = told.iter().zip(&own).filter(|(x, own)| x == own).count();
-        let missing = told.iter().filter(|bits| **bits == none).count();
+        assert_eq!(shown.len(), own.len(), "{name}");
+        let equal = shown.iter().zip(&own).filter(|(x, own)| x == own).count();
+        let missing = shown.iter().filter(|bits| **bits == none).count();
         assert_eq!(equal + missing, own.len(), "{name}");
         assert!(missing == 0 || name.starts_with("dq_"), "{name}");
     }

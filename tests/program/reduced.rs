@@ -206,9 +206,9 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
     let parts = reduced(&machine, &logs, Some(&model)).as_logs();
     let of_parts = fitted(&machine, &parts, &settings(false));
     same_fit(&of_parts, &whole);
-    let told = |w: &&String| w.contains("--hold-friction");
+    let shown = |w: &&String| w.contains("--hold-friction");
     assert!(
-        of_parts.warnings.iter().any(|w| told(&w)),
+        of_parts.warnings.iter().any(|w| shown(&w)),
         "{:?}",
         of_parts.warnings
     );
@@ -324,8 +324,8 @@ fn files_that_are_damaged_or_belong_elsewhere_are_refused_with_the_reason() {
         let words_of = line.replace("ROBOT", robot).replace("HALF", &half);
         let line: Vec<&str> = words_of.split(' ').collect();
         let message = tool(at, &line, status);
-        let told = message.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(told.contains(words), "{line:?}: {told}");
+        let shown = message.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(shown.contains(words), "{line:?}: {shown}");
         assert_eq!(at.join("m.toml").exists(), status == 0, "{line:?}");
     }
     let message = tool(

@@ -85,8 +85,8 @@ fn rests_do_not_move_the_friction_and_are_told_apart_in_the_errors() {
             u.fitted_std
         );
     }
-    let told = |text: &String| text.contains("at rest in a part of the rows: slide");
-    assert!(found.warnings.iter().any(told), "{:?}", found.warnings);
+    let shown = |text: &String| text.contains("at rest in a part of the rows: slide");
+    assert!(found.warnings.iter().any(shown), "{:?}", found.warnings);
     let fitted = &found.joints[0];
     let (moving, rest) = (fitted.relative_error_moving, fitted.relative_error_rest);
     assert!(moving.unwrap() < 0.05, "{fitted:?}");

@@ -218,8 +218,8 @@ fn a_position_that_steps_is_named_with_its_joint_and_its_time_and_the_log_is_par
                 assert_eq!(step.channel, Some(format!("q_{joint}")), "{what}");
                 let near = log.t[row - 2]..log.t[row + 3];
                 assert!(near.contains(&step.log_to_s), "{what}: {step:?}");
-                let told = step.size.unwrap();
-                assert!((told / height - 1.0).abs() < 0.2, "{what}: {told}");
+                let shown = step.size.unwrap();
+                assert!((shown / height - 1.0).abs() < 0.2, "{what}: {shown}");
                 let other = |f: &&LogFault| f.kind != FaultKind::PositionStep;
                 let others = found.faults.iter().filter(other).count();
                 assert_eq!(others, plain.faults.len(), "{what}: {:?}", found.faults);
@@ -272,10 +272,10 @@ fn an_encoder_that_begins_anew_is_named_with_its_range_and_followed_through_its_
             }
             let found = wrapped.judged(Depth::Gate);
             let what = format!("{} q_{joint}", log.name);
-            let told = of_kind(&found, FaultKind::WrappedEncoder);
-            assert_eq!(told.len(), 1, "{what}: {:?}", found.faults);
-            assert_eq!(told[0].channel, Some(format!("q_{joint}")), "{what}");
-            assert!((told[0].size.unwrap() / turn - 1.0).abs() < 1e-9, "{what}");
+            let shown = of_kind(&found, FaultKind::WrappedEncoder);
+            assert_eq!(shown.len(), 1, "{what}: {:?}", found.faults);
+            assert_eq!(shown[0].channel, Some(format!("q_{joint}")), "{what}");
+            assert!((shown[0].size.unwrap() / turn - 1.0).abs() < 1e-9, "{what}");
             let (read, _) = wrapped.read();
             let (plain, _) = log.read();
             assert_eq!(read.t.len(), plain.t.len(), "{what}");
@@ -335,8 +335,8 @@ fn of_samples_that_are_held_only_fresh_rows_are_used() {
             }
             let what = format!("{} held for {hold}", log.name);
             let found = held.judged(Depth::Whole);
-            let told = of_kind(&found, FaultKind::SampleAndHold);
-            assert_eq!(told.len(), 1, "{what}: {:?}", found.faults);
+            let shown = of_kind(&found, FaultKind::SampleAndHold);
+            assert_eq!(shown.len(), 1, "{what}: {:?}", found.faults);
             let gate = held.gate(&[]);
             assert_eq!(gate.mending().held, Some(hold), "{what}");
             let (read, _) = held.read();
@@ -379,15 +379,15 @@ fn stretches_in_which_everything_is_frozen_are_stalls_and_left_out() {
             expected.push((log.t[k], log.t[k + rows - 1]));
         }
         let found = frozen.judged(Depth::Gate);
-        let told: Vec<(f64, f64)> = of_kind(&found, FaultKind::Stall)
+        let shown: Vec<(f64, f64)> = of_kind(&found, FaultKind::Stall)
             .iter()
             .map(|f| (f.log_from_s, f.log_to_s))
             .collect();
-        assert_eq!(told.len(), 3, "{}: {:?}", log.name, found.faults);
-        for ((from, to), (a, b)) in told.iter().zip(&expected) {
+        assert_eq!(shown.len(), 3, "{}: {:?}", log.name, found.faults);
+        for ((from, to), (a, b)) in shown.iter().zip(&expected) {
             assert!(
                 (from - a).abs() < 0.05 && (to - b).abs() < 0.05,
-                "{}: {told:?}",
+                "{}: {shown:?}",
                 log.name
             );
         }
@@ -472,8 +472,8 @@ fn nanoseconds_since_1970_in_t_are_no_seconds() {
         for (a, b) in values(&plain).iter().zip(values(&epoch)) {
             assert!((a / b - 1.0).abs() < 1e-3, "{unit}: {a} {b}");
         }
-        let told = epoch["warnings"].to_string();
-        assert!(told.contains(&format!("are taken as {unit}")), "{told}");
+        let shown = epoch["warnings"].to_string();
+        assert!(shown.contains(&format!("are taken as {unit}")), "{shown}");
     }
 }
 
@@ -501,15 +501,15 @@ fn unseen(
     );
     let joints = found["joints"].as_array().unwrap().iter();
     let errors = joints.map(|j| 100.0 * j[kind].as_f64().unwrap());
-    let told = [fit["warnings"].to_string(), found["warnings"].to_string()].concat();
-    Some((errors.collect(), told))
+    let shown = [fit["warnings"].to_string(), found["warnings"].to_string()].concat();
+    Some((errors.collect(), shown))
 }
 
 #[test]
 fn smooth_turning_points_of_a_heavy_arm_are_no_spikes() {
     let folder = tempfile::tempdir().unwrap();
     let fitted = ["kr300/A.csv", "kr300/B.csv"].map(str::to_owned);
-    let Some((errors, told)) = unseen(
+    let Some((errors, shown)) = unseen(
         folder.path(),
         "kr300.toml",
         &fitted,
@@ -521,8 +521,8 @@ fn smooth_turning_points_of_a_heavy_arm_are_no_spikes() {
         assert!(*error <= most, "{errors:?}");
     }
     assert!(
-        !told.contains("act_pos") && !told.contains("rows are left out"),
-        "{told}"
+        !shown.contains("act_pos") && !shown.contains("rows are left out"),
+        "{shown}"
     );
 }
 
@@ -533,7 +533,7 @@ fn the_free_swings_of_a_pendulum_are_data_and_a_dead_channel_is_not() {
         "055032", "055640", "055903", "060143", "060245", "060329", "060440", "061705",
     ];
     let fitted = logs.map(|log| format!("pendulum/{log}.csv"));
-    let Some((errors, told)) = unseen(
+    let Some((errors, shown)) = unseen(
         folder.path(),
         "pendulum.toml",
         &fitted,
@@ -544,9 +544,9 @@ fn the_free_swings_of_a_pendulum_are_data_and_a_dead_channel_is_not() {
     // samples at the turning points are not fitted; a fit of all samples has 11.7 and 20.9 % of these
     assert!(errors[0] < 11.5 && errors[1] < 19.5, "{errors:?}");
     assert_eq!(
-        told.matches("torques of 0 that are data").count(),
+        shown.matches("torques of 0 that are data").count(),
         4,
-        "{told}"
+        "{shown}"
     );
     let Some(path) = shared("pendulum/061157.csv") else {
         return;
@@ -569,9 +569,9 @@ fn the_free_swings_of_a_pendulum_are_data_and_a_dead_channel_is_not() {
         "-o",
         "m.toml",
     ];
-    let told = run(folder.path(), &words)["warnings"].to_string();
+    let shown = run(folder.path(), &words)["warnings"].to_string();
     assert!(
-        told.contains("torques of 0 in motion that does not go with them: left out"),
-        "{told}"
+        shown.contains("torques of 0 in motion that does not go with them: left out"),
+        "{shown}"
     );
 }

@@ -186,8 +186,8 @@ fn a_payload_on_a_serial_robot_is_found_with_mass_and_centre() {
     let steps = written(&found);
     assert_eq!(steps.len(), 1, "{steps:?}");
     assert_eq!(steps[0]["effect"], "payload");
-    let told = &steps[0]["parameters"];
-    let of = |key: &str| (number(&told[key], "value"), number(&told[key], "std"));
+    let shown = &steps[0]["parameters"];
+    let of = |key: &str| (number(&shown[key], "value"), number(&shown[key], "std"));
     let (found_mass, std) = of("mass");
     assert!(
         (found_mass - mass).abs() < 3.0 * std && std < 0.01,

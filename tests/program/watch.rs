@@ -160,23 +160,23 @@ fn a_mass_and_a_change_of_friction_are_told_from_each_other() {
     std::fs::write(path.join("mass.csv"), csv(&rows(4, 20, &mass))).unwrap();
     std::fs::write(path.join("friction.csv"), csv(&rows(5, 20, &friction))).unwrap();
     let found = document(path, &["watch", "mass.csv", "-m", "model.toml"]);
-    let told = &found["explanation"];
-    assert_eq!(told["kind"], "payload", "{told}");
-    let change = &told["changes"][0];
+    let shown = &found["explanation"];
+    assert_eq!(shown["kind"], "payload", "{shown}");
+    let change = &shown["changes"][0];
     let [value, std] = ["value", "std"].map(|key| change[key].as_f64().unwrap());
     assert!(
         (value - 0.3).abs() < 0.06 && std > 0.0 && std < 0.05,
         "{change}"
     );
     let found = document(path, &["watch", "friction.csv", "-m", "model.toml"]);
-    let told = &found["explanation"];
+    let shown = &found["explanation"];
     assert_eq!(
-        (&told["kind"], &told["joint"]),
+        (&shown["kind"], &shown["joint"]),
         (&"friction".into(), &"q1".into()),
-        "{told}"
+        "{shown}"
     );
-    let coulomb = told["changes"][0]["value"].as_f64().unwrap();
-    assert!((coulomb - 1.5).abs() < 0.4, "{told}");
+    let coulomb = shown["changes"][0]["value"].as_f64().unwrap();
+    assert!((coulomb - 1.5).abs() < 0.4, "{shown}");
 }
 
 #[test]
@@ -289,12 +289,12 @@ fn the_band_of_validate_and_torque_holds_what_it_says() {
         path,
         &["torque", "fast.csv", "-m", "model.toml", "-o", "fast.mcap"],
     );
-    let told = found["warnings"].to_string();
+    let shown = found["warnings"].to_string();
     assert!(
-        told.contains("q1 leaves what the model was fitted on"),
-        "{told}"
+        shown.contains("q1 leaves what the model was fitted on"),
+        "{shown}"
     );
-    assert!(told.contains("speeds up to"), "{told}");
+    assert!(shown.contains("speeds up to"), "{shown}");
 }
 
 #[test]

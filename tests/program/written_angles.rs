@@ -209,7 +209,7 @@ fn a_file_of_another_kind_or_a_wrong_name_says_what_to_do() {
     )
     .unwrap();
     std::fs::write(folder.path().join("gantry.toml"), "[robot]\n").unwrap();
-    let told = |arguments: &[&str]| {
+    let shown = |arguments: &[&str]| {
         let mut command = assert_cmd::Command::cargo_bin("cft-ident").unwrap();
         command
             .current_dir(folder.path())
@@ -217,13 +217,13 @@ fn a_file_of_another_kind_or_a_wrong_name_says_what_to_do() {
             .assert()
             .code(3)
     };
-    told(&["inspect", "run_1.csv", "-r", "gantry.urdf"])
+    shown(&["inspect", "run_1.csv", "-r", "gantry.urdf"])
         .stderr(contains("is a URDF").and(contains("cft-ident new NAME --urdf gantry.urdf")));
-    told(&["inspect", "run_1.csv", "-r", "run_1.csv"])
+    shown(&["inspect", "run_1.csv", "-r", "run_1.csv"])
         .stderr(contains("is a log").and(contains("cft-ident new NAME --log run_1.csv")));
-    told(&["inspect", "run_1.csv", "-r", "gantri.toml"])
+    shown(&["inspect", "run_1.csv", "-r", "gantri.toml"])
         .stderr(contains("did you mean `gantry.toml`?"));
-    told(&["inspect", "run1.csv"]).stderr(contains("did you mean `run_1.csv`?"));
-    told(&["inspect", "b.csv"]).stderr(contains("in that folder are run_1.csv"));
-    told(&["new", "mine", "--urdf", "gantr.urdf"]).stderr(contains("did you mean `gantry.urdf`?"));
+    shown(&["inspect", "run1.csv"]).stderr(contains("did you mean `run_1.csv`?"));
+    shown(&["inspect", "b.csv"]).stderr(contains("in that folder are run_1.csv"));
+    shown(&["new", "mine", "--urdf", "gantr.urdf"]).stderr(contains("did you mean `gantry.urdf`?"));
 }

@@ -188,7 +188,7 @@ fn judged(reading: &Value, load: Option<&Load>, gains: &[f64]) -> Value {
     }
     let of = reading["gains"].as_array().map_or(&[][..], Vec::as_slice);
     let of = of.iter().zip(gains);
-    numbers.extend(of.map(|(told, gain)| one("gain", gain - 1.0, &told["error"])));
+    numbers.extend(of.map(|(described, gain)| one("gain", gain - 1.0, &described["error"])));
     let joints = reading["joints"].as_array().map_or(&[][..], Vec::as_slice);
     let worse = joints.iter().filter(|joint| joint["worse"] == true).count();
     json!({ "gains_free": reading["gains_free"], "numbers": numbers, "worse": worse })

@@ -301,7 +301,7 @@ pub fn table(rows: &Rows) -> String {
                 }
                 let t = tally(&member, &own);
                 let median = t.ratios.get(t.ratios.len() / 2).copied();
-                let told = t.own_share.is_none_or(|s| s >= LIMITS.own_share);
+                let shown = t.own_share.is_none_or(|s| s >= LIMITS.own_share);
                 text += &format!(
                     "| {cell} | {tool} | {} | {} | {} | {} | {} | {} | {} |\n",
                     t.campaigns,
@@ -310,7 +310,7 @@ pub fn table(rows: &Rows) -> String {
                     percent(t.named, t.done),
                     percent(t.false_free, t.done),
                     median.map_or("-".to_owned(), |m| format!("{m:.2}")),
-                    if !told {
+                    if !shown {
                         "cannot tell"
                     } else if size < 6.0 {
                         "reported"

@@ -490,14 +490,14 @@ pub fn table(rows: &Rows) -> String {
                     own.len()
                 );
             } else {
-                let [named, told, misnamed, silent] =
+                let [named, shown, misnamed, silent] =
                     ["named", "told", "misnamed", "silent"].map(|a| count(&|r| r["answer"] == a));
                 wrong[0] += named;
-                wrong[1] += told;
+                wrong[1] += shown;
                 wrong[2] += misnamed;
                 wrong[3] += own.len();
                 text += &format!(
-                    "| {} | {tool} | {} | {refused} | | {named} | {told} | {misnamed} | {silent} |\n",
+                    "| {} | {tool} | {} | {refused} | | {named} | {shown} | {misnamed} | {silent} |\n",
                     cell.name,
                     own.len()
                 );

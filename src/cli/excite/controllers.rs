@@ -79,8 +79,8 @@ fn sampled(
     }
     let log = &bench.file.log.joint;
     let named = machine.model.robot.joint_names().iter().map(|joint| {
-        let told = log.get(joint).and_then(|channels| channels.name.clone());
-        told.unwrap_or_else(|| joint.clone())
+        let shown = log.get(joint).and_then(|channels| channels.name.clone());
+        shown.unwrap_or_else(|| joint.clone())
     });
     Ok(JointTrajectory {
         names: named.collect(),

@@ -114,12 +114,12 @@ impl Added {
     /// has none, or an infinite one, is left out.
     pub fn sizes(&self, covariance: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let size = |k: &KeyValue| self.law.entry.key(k.key).is_some_and(|key| key.size);
-        let told = |k: &KeyValue| {
+        let shown = |k: &KeyValue| {
             let variance = spread(&k.slopes, &k.slopes, covariance);
             variance > 0.0 && variance.is_finite()
         };
         let mut keys = self.law.keys(&self.shape, &self.linear);
-        keys.retain(|k| size(k) && told(k));
+        keys.retain(|k| size(k) && shown(k));
         let of = |a: &KeyValue| {
             let row = keys
                 .iter()

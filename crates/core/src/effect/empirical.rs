@@ -326,10 +326,10 @@ mod tests {
         for x in [0.0, 0.7, 2.3, 4.9, 5.0] {
             let cube = |(k, c): (usize, &f64)| c * f64::max(x - k as f64, 0.0).powi(3);
             let sum: f64 = terms[2..].iter().enumerate().map(cube).sum();
-            let told = terms[0] + terms[1] * x + sum;
+            let shown = terms[0] + terms[1] * x + sum;
             let at = spline.at(x / 5.0);
             let wanted: f64 = at.iter().zip(&values).map(|(b, m)| b * m).sum();
-            assert!((told - wanted).abs() < 1e-12, "{x}: {told} {wanted}");
+            assert!((shown - wanted).abs() < 1e-12, "{x}: {shown} {wanted}");
         }
     }
 

@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn what_is_no_formula_of_this_robot_is_told() {
-        let told = |formula: &str| {
+        let shown = |formula: &str| {
             law(&definition(formula), &robot())
                 .err()
                 .map(|e| e.to_string())
@@ -233,7 +233,7 @@ mod tests {
             ("", "no formula"),
             ("play * w", "`play` needs its scale"),
         ] {
-            let error = told(formula).unwrap();
+            let error = shown(formula).unwrap();
             assert!(error.contains("own") && error.contains(says), "{error}");
         }
         let named = Definition {

@@ -308,9 +308,9 @@ mod tests {
             ("payload", &[("mass", -0.1)], false),
         ];
         for (name, keys, holds) in cases {
-            let told = said(name, keys, &JointDrive::default());
-            assert_eq!(told.is_none(), *holds, "{name} {keys:?}: {told:?}");
-            assert!(told.is_none_or(|why| why.len() > 20), "{name}");
+            let shown = said(name, keys, &JointDrive::default());
+            assert_eq!(shown.is_none(), *holds, "{name} {keys:?}: {shown:?}");
+            assert!(shown.is_none_or(|why| why.len() > 20), "{name}");
         }
     }
 

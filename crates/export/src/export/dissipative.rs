@@ -120,7 +120,7 @@ pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Op
 /// What a file of links cannot say truly, as sentences: friction and drive inertias below zero.
 pub fn below_zero(file: &ModelFile, model: &Model) -> Vec<String> {
     let names = model.robot.joint_names();
-    let told = |name: &str, joint: Option<&str>, value: f64| {
+    let shown = |name: &str, joint: Option<&str>, value: f64| {
         let parameter = file.find(name, joint);
         let std = parameter.and_then(|p| p.std).unwrap_or(f64::NAN);
         let (value, std) = number::value_and_std(value, std);
@@ -136,7 +136,7 @@ pub fn below_zero(file: &ModelFile, model: &Model) -> Vec<String> {
             if value < 0.0 {
                 out.push(format!(
                     "the {name} friction of {joint} is {}, which would drive it: the file has 0",
-                    told(name, Some(joint), value)
+                    shown(name, Some(joint), value)
                 ));
             }
         }
@@ -147,7 +147,7 @@ pub fn below_zero(file: &ModelFile, model: &Model) -> Vec<String> {
         if let (Some(p), Some(joint)) = (found, names.get(j)) {
             out.push(format!(
                 "the drive inertia of {joint} is {}, and no drive has one below zero: fit without --unconstrained",
-                told(&name, None, p.value)
+                shown(&name, None, p.value)
             ));
         }
     }

@@ -57,7 +57,7 @@ pub fn left_out(
         }
     }
     let names = refined.model.robot.joint_names();
-    let told = parts.into_iter().zip(own).map(|(part, own)| {
+    let shown = parts.into_iter().zip(own).map(|(part, own)| {
         let share = |j: usize| 100.0 * (own[j] / whole[j]).sqrt();
         let known = (0..n).filter(|j| whole[*j] > 0.0);
         let worst = known.max_by(|a, b| share(*a).total_cmp(&share(*b)));
@@ -68,7 +68,7 @@ pub fn left_out(
             percent_of_torque: worst.map(|j| (1e4 * share(j)).round() / 1e4),
         }
     });
-    told.collect()
+    shown.collect()
 }
 
 fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<'a>> {

@@ -111,7 +111,7 @@ fn joint(out: &mut String, link: &ArmLink, parent: &str) {
         JointKind::Revolute => "revolute",
         JointKind::Prismatic => "prismatic",
     };
-    let told = |x: Option<f64>| x.map_or(NONE.to_owned(), |x| format!("{x:?}"));
+    let shown = |x: Option<f64>| x.map_or(NONE.to_owned(), |x| format!("{x:?}"));
     let [low, high] = match limits.position {
         Some(ends) => ends.map(|x| format!("{x:?}")),
         None => [format!("-{NONE}"), NONE.to_owned()],
@@ -123,8 +123,8 @@ fn joint(out: &mut String, link: &ArmLink, parent: &str) {
          <limit><lower>{low}</lower><upper>{high}</upper><effort>{}</effort><velocity>{}</velocity></limit>\n          \
          <dynamics><damping>{:?}</damping><friction>{:?}</friction></dynamics>\n{mimic}        </axis>\n      </joint>\n",
         words(&link.axis),
-        told(limits.torque),
-        told(limits.speed),
+        shown(limits.torque),
+        shown(limits.speed),
         loss[0],
         loss[1]
     );

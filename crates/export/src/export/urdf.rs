@@ -194,9 +194,9 @@ fn joint(
 fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<(), ExportError> {
     let range = i * STANDARD..(i + 1) * STANDARD;
     let values: [f64; STANDARD] = std::array::from_fn(|k| standard.values[range.start + k]);
-    let told = &standard.identifiability[range];
+    let shown = &standard.identifiability[range];
     let of = |what: Identifiability| -> String {
-        let names = STANDARD_NAMES.iter().zip(told);
+        let names = STANDARD_NAMES.iter().zip(shown);
         let list: Vec<&str> = names
             .filter(|(_, t)| **t == what)
             .map(|(n, _)| *n)

@@ -236,10 +236,10 @@ mod tests {
         let mut read = |text: &str, place| changes.angle(text.parse().unwrap(), text, place);
         read("1.5708", "rpy of joint a");
         read("-2.356", "rpy of joint b");
-        let told = changes.in_words("r.urdf").unwrap();
+        let shown = changes.in_words("r.urdf").unwrap();
         assert!(
-            told.contains("rpy of joint a 1.5708 as pi/2 and 1 more;"),
-            "{told}"
+            shown.contains("rpy of joint a 1.5708 as pi/2 and 1 more;"),
+            "{shown}"
         );
         assert_eq!(in_words(-2.356), "-3 pi/4");
         assert_eq!(in_words(PI), "pi");

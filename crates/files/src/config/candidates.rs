@@ -197,8 +197,11 @@ mod tests {
             ("joints", "joint", "joint"),
         ] {
             let error = parse("own.toml", &GOOD.replace(from, to)).unwrap_err();
-            let told = error.to_string();
-            assert!(told.contains("own.toml") && told.contains(says), "{told}");
+            let shown = error.to_string();
+            assert!(
+                shown.contains("own.toml") && shown.contains(says),
+                "{shown}"
+            );
         }
     }
 }

@@ -92,11 +92,11 @@ struct Clearest {
 /// larger than the variances say. Of several parameters the likelihood ratio is tested, with the correlation of their
 /// innovations (Basseville and Nikiforov 1993, section 7.2).
 pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
-    let (count, told) = (about.members.len(), about.determined());
+    let (count, shown) = (about.members.len(), about.determined());
     let mut found: Vec<Found> = Vec::new();
     let mut sizes = likeliest(about, &[], sizes).0;
-    while found.len() < MAX_CHANGES && told > count * (OTHERS + found.len() + 2) {
-        let freedom = (told - count * (OTHERS + found.len() + 1)) as f64;
+    while found.len() < MAX_CHANGES && shown > count * (OTHERS + found.len() + 2) {
+        let freedom = (shown - count * (OTHERS + found.len() + 1)) as f64;
         let Ok(law) = FisherSnedecor::new(count as f64, freedom) else {
             break;
         };
@@ -124,18 +124,22 @@ pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
 /// there are too few logs to report any. That size itself is reported in one course of two.
 pub(super) fn least_seen(about: About, sizes: &[Sizes], level: f64) -> Vec<Option<f64>> {
     let count = about.members.len();
-    let told: Vec<usize> = (0..about.times.len())
+    let shown: Vec<usize> = (0..about.times.len())
         .filter(|k| about.members.iter().any(|m| m.estimate[*k].is_finite()))
         .collect();
     let freedom = about.determined().saturating_sub(count * (OTHERS + 1));
     let law = FisherSnedecor::new(count as f64, freedom.max(1) as f64);
-    let (true, Ok(law)) = (told.len() >= BEFORE + AFTER && freedom > 0, law) else {
+    let (true, Ok(law)) = (shown.len() >= BEFORE + AFTER && freedom > 0, law) else {
         return vec![None; count];
     };
-    let tried = 2 * (told.len() - BEFORE - AFTER + 1);
+    let tried = 2 * (shown.len() - BEFORE - AFTER + 1);
     let ratio = law.inverse_cdf(1.0 - level / tried as f64);
     let white = White::new(about, sizes, &rests(about, &[]));
-    let columns = white.columns(&shape(ChangeKind::Step, told[told.len() / 2], about.times));
+    let columns = white.columns(&shape(
+        ChangeKind::Step,
+        shown[shown.len() / 2],
+        about.times,
+    ));
     let steps = fitted(&columns, &white.signals(), 1.0);
     let least = |[_, std]: &[f64; 2]| (ratio * count as f64).sqrt() * std;
     let finite = |size: f64| size.is_finite().then_some(size);
@@ -208,14 +212,14 @@ fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Clearest> 
     let freedom = freedom.max(1) as f64;
     let residual = without(&white.signals(), &known);
     let square = dot(&residual, &residual);
-    let told: Vec<usize> = (0..about.times.len())
+    let shown: Vec<usize> = (0..about.times.len())
         .filter(|k| about.members.iter().any(|m| m.estimate[*k].is_finite()))
         .collect();
     let mut best: Option<Clearest> = None;
     let mut tried = 0_u32;
     for kind in [ChangeKind::Step, ChangeKind::Ramp] {
-        let places = BEFORE..(told.len() + 1).saturating_sub(AFTER).max(BEFORE);
-        for at in told.get(places).into_iter().flatten().copied() {
+        let places = BEFORE..(shown.len() + 1).saturating_sub(AFTER).max(BEFORE);
+        for at in shown.get(places).into_iter().flatten().copied() {
             tried += 1;
             let shape = shape(kind, at, about.times);
             let own = white.columns(&shape);

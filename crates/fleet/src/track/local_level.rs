@@ -184,9 +184,9 @@ mod tests {
         let white = whitener.apply(&SIGNAL);
         let found: f64 = white.iter().map(|x| x * x).sum();
         assert!((found / square - 1.0).abs() < 1e-12, "{found} {square}");
-        let told: Vec<usize> = (0..5).filter(|k| whitener.tells(*k)).collect();
-        assert_eq!(told, [1, 3, 4]);
-        assert!((0..5).all(|k| told.contains(&k) || white[k] == 0.0));
+        let shown: Vec<usize> = (0..5).filter(|k| whitener.tells(*k)).collect();
+        assert_eq!(shown, [1, 3, 4]);
+        assert!((0..5).all(|k| shown.contains(&k) || white[k] == 0.0));
     }
 
     #[test]

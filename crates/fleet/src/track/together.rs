@@ -77,9 +77,9 @@ impl<'a> White<'a> {
         masks.sort_unstable();
         masks.dedup();
         let factor = |mask: u64| {
-            let told: Vec<usize> = members_of(mask, whiteners.len()).collect();
-            let own = correlation.select_rows(&told).select_columns(&told);
-            let size = told.len();
+            let shown: Vec<usize> = members_of(mask, whiteners.len()).collect();
+            let own = correlation.select_rows(&shown).select_columns(&shown);
+            let size = shown.len();
             let factor = own.cholesky().map(|c| c.l());
             (mask, factor.unwrap_or(DMatrix::identity(size, size)))
         };

@@ -129,11 +129,11 @@ fn guess(name: &str) -> (ChannelRole, Option<String>) {
     if words::is_command(&spoken) {
         return (ChannelRole::Command, None);
     }
-    let told = words::role(&spoken);
+    let shown = words::role(&spoken);
     let of_words = || {
-        let joint = told.filter(|role| *role != ChannelRole::Other);
+        let joint = shown.filter(|role| *role != ChannelRole::Other);
         let joint = joint.map(|_| words::joint(&spoken));
-        (told.unwrap_or(ChannelRole::Other), joint)
+        (shown.unwrap_or(ChannelRole::Other), joint)
     };
     for (word, role) in WORDS {
         let Some(rest) = base.strip_prefix(word) else {
@@ -149,7 +149,7 @@ fn guess(name: &str) -> (ChannelRole, Option<String>) {
             .iter()
             .any(|p| base.starts_with(p));
         let agrees =
-            told.is_none_or(|told| told == role || (told == ChannelRole::Other && contract));
+            shown.is_none_or(|shown| shown == role || (shown == ChannelRole::Other && contract));
         if ends && numbered && agrees {
             let joint = (!joint.is_empty()).then(|| joint.to_owned());
             return (role, Some(joint.unwrap_or_default()));

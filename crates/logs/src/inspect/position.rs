@@ -57,14 +57,14 @@ fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
 pub(super) fn leaps(
     judge: &LogJudge,
     place: usize,
-    (clock, reach, told): (&ClockFacts, f64, &mut Vec<[f64; 2]>),
+    (clock, reach, shown): (&ClockFacts, f64, &mut Vec<[f64; 2]>),
     draft: &mut FaultList,
 ) {
     let track = &judge.tracks[place];
-    let known = |t: f64| told.iter().any(|[from, to]| *from <= t && t <= *to);
+    let known = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
     let (mut found, least) = unusual(track, clock);
     found.retain(|leap| !known(leap.at));
-    told.extend(
+    shown.extend(
         found
             .iter()
             .map(|leap| [leap.before - reach, leap.at + reach]),

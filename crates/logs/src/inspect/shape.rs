@@ -57,7 +57,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     flat.tell(track, draft);
     // Where a channel leaps out of a flat stretch it is reported already.
     let reach = 5.5 * clock.dt;
-    let mut told: Vec<[f64; 2]> = (flat.tops.iter().chain(&flat.stuck))
+    let mut shown: Vec<[f64; 2]> = (flat.tops.iter().chain(&flat.stuck))
         .map(|run| [run.from - reach, run.to + reach])
         .chain(
             draft
@@ -67,10 +67,10 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
         )
         .collect();
     if track.channel.role == ChannelRole::Position {
-        position::leaps(judge, place, (clock, reach, &mut told), draft);
+        position::leaps(judge, place, (clock, reach, &mut shown), draft);
         position::erratic(judge, track, draft);
     }
-    spikes(judge, place, (clock, &told), draft);
+    spikes(judge, place, (clock, &shown), draft);
     if judge.depth == Depth::Whole {
         coarse(judge, track, clock, draft);
     }
@@ -355,7 +355,7 @@ impl<'a> Flatness<'a> {
 fn spikes(
     judge: &LogJudge,
     place: usize,
-    (clock, told): (&ClockFacts, &[[f64; 2]]),
+    (clock, shown): (&ClockFacts, &[[f64; 2]]),
     draft: &mut FaultList,
 ) {
     let track = &judge.tracks[place];
@@ -373,10 +373,10 @@ fn spikes(
             ChannelRole::Position => 0.5 * position::drive(track, clock),
             _ => SPIKE_SHARE * track.deviation(),
         });
-    let told = |t: f64| told.iter().any(|[from, to]| *from <= t && t <= *to);
+    let shown = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
     let all = track.spikes.found().iter();
     let high: Vec<_> = all
-        .filter(|s| s.height.abs() > least && !told(s.t))
+        .filter(|s| s.height.abs() > least && !shown(s.t))
         .collect();
     let mut episodes = Episodes::default();
     let mut highest = 0.0f64;

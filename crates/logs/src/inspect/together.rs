@@ -294,11 +294,11 @@ fn noiseless(judge: &LogJudge, draft: &mut FaultList) {
             Some(_) => continue,
             None => grain::noise(judge.windows.iter(), index),
         };
-        let told = draft.faults.iter().any(|fault| {
+        let shown = draft.faults.iter().any(|fault| {
             fault.kind == FaultKind::CommandAsMeasurement
                 && fault.channel.as_ref() == Some(&track.channel.name)
         });
-        if told || noise.is_none_or(|noise| noise > NOISELESS * track.travel()) {
+        if shown || noise.is_none_or(|noise| noise > NOISELESS * track.travel()) {
             continue;
         }
         let effect = "has neither noise nor the step of an encoder: it was filtered or computed, or it is a command, in which case a fit takes tracking errors for forces".to_owned();

@@ -297,27 +297,27 @@ mod tests {
     #[test]
     fn what_a_file_is_refused_for_arrays_are_too() {
         let (q, tau) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]);
-        let told = |t: &[f64], q: &[f64], tau: &[f64]| read(t, q, tau).unwrap_err().to_string();
-        let text = told(&[0.1, 0.0], &q, &tau);
+        let shown = |t: &[f64], q: &[f64], tau: &[f64]| read(t, q, tau).unwrap_err().to_string();
+        let text = shown(&[0.1, 0.0], &q, &tau);
         assert!(
             text.starts_with("arm, row 2: time runs backwards"),
             "{text}"
         );
-        let text = told(&[0.0, 0.1], &[1.0, f64::NAN, 3.0, 4.0], &tau);
+        let text = shown(&[0.0, 0.1], &[1.0, f64::NAN, 3.0, 4.0], &tau);
         assert!(
             text.starts_with("arm, row 1: column `q_q2` holds NaN"),
             "{text}"
         );
-        let text = told(&[0.0, 0.1], &q, &[0.0; 4]);
+        let text = shown(&[0.0, 0.1], &q, &[0.0; 4]);
         assert!(
             text.starts_with("arm: torque column `tau_q1` is 0"),
             "{text}"
         );
-        let text = told(&[0.0, 0.1], &q, &tau[..2]);
+        let text = shown(&[0.0, 0.1], &q, &tau[..2]);
         assert!(
             text.starts_with("arm: tau holds 2 values for 2 rows"),
             "{text}"
         );
-        assert!(told(&[0.0, 0.1], &q[..2], &[]).contains("q holds 2 values"));
+        assert!(shown(&[0.0, 0.1], &q[..2], &[]).contains("q holds 2 values"));
     }
 }

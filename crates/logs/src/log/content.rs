@@ -213,8 +213,8 @@ impl Content {
 fn has_two_lines(text: &[u8]) -> bool {
     let whole = text.split_inclusive(|byte| *byte == b'\n');
     let whole = whole.filter(|line| line.ends_with(b"\n"));
-    let told = |line: &&[u8]| !matches!(line.trim_ascii().first(), None | Some(b'#' | b'%'));
-    whole.filter(told).count() >= 2
+    let described = |line: &&[u8]| !matches!(line.trim_ascii().first(), None | Some(b'#' | b'%'));
+    whole.filter(described).count() >= 2
 }
 
 /// First bytes of what zstd compressed.

@@ -138,20 +138,20 @@ impl LogPass {
 
     /// What was chosen on the way, one sentence each.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let mut told = self.rows.warnings();
+        let mut shown = self.rows.warnings();
         if self.unstamped > 0 {
-            told.push(format!(
+            shown.push(format!(
                 "{} rows at the beginning are stamped 0, before the clock was set, and are left out",
                 self.unstamped
             ));
         }
         if let Some((unit, column)) = &self.recognised {
             let unit = unit.in_seconds().0;
-            told.push(format!(
+            shown.push(format!(
                 "times of `{column}` are taken as {unit}, by the size of the numbers and of their steps; `time_unit = \"{unit}\"` in [log] of the robot file says so, \"s\" that they are seconds"
             ));
         }
-        told
+        shown
     }
 
     /// Goes through rows that are there already.

@@ -101,8 +101,8 @@ pub(super) fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
             .iter()
             .any(|word| known.contains(&word.text.as_str()))
     };
-    let told = PENALTIES.iter().filter(|(known, _)| of(known));
-    let sum: i32 = told.map(|(_, count)| *count).sum();
+    let shown = PENALTIES.iter().filter(|(known, _)| of(known));
+    let sum: i32 = shown.map(|(_, count)| *count).sum();
     // `current` beside a position is an adjective
     let adjective = role != ChannelRole::Torque && of(&["current"]);
     sum - i32::from(adjective)

@@ -156,14 +156,14 @@ pub(super) fn best_by<'a>(
     } = found.next()?;
     let taken: Vec<&str> = given.iter().flatten().map(|c| c.name.as_str()).collect();
     let (mut others, mut tie) = (Vec::new(), false);
-    let mut told: Vec<Vec<&str>> = Vec::new();
+    let mut shown: Vec<Vec<&str>> = Vec::new();
     for other in found {
         // another reading of the same columns is no other family
         let same = |c: &&LogColumn| taken.contains(&c.name.as_str());
         let mut known = |columns: &[Option<&'a LogColumn>]| {
             let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
-            let known = told.contains(&names);
-            told.push(names);
+            let known = shown.contains(&names);
+            shown.push(names);
             known
         };
         if other.columns.iter().flatten().all(same)

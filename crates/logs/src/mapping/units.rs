@@ -148,7 +148,7 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
     let first = plain.clone().next().map(|column| &column.name);
     let guessed = |kind: JointKind, column: &LogColumn| {
         // one sentence for all of them
-        let told = |text: String| Some(text).filter(|_| first == Some(&column.name));
+        let shown = |text: String| Some(text).filter(|_| first == Some(&column.name));
         let (unit, check) = match kind {
             _ if whole => (
                 Some("counts"),
@@ -173,7 +173,7 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
         };
         Unit {
             unit,
-            check: told(check),
+            check: shown(check),
             ..Unit::default()
         }
     };

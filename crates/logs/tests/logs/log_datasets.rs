@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-use crate::log_drawn::{JOINTS, Motion, ROWS, drawn, mapped, read, same, told};
+use crate::log_drawn::{JOINTS, Motion, ROWS, drawn, mapped, read, same, shown};
 
 /// Time between episodes [s].
 const BETWEEN: f64 = 10.0;
@@ -188,5 +188,5 @@ fn drawn_datasets_of_episodes_are_read_exactly_and_episodes_stay_apart() {
         }
         same(&found, &motion, seed);
     }
-    told("datasets of LeRobot", 0);
+    shown("datasets of LeRobot", 0);
 }

@@ -23,7 +23,7 @@ pub(crate) fn drawn() -> u64 {
 }
 
 /// Says how many logs of a kind were read at once, and how many by the remedy of the message that refused them.
-pub(crate) fn told(kind: &str, cured: u64) {
+pub(crate) fn shown(kind: &str, cured: u64) {
     let (logs, read) = (drawn(), drawn() - cured);
     println!(
         "drawn: {{\"logs\": \"{kind}\", \"drawn\": {logs}, \"read exactly\": {read}, \"refused, and read by the remedy\": {cured}}}"
@@ -299,7 +299,7 @@ fn text_logs_are_read_whatever_surrounds_the_table_and_a_coarse_clock_names_its_
         };
         same(&found, &motion, seed);
     }
-    told("text", cured);
+    shown("text", cured);
 }
 
 /// A recording with faults that are mended, and whether its efforts are one too few.
@@ -411,5 +411,5 @@ fn recordings_are_read_in_the_order_of_their_times_without_what_is_of_no_joint()
         };
         same(&found, &motion, seed);
     }
-    told("recordings of joint states", cured);
+    shown("recordings of joint states", cured);
 }

@@ -136,9 +136,9 @@ fn two_clocks(folder: &TempDir, delay: f64) -> PathBuf {
 #[track_caller]
 fn told_delay(reader: &Reader) -> f64 {
     let warnings = reader.warnings();
-    let told = warnings.iter().find(|text| text.contains("/drives lags"));
-    let told = told.unwrap_or_else(|| panic!("{warnings:?}"));
-    let number = told.split(" by ").nth(1).unwrap();
+    let described = warnings.iter().find(|text| text.contains("/drives lags"));
+    let described = described.unwrap_or_else(|| panic!("{warnings:?}"));
+    let number = described.split(" by ").nth(1).unwrap();
     number.split(' ').next().unwrap().parse().unwrap()
 }
 
@@ -256,13 +256,13 @@ fn a_message_whose_number_is_none_is_left_out_and_told_and_a_recording_of_none_e
     let path = recorded("log.mcap", &|k| k == 3);
     let (block, reader) = read(&shown(&path), &one_joint(""));
     assert_eq!(block.t, [0.0, 1e-3, 2e-3, 4e-3]);
-    let told = reader.warnings().concat();
+    let described = reader.warnings().concat();
     for words in [
         "1 of 5 messages",
         "message 4",
         "no number as `position[name=q1]`",
     ] {
-        assert!(told.contains(words), "{words}: {told}");
+        assert!(described.contains(words), "{words}: {described}");
     }
     let message = refused(&recorded("none.mcap", &|_| true), &one_joint(""));
     for words in [

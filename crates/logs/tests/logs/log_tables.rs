@@ -7,7 +7,7 @@ use cft_ident_logs::log::{Block, Channel, Layout, LogSpec, RawReader, Reader};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::log_drawn::{Motion, ROWS, drawn, mapped, names, read, same, told};
+use crate::log_drawn::{Motion, ROWS, drawn, mapped, names, read, same, shown};
 
 fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(cft_ident_support::ROOT).join("fixtures/tables");
@@ -65,10 +65,10 @@ const TAU: [&str; 3] = ["tau_0", "tau_1", "tau_2"];
 fn arrays_that_numpy_wrote_are_read_whichever_way_they_lie() {
     let (plain, reader) = holds_all(&fixture("arrays.npz"), &layout(Q, TAU, "t"));
     assert!((plain.t[59] - 0.59).abs() < 1e-12);
-    let told = reader.warnings().join("\n");
+    let shown = reader.warnings().join("\n");
     assert!(
-        told.contains("array `fs` is left out") && told.contains("array `names`"),
-        "{told}"
+        shown.contains("array `fs` is left out") && shown.contains("array `names`"),
+        "{shown}"
     );
     holds_all(&fixture("turned.npz"), &layout(Q, TAU, "time"));
     holds_all(&fixture("records.npy"), &layout(Q, TAU, "t"));
@@ -256,7 +256,7 @@ fn drawn_archives_of_arrays_are_read_exactly_and_cut_ones_are_refused() {
             .to_string();
         assert!(error.contains("cut off"), "seed {seed}: {error}");
     }
-    told("archives of numpy", 0);
+    shown("archives of numpy", 0);
 }
 
 /// Rows as JSON objects, flat, with lists or nested, a line each or in one list.
@@ -306,7 +306,7 @@ fn drawn_objects_of_json_are_read_exactly() {
         std::fs::write(&path, objects(&mut rng, &motion)).unwrap();
         same(&read(&path, &mapped(&path)).unwrap(), &motion, seed);
     }
-    told("objects of JSON", 0);
+    shown("objects of JSON", 0);
 }
 
 #[cfg(feature = "parquet")]
@@ -336,7 +336,7 @@ fn drawn_tables_of_parquet_are_read_exactly() {
         log.commit().unwrap();
         same(&read(&path, &mapped(&path)).unwrap(), &motion, seed);
     }
-    told("tables of Parquet", 0);
+    shown("tables of Parquet", 0);
 }
 
 /// Reads all rows of a file that may be damaged: an error is an answer.

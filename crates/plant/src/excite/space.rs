@@ -161,8 +161,8 @@ impl DesignSpace {
                     continue;
                 }
                 let names = [name(*a), name(*b)];
-                let told = format!("{} to {}", escape(&names[0]), escape(&names[1]));
-                channels.push(apart(Quantity::Distance, space.pairs.len(), &told));
+                let shown = format!("{} to {}", escape(&names[0]), escape(&names[1]));
+                channels.push(apart(Quantity::Distance, space.pairs.len(), &shown));
                 space.pairs.push(Pair { names, one, other });
             }
         }
@@ -305,17 +305,17 @@ mod tests {
 
     #[test]
     fn what_nobody_checks_is_told_by_what_is_declared() {
-        let told = |text: &str, way| {
+        let shown = |text: &str, way| {
             let file = file(text);
             DesignSpace::of(&file, &file.robot()).0.not_checked(way)
         };
         assert_eq!(
-            told(ARM, true),
+            shown(ARM, true),
             "NOT CHECKED: what stands around the robot, but for floor and box at tip."
         );
         let bare = ARM.split("[limits]").next().unwrap_or_default();
         assert_eq!(
-            told(bare, false),
+            shown(bare, false),
             "NOT CHECKED: collisions of the robot with itself; collisions with what stands around it; \
              the way to the first point."
         );

@@ -424,8 +424,8 @@ slope_2       16         -
 
     #[test]
     fn later_lines_of_a_hanging_text_stand_below_it() {
-        let told = hanging("  1. ", &"word ".repeat(20), 5);
-        let lines: Vec<&str> = told.lines().collect();
+        let described = hanging("  1. ", &"word ".repeat(20), 5);
+        let lines: Vec<&str> = described.lines().collect();
         assert_eq!(lines.len(), 2);
         assert!(lines[0].starts_with("  1. word") && lines[1].starts_with("     word"));
         assert!(lines.iter().all(|line| line.len() <= WIDTH));
@@ -434,11 +434,11 @@ slope_2       16         -
     #[test]
     fn a_message_is_folded_and_a_path_in_it_stays_whole() {
         let path = format!("/{}/log.csv", "folder".repeat(14));
-        let told = folded(&format!(
+        let described = folded(&format!(
             "error: no data\nhint: {} {path}\n",
             "look ".repeat(20)
         ));
-        let lines: Vec<&str> = told.lines().collect();
+        let lines: Vec<&str> = described.lines().collect();
         assert_eq!(lines[0], "error: no data");
         assert!(lines[1].starts_with("hint: look") && lines[1].len() <= WIDTH);
         assert!(lines[2].starts_with("  look"));

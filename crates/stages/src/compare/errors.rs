@@ -117,15 +117,15 @@ fn bootstrapped(pieces: &[Vec<PieceSquares>], n: usize) -> ErrorDifferences {
         true => intervals_95(pieces.len(), 1, SEED, &mut |picked| of(picked)),
         false => Vec::new(),
     };
-    let mut told = found.iter().enumerate().map(|(k, d)| {
+    let mut shown = found.iter().enumerate().map(|(k, d)| {
         let interval = intervals.get(k).copied();
         Difference {
             difference: *d,
             interval_95: interval.filter(|ends| ends.iter().all(|x| x.is_finite())),
         }
     });
-    let joints = told.by_ref().take(n).collect();
-    let overall = told.next().unwrap_or(Difference {
+    let joints = shown.by_ref().take(n).collect();
+    let overall = shown.next().unwrap_or(Difference {
         difference: f64::NAN,
         interval_95: None,
     });

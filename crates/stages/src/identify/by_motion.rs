@@ -121,12 +121,12 @@ fn take(found: &mut IdentifiedDynamics, fit: &AxisFit) {
         let share = 2.0 * std * found.fit.column_rms[(0, i)] / torque_rms;
         let determined = fit.free.contains(&i);
         let (verdict, negligible) = verdict(value, std, determined, share);
-        let told = verdict != Verdict::NotIdentifiable;
+        let shown = verdict != Verdict::NotIdentifiable;
         (unknown.fitted, unknown.fitted_std) = (value, std);
         (unknown.verdict, unknown.negligible) = (verdict, negligible);
-        unknown.value = told.then_some(value);
-        unknown.std = told.then_some(std);
-        unknown.relative_std = told.then(|| std / value.abs());
+        unknown.value = shown.then_some(value);
+        unknown.std = shown.then_some(std);
+        unknown.relative_std = shown.then(|| std / value.abs());
     }
     let u = found.unknowns.len();
     found.covariance = fit.covariance.view((0, 0), (u, u)).into_owned();
@@ -182,12 +182,12 @@ fn effects(machine: &LoggedRobot, model: &AugmentedModel, fit: &AxisFit) -> Vec<
             effect.held[i] = i >= shapes && !fit.free.contains(&(first + i));
         }
         first += n;
-        let told = effect.numbers(
+        let shown = effect.numbers(
             &machine.robot,
             machine.file.torque_unit(0),
             Some(covariance.as_slice()),
         );
-        in_file(&effect, machine, &told)
+        in_file(&effect, machine, &shown)
     };
     model.effects.iter().map(of).collect()
 }

@@ -90,9 +90,9 @@ pub fn identify<E: From<IdentifyError>>(
         each_row_once(machine, &[(role, fitted), validation])?;
     }
     let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
-    let mut keep = |from: &[Provenance], told: &[String], role: DataRole| {
+    let mut keep = |from: &[Provenance], shown: &[String], role: DataRole| {
         inputs.extend(from.iter().cloned().map(|input| input.used_as(role)));
-        warnings.extend_from_slice(told);
+        warnings.extend_from_slice(shown);
     };
     let known = match logs.friction.as_slice() {
         [] => None,

@@ -45,12 +45,12 @@ impl Passes<'_> {
     /// # Errors
     /// A log that cannot be read.
     pub(super) fn contacts(&self) -> Result<Vec<String>, IdentifyError> {
-        let told = |(log, jump): &(usize, Jump)| {
+        let shown = |(log, jump): &(usize, Jump)| {
             let log = &self.logs[*log];
             let first = self.machine.first_row(log, self.control)?;
             Ok(sentence(self.machine, log, jump, first))
         };
-        self.jumps.iter().map(told).collect()
+        self.jumps.iter().map(shown).collect()
     }
 }
 

@@ -61,7 +61,7 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// The motion of a log, or the processing that a robot file asks for.
-    #[error("{of}: {error}{}", .left_out.as_ref().map(|told| format!("; {told}")).unwrap_or_default())]
+    #[error("{of}: {error}{}", .left_out.as_ref().map(|shown| format!("; {shown}")).unwrap_or_default())]
     Motion {
         of: String,
         error: MotionError,

@@ -156,11 +156,11 @@ pub fn estimate(
     law: bool,
 ) -> Result<Estimated, IdentifyError> {
     let mut account = Account::of(estimator);
-    let told = &mut account;
+    let shown = &mut account;
     let moves = columns.known.iter().flatten().any(KnownFriction::moves);
     let mut columns = columns;
     if moves && estimator != EstimatorKind::Oe {
-        let found = with_known_friction(passes, columns, told)?;
+        let found = with_known_friction(passes, columns, shown)?;
         if estimator == EstimatorKind::Wls {
             return Ok(Estimated { account, ..found });
         }
@@ -168,15 +168,15 @@ pub fn estimate(
         columns = found.columns;
     }
     let (mut fit, sums, solver) = match estimator {
-        EstimatorKind::Oe => refined(passes, &columns, law, told)?,
-        EstimatorKind::Wls if law => refined(passes, &columns, law, told)?,
+        EstimatorKind::Oe => refined(passes, &columns, law, shown)?,
+        EstimatorKind::Wls if law => refined(passes, &columns, law, shown)?,
         EstimatorKind::Irls => {
             first_reading(passes, &columns)?;
-            robust_regression(passes, &columns, told)?
+            robust_regression(passes, &columns, shown)?
         }
         EstimatorKind::Iv => {
             first_reading(passes, &columns)?;
-            instrumental(passes, &columns, told)?
+            instrumental(passes, &columns, shown)?
         }
         EstimatorKind::Ols => linear(passes, &columns, solve::Weighting::Ols)?,
         EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,

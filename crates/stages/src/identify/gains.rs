@@ -254,7 +254,7 @@ fn judged(
         let names: Vec<&str> = joints.iter().map(|j| names[*j].as_str()).collect();
         names.join(", ")
     };
-    let told = |joints: &[usize], of: &dyn Fn(usize) -> f64| {
+    let shown = |joints: &[usize], of: &dyn Fn(usize) -> f64| {
         let each = joints.iter().filter(|j| fit.determined[**j]).map(|&j| {
             let (value, std) = number::value_and_std(of(j), of(j).abs() * spread(j));
             format!("{} {value} +- {std}", names[j])
@@ -271,7 +271,7 @@ fn judged(
         if !open.is_empty() || n < 2 {
             let joints = if open.is_empty() { vec![0] } else { open };
             return Err(GainError::RatioUndetermined {
-                found: in_brackets(told(&joints, &ratio)),
+                found: in_brackets(shown(&joints, &ratio)),
                 joints: listed(&joints),
                 reference: names[reference].clone(),
             });
@@ -280,7 +280,7 @@ fn judged(
         return match negative.is_empty() {
             true => Ok(()),
             false => Err(GainError::Negative {
-                found: told(&negative, &ratio),
+                found: shown(&negative, &ratio),
                 joints: listed(&negative),
             }),
         };
@@ -290,13 +290,13 @@ fn judged(
         let all: Vec<usize> = (0..n).collect();
         return Err(GainError::NoLoad {
             log,
-            joints: told(&all, &|j| fit.channel[j]),
+            joints: shown(&all, &|j| fit.channel[j]),
         });
     }
     let gain = |j: usize| factor(machine, fit, Some(payload), j) * declared(machine, j);
     if !open.is_empty() {
         return Err(GainError::Undetermined {
-            found: in_brackets(told(&open, &gain)),
+            found: in_brackets(shown(&open, &gain)),
             joints: listed(&open),
         });
     }
@@ -307,7 +307,7 @@ fn judged(
     match negative.is_empty() {
         true => Ok(()),
         false => Err(GainError::Negative {
-            found: told(&negative, &gain),
+            found: shown(&negative, &gain),
             joints: listed(&negative),
         }),
     }

@@ -195,14 +195,14 @@ impl FrictionBefore {
             let unit = machine.file.torque_unit(j);
             let position = machine.robot.joint_kind(j).position_unit();
             let shown = |x: f64| number::significant(x, 3);
-            let told = match 2.0 * std > WEAK * torque.abs() {
+            let described = match 2.0 * std > WEAK * torque.abs() {
                 true => {
                     "; these logs cannot tell its friction at these speeds: log the joint alone as fast as it is used"
                 }
                 false => "",
             };
             out.push(format!(
-                "{joint}: moves at up to {} {position}/s here, its one-joint logs at up to {}; its friction there is {} +- {} {unit}{told}",
+                "{joint}: moves at up to {} {position}/s here, its one-joint logs at up to {}; its friction there is {} +- {} {unit}{described}",
                 shown(speed),
                 shown(covered[1]),
                 shown(torque),

@@ -269,9 +269,9 @@ pub fn lsq(
         return Err(IdentifyError::OnlyNoise { left: least });
     }
     let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
-    let told = of_geometry.iter().map(|finding| &finding.meaning);
+    let shown = of_geometry.iter().map(|finding| &finding.meaning);
     warnings.extend(
-        told.map(|told| format!("{told}; take the plain number unless it was measured so")),
+        shown.map(|shown| format!("{shown}; take the plain number unless it was measured so")),
     );
     let names = machine.robot.joint_names().iter().enumerate();
     let joints = names.map(|(j, joint)| JointResidual {
@@ -394,14 +394,14 @@ const TOLD: f64 = 0.01;
 /// Rows at rest that are not fitted, as a warning.
 fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
     let joints = machine.robot.joint_names().iter().zip(shares);
-    let told: Vec<String> = joints
+    let shown: Vec<String> = joints
         .filter(|(_, share)| **share >= TOLD)
         .map(|(joint, share)| format!("{joint} {}", number::percent(*share)))
         .collect();
-    (!told.is_empty()).then(|| {
+    (!shown.is_empty()).then(|| {
         format!(
             "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted; where a joint turns its samples weigh nothing",
-            told.join(", ")
+            shown.join(", ")
         )
     })
 }

@@ -146,7 +146,7 @@ impl OpenLog<'_> {
         let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
         let dropped = dropped + self.reader.not_read();
         let rows = self.reader.samples() + dropped;
-        let told = match self.cutter.removed() + dropped + too_short {
+        let shown = match self.cutter.removed() + dropped + too_short {
             0 => format!("none of {rows} rows is left out in all"),
             removed => format!(
                 "{removed} of {rows} rows are left out in all, those next to bad ones included"
@@ -154,7 +154,7 @@ impl OpenLog<'_> {
         };
         let causes: Vec<String> = costs.into_iter().map(|(_, text)| text).collect();
         Some(format!(
-            "{}: {told}: {}; see `cft-ident inspect`",
+            "{}: {shown}: {}; see `cft-ident inspect`",
             self.name,
             causes.join(", ")
         ))

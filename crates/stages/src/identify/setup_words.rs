@@ -315,11 +315,11 @@ impl Words<'_> {
             .each_ref()
             .map(|e| overall(e).map(percent).unwrap_or_default());
         let angle = matches!(estimate.change, Change::Zero(..) | Change::Gravity(_));
-        let told = |x: f64| match angle {
+        let shown = |x: f64| match angle {
             true => format!("{} degrees", significant(x.to_degrees(), 3)),
             false => significant(x, 4),
         };
-        let value = told(estimate.value);
+        let value = shown(estimate.value);
         let what = match (&estimate.change, &joint) {
             (Change::Gear(..), Some(joint)) => {
                 format!("{joint} fits a motor behind a gear of {value}, position and torque")
@@ -338,8 +338,8 @@ impl Words<'_> {
         let [low, high] = estimate.interval_95;
         let meaning = format!(
             "{what} (95 % CI {} to {}; error {before} as declared, {after} with it): an estimate and no mistake of a list; compare it with the machine",
-            told(low),
-            told(high)
+            shown(low),
+            shown(high)
         );
         let values = match angle {
             true => [0.0, estimate.value],

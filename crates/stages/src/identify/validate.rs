@@ -369,8 +369,8 @@ fn reconstruct(
             all.count_from(whole.origin.seconds());
             for stretch in &whole.stretches {
                 let hat = refined.reconstruct(stretch);
-                let mut told = |r: &Reconstructed| row(r, whole.origin);
-                all.add_stretch(&settings, segments, stretch, &hat, &mut told)
+                let mut described = |r: &Reconstructed| row(r, whole.origin);
+                all.add_stretch(&settings, segments, stretch, &hat, &mut described)
                     .map_err(|e| IdentifyError::motion(&log.name(), e))?;
                 segments += 1;
             }

@@ -313,14 +313,14 @@ fn is_json(log: &Log) -> Option<std::fs::File> {
 /// The word about joints that cannot be watched.
 fn blind(joints: &[WatchedJoint], held: &[HeldOut]) -> Vec<String> {
     let each = joints.iter().zip(held).filter(|(of, _)| of.blind);
-    let told = each.map(|(of, held)| {
+    let shown = each.map(|(of, held)| {
         let [limit, torque] = [of.threshold[0], held.torque_seen].map(|x| number::significant(x, 3));
         format!(
             "cannot watch {}: an alarm takes {limit} {} from outside, and the greatest torque of the joint along the logs of the fit is {torque} {}; a better model (`diagnose`), or more --false-alarms, narrows it",
             of.joint, of.unit, of.unit
         )
     });
-    told.collect()
+    shown.collect()
 }
 
 /// A word on a rate that the calibration is too short for.

@@ -35,8 +35,8 @@ fn row(machine: &str, of: &Value) -> Vec<String> {
         .iter()
         .find(|j| j["joint"] == of["joint"]);
     let errors = own.map_or("-".to_owned(), |j| {
-        let told = |key: &str| significant(100.0 * number(&j[key]), 3);
-        format!("{}, {} %", told("before"), told("after"))
+        let shown = |key: &str| significant(100.0 * number(&j[key]), 3);
+        format!("{}, {} %", shown("before"), shown("after"))
     });
     vec![
         machine.to_owned(),

@@ -184,11 +184,11 @@ fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
     let mut found: Vec<Dependence> = found.into_iter().map(|(_, d)| d).collect();
     if let Some(strongest) = found.first_mut() {
         let place = |of: &Signal| signals.iter().position(|s| s == of);
-        let told: Vec<usize> = strongest.signals.iter().filter_map(place).collect();
+        let shown: Vec<usize> = strongest.signals.iter().filter_map(place).collect();
         // beside one alone stands the next strongest by itself
-        let mut others: Vec<usize> = (0..signals.len()).filter(|i| !told.contains(i)).collect();
+        let mut others: Vec<usize> = (0..signals.len()).filter(|i| !shown.contains(i)).collect();
         others.sort_by(|a, b| tried[*b].1.surely().total_cmp(&tried[*a].1.surely()));
-        let drawn: Vec<usize> = told.into_iter().chain(others).take(2).collect();
+        let drawn: Vec<usize> = shown.into_iter().chain(others).take(2).collect();
         if let &[a, b] = drawn.as_slice() {
             let of = [&values[a], &values[b]].map(Vec::as_slice);
             let map = ResidualMap::of([signals[a], signals[b]], of, &rows.residual, &rows.block);

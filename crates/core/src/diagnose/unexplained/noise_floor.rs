@@ -317,10 +317,10 @@ mod tests {
             .map(|_| Middle::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY))
             .collect();
         let scatter = found.iter().map(|m| (m.value - 3.0).powi(2)).sum::<f64>() / 2000.0;
-        let told = found.iter().map(|m| m.error).sum::<f64>() / 2000.0;
+        let shown = found.iter().map(|m| m.error).sum::<f64>() / 2000.0;
         assert!(
-            (told / scatter.sqrt() - 1.0).abs() < 0.1,
-            "{told} {scatter}"
+            (shown / scatter.sqrt() - 1.0).abs() < 0.1,
+            "{shown} {scatter}"
         );
     }
 

@@ -230,7 +230,7 @@ mod tests {
     fn what_is_not_known_or_has_no_end_is_told() {
         let shown = "<node><instance_geometry url=\"#g\"/></node>";
         let circle = "<node id=\"c\"><instance_node url=\"#c\"/><instance_node url=\"#c\"/></node>";
-        for (text, told) in [
+        for (text, described) in [
             (
                 file("<node><instance_geometry url=\"#h\"/></node>"),
                 "line 13: <instance_geometry> names nothing",
@@ -261,7 +261,7 @@ mod tests {
             ("<robot/>".to_owned(), "has no <COLLADA>"),
         ] {
             let found = vertices(&text).unwrap_err();
-            assert!(found.contains(told), "{told}: {found}");
+            assert!(found.contains(described), "{described}: {found}");
         }
         let many = shown.repeat(MOST_NODES);
         assert!(

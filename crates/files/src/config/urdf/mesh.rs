@@ -212,8 +212,8 @@ mod tests {
         assert!(wrong(b"version https://git-lfs").contains("no STL"));
         assert_eq!(wrong(b"solid\nendsolid"), "holds no vertex");
         let bent = text.replace("-2e-1", "nan");
-        let told = "line 6: `vertex 0 nan 3` has not three finite numbers";
-        assert_eq!(wrong(bent.as_bytes()), told);
+        let described = "line 6: `vertex 0 nan 3` has not three finite numbers";
+        assert_eq!(wrong(bent.as_bytes()), described);
         let bent = binary("", &[[[0.0, f32::INFINITY, 0.0]; 3]]);
         assert_eq!(wrong(&bent), "triangle 1 has a vertex at [0.0, inf, 0.0]");
     }

@@ -355,8 +355,8 @@ fn notes(parts: &Parts, place: &Place) -> Vec<String> {
     });
     let impossible = parts.impossible.as_ref();
     let impossible = impossible.map(|text| format!("{}: {text}", place.file));
-    let told = parts.changes.in_words(place.file).into_iter();
-    told.chain(renamed).chain(impossible).collect()
+    let shown = parts.changes.in_words(place.file).into_iter();
+    shown.chain(renamed).chain(impossible).collect()
 }
 
 /// Lumps the bodies and lets mimic joints follow.

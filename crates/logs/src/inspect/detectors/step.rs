@@ -357,11 +357,14 @@ mod tests {
     fn a_rest_is_its_first_and_its_last_row_and_a_few_that_repeat_are_none() {
         let mut fresh = FreshRows::new(1);
         let rows = [0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 3.0];
-        let told: Vec<Freshness> = (0..rows.len())
+        let shown: Vec<Freshness> = (0..rows.len())
             .map(|k| fresh.look(k as f64, &rows[k..=k]))
             .collect();
-        assert_eq!(told[3], Freshness::Fresh);
-        assert_eq!(told[10], Freshness::AfterRest(9.0));
-        assert_eq!(told.iter().filter(|f| **f == Freshness::Repeats).count(), 7);
+        assert_eq!(shown[3], Freshness::Fresh);
+        assert_eq!(shown[10], Freshness::AfterRest(9.0));
+        assert_eq!(
+            shown.iter().filter(|f| **f == Freshness::Repeats).count(),
+            7
+        );
     }
 }

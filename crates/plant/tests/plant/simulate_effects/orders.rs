@@ -211,8 +211,8 @@ fn units_follow_the_joint() {
         (Unit::Inertia, "kg", "kg m^2"),
         (Unit::Fixed("Hz"), "Hz", "Hz"),
     ] {
-        let told = [unit(of, false, true), unit(of, true, true)];
-        assert_eq!(told, [slides, turns]);
+        let shown = [unit(of, false, true), unit(of, true, true)];
+        assert_eq!(shown, [slides, turns]);
     }
     let truth = CftTruth::synthetic(Setup::Tuedacs);
     let (_, values) = effects(&truth, &specs(&["coupling:q2:from=1"])).expect("known");

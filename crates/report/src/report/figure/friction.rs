@@ -222,14 +222,14 @@ impl FrictionPanel {
         let Some(([slow, at_rest], [fast, at_speed])) = ends else {
             return format!("no friction of {} is known", self.joint);
         };
-        let told = |x: f64, unit: &str| format!("{} {unit}", number::significant(x, 3));
+        let shown = |x: f64, unit: &str| format!("{} {unit}", number::significant(x, 3));
         format!(
             "{}: {} at {}, {} at {}",
             self.joint,
-            told(*at_rest, &self.torque_unit),
-            told(*slow, &self.speed_unit),
-            told(*at_speed, &self.torque_unit),
-            told(*fast, &self.speed_unit)
+            shown(*at_rest, &self.torque_unit),
+            shown(*slow, &self.speed_unit),
+            shown(*at_speed, &self.torque_unit),
+            shown(*fast, &self.speed_unit)
         )
     }
 

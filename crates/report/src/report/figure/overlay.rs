@@ -55,8 +55,8 @@ impl OverlayFigure {
     pub fn cells(&self) -> Cells {
         let picture = |panel: &OverlayPanel| {
             let title = format!("friction of {}", panel.joint);
-            let told = format!("{title} by {} and {}", self.names[0], self.names[1]);
-            cell::cell(&title, &told, PANEL_HEIGHT_PX, |svg, frame| {
+            let described = format!("{title} by {} and {}", self.names[0], self.names[1]);
+            cell::cell(&title, &described, PANEL_HEIGHT_PX, |svg, frame| {
                 panel.draw(svg, frame)
             })
         };

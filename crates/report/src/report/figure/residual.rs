@@ -156,18 +156,18 @@ impl ResidualPanel {
             let values = lines.flat_map(|(_, line)| line.iter().map(|p| p[1].abs()));
             values.filter(|y| y.is_finite()).reduce(f64::max)
         };
-        let told = |x: f64| format!("{} {}", number::significant(x, 3), self.of.1);
+        let shown = |x: f64| format!("{} {}", number::significant(x, 3), self.of.1);
         let before = most([When::Before, When::BeforeBackward]);
         let after = most([When::After, When::AfterBackward]);
         let (what, over) = (&self.of.0, &self.over.0);
         match (before, after) {
             (Some(before), Some(after)) => format!(
                 "greatest {what} of {joint} over {over}: {} as given, {} after",
-                told(before),
-                told(after)
+                shown(before),
+                shown(after)
             ),
             (Some(only), None) | (None, Some(only)) => {
-                format!("greatest {what} of {joint} over {over}: {}", told(only))
+                format!("greatest {what} of {joint} over {over}: {}", shown(only))
             }
             (None, None) => format!("not enough motion of {joint} to tell"),
         }
@@ -249,9 +249,9 @@ mod tests {
         assert!(svg.contains(">1.00</text>") && !svg.contains(">9.00</text>"));
         let cells = figure.cells();
         assert_eq!(cells[0].pictures.len(), 2);
-        let told = "greatest residual of q&lt;1 over velocity: 2.00 Nm as given, 2.00 Nm after";
+        let shown = "greatest residual of q&lt;1 over velocity: 2.00 Nm as given, 2.00 Nm after";
         assert!(
-            cells[0].pictures[0].contains(told),
+            cells[0].pictures[0].contains(shown),
             "{}",
             cells[0].pictures[0]
         );

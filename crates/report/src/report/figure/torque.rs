@@ -67,11 +67,11 @@ impl TorqueFigure {
     pub fn svg(&self) -> String {
         let group = NAME + TORQUE + BETWEEN + RESIDUAL + NUMBERS;
         let height = HEAD + group * self.joints.len() as f64 + FOOT;
-        let told = |joint: &JointTorque| format!("{}{}", joint.joint, joint.figures());
-        let told: Vec<String> = self.joints.iter().map(told).collect();
+        let shown = |joint: &JointTorque| format!("{}{}", joint.joint, joint.figures());
+        let shown: Vec<String> = self.joints.iter().map(shown).collect();
         let description = format!(
             "Measured and reconstructed torque over time and their difference: {}",
-            told.join("; ")
+            shown.join("; ")
         );
         let mut svg = Svg::new(WIDTH, height, &self.title, &description);
         svg.text(

@@ -353,12 +353,12 @@ fn error_table(tried: &TriedOnLogs, logs: &str, [head_a, head_b]: &[String; 2]) 
         _ => number::ABSENT,
     };
     let [a, b] = tried.validations.each_ref().map(|v| &v.errors);
-    let told = a
+    let described = a
         .joints
         .iter()
         .zip(&b.joints)
         .zip(&tried.differences.joints);
-    for ((a, b), d) in told {
+    for ((a, b), d) in described {
         let [ours, theirs, difference, interval] = cells(a.relative_error, b.relative_error, d);
         let rms = [a.rmse, b.rmse].map(|e| number::significant(e, 3));
         let unit = a.unit;

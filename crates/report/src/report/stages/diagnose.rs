@@ -168,7 +168,7 @@ fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
 /// Friction that changes from a time on.
 fn changes(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
-    let told = d.changes.iter().map(|c| {
+    let shown = d.changes.iter().map(|c| {
         format!(
             "friction of {} changes by {} {} from {:.2} s of {} on ({} standard errors): a change in time, and no law \
              of the motion",
@@ -180,7 +180,7 @@ fn changes(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
             number::significant(c.certainty, 2)
         )
     });
-    told.collect()
+    shown.collect()
 }
 
 /// One effect that was found, for a terminal.
@@ -194,23 +194,23 @@ fn step_told(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usiz
     );
     terminal.note(&format!("{number:>3}. "), &name, 7);
     terminal.note(MARGIN, &grade(step, effect), 7);
-    let told = format!(
+    let shown = format!(
         "takes {} off the squared error of blocks left out ({} standard errors)",
         number::percent(step.share),
         number::significant(step.gain.value / step.gain.se.max(f64::MIN_POSITIVE), 2)
     );
-    terminal.note(MARGIN, &told, 7);
+    terminal.note(MARGIN, &shown, 7);
     if let Some([before, after]) = step.holdout {
-        let told = format!(
+        let shown = format!(
             "held-out data, the others kept and refitted: {} without it, {} with it{}",
             number::percent(before),
             number::percent(after),
             worsened(step)
         );
-        terminal.note(MARGIN, &told, 7);
+        terminal.note(MARGIN, &shown, 7);
     }
-    if let Some(told) = alternatives(machine, step) {
-        terminal.note(MARGIN, &told, 7);
+    if let Some(shown) = alternatives(machine, step) {
+        terminal.note(MARGIN, &shown, 7);
     }
 }
 

@@ -19,11 +19,11 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
     let (text, good) = words(judged);
-    for told in judged.first_words() {
-        report.terminal().paragraph(told);
+    for described in judged.first_words() {
+        report.terminal().paragraph(described);
         // numbers of the robot file are a caution, and no verdict
-        if judged.torques_first || told == judged.not_checked {
-            report.brief().verdict(told, false);
+        if judged.torques_first || described == judged.not_checked {
+            report.brief().verdict(described, false);
         }
     }
     if judged.torques_first {
@@ -213,11 +213,13 @@ fn apart(report: &mut Report, judged: &Judgement) {
     );
     if let Some(pair) = &judged.confounded {
         let (first, second) = (&pair.first, &pair.second);
-        let told = format!("{first} and {second}, correlation {:.2}", pair.correlation);
-        report.terminal().line(&format!("most correlated: {told}"));
+        let described = format!("{first} and {second}, correlation {:.2}", pair.correlation);
+        report
+            .terminal()
+            .line(&format!("most correlated: {described}"));
         report
             .page()
-            .paragraph(&format!("Most correlated: {told}."));
+            .paragraph(&format!("Most correlated: {described}."));
     }
 }
 
@@ -232,8 +234,10 @@ fn bands(judged: &Judgement) -> Option<String> {
             unbroken(&format!("{} {hz} Hz", band.joint))
         })
         .collect();
-    let told = bands.join(", ");
-    Some(format!("99 % of the torque's power lies below: {told}"))
+    let described = bands.join(", ");
+    Some(format!(
+        "99 % of the torque's power lies below: {described}"
+    ))
 }
 
 fn traces(figure: &MotionFigure) -> Traces {

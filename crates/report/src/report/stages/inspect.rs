@@ -179,18 +179,18 @@ fn faults(out: &mut Writer, found: &Findings) {
         let severity = b.severity.cmp(&a.severity);
         severity.then(cost(b).cmp(&cost(a)))
     });
-    let mut told: Vec<&LogFault> = Vec::new();
+    let mut shown: Vec<&LogFault> = Vec::new();
     for fault in in_order {
-        if told.iter().any(|earlier| alike(earlier, fault)) {
+        if shown.iter().any(|earlier| alike(earlier, fault)) {
             continue;
         }
         let all: Vec<&LogFault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
-        told.push(fault);
+        shown.push(fault);
         let channels = all.iter().filter_map(|fault| fault.channel.as_deref());
         let channels = distinct(channels.map(escape).collect());
         let spans = distinct(all.iter().map(|fault| fault.span()).collect());
         let head = [fault.severity.word(), fault.kind.word(), &channels].join(" ");
-        if told.len() > 1 || !found.costs.is_empty() {
+        if shown.len() > 1 || !found.costs.is_empty() {
             out.line("");
         }
         out.note("", &format!("{}: {spans} s", head.trim_end()), 0);

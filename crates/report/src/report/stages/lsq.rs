@@ -503,9 +503,9 @@ fn account(terminal: &mut Writer, account: &Account) {
             account.iterations
         ));
     }
-    let each = |told: &dyn Fn(&JointAccount) -> Option<String>| {
+    let each = |shown: &dyn Fn(&JointAccount) -> Option<String>| {
         let joints = account.joints.iter();
-        let words = joints.filter_map(|of| Some(format!("{} {}", of.joint, told(of)?)));
+        let words = joints.filter_map(|of| Some(format!("{} {}", of.joint, shown(of)?)));
         Some(words.collect::<Vec<_>>().join(", ")).filter(|words| !words.is_empty())
     };
     if let Some(shares) = each(&|of| of.down_weighted.map(number::percent)) {

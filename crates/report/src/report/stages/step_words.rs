@@ -80,8 +80,8 @@ pub(super) fn in_words(machine: &LoggedRobot, step: &FoundEffect) -> String {
             Some(std) if std > 0.0 => number::plus_minus(scale * t.value, scale * std),
             _ => number::significant(scale * t.value, 4),
         };
-        let told = format!("{} = {value} {unit}", t.key);
-        told.trim_end().to_owned()
+        let shown = format!("{} = {value} {unit}", t.key);
+        shown.trim_end().to_owned()
     });
     words.collect::<Vec<_>>().join(", ")
 }

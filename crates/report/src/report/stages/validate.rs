@@ -41,8 +41,8 @@ pub fn validate(of: &Validate) -> Report {
     let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
     let (mut text, mut good) = words(judged, of.limit, &escaped(logs));
     text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
-    if let Some(told) = not_a_validation(judged) {
-        text = format!("NOT A VALIDATION: {told}.");
+    if let Some(shown) = not_a_validation(judged) {
+        text = format!("NOT A VALIDATION: {shown}.");
         good = false;
     }
     report.everywhere().verdict(&text, good);

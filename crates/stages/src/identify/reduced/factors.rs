@@ -75,7 +75,7 @@ pub(super) struct Factors {
 impl Factors {
     pub(super) fn of(factors: BlockFactors, at_rest: bool) -> Self {
         let scores = factors.blocks.iter().find_map(|b| b.scores.clone());
-        let told = scores.iter().flat_map(|s| &s.blocks);
+        let shown = scores.iter().flat_map(|s| &s.blocks);
         let blocks = factors.blocks.iter();
         let head = Head {
             block_seconds: factors.block_seconds,
@@ -84,7 +84,7 @@ impl Factors {
             moving: factors.moving,
             resting: factors.resting,
             at_rest,
-            scores: told.map(|b| (b.stretch, b.rows)).collect(),
+            scores: shown.map(|b| (b.stretch, b.rows)).collect(),
         };
         let rest = factors.at_rest.into_iter().filter(|_| at_rest);
         let matrices = factors.blocks.into_iter().flat_map(|b| b.r).chain(rest);

@@ -197,8 +197,8 @@ impl ReducedLogs {
             return Err(cut_off(wanted));
         }
         let content = bytes.len() - CHECKSUM;
-        let told = sha256_of_bytes(&bytes[..content]);
-        if bytes.len() as u64 != wanted || told.as_bytes() != &bytes[content..] {
+        let shown = sha256_of_bytes(&bytes[..content]);
+        if bytes.len() as u64 != wanted || shown.as_bytes() != &bytes[content..] {
             return Err(damaged());
         }
         let (head, mut rest) = bytes[BEFORE..content].split_at(head as usize);

@@ -47,16 +47,16 @@ pub struct FrictionGiven {
 
 /// Sections of a robot file by which rows differ.
 fn sections(file: &RobotFile) -> BTreeMap<String, String> {
-    let told = |name: &str, text: serde_json::Result<String>| {
+    let shown = |name: &str, text: serde_json::Result<String>| {
         let text = text.unwrap_or_default();
         (name.to_owned(), Provenance::of_text(name, &text).sha256)
     };
     BTreeMap::from([
-        told("robot", serde_json::to_string(&file.robot)),
-        told("friction", serde_json::to_string(&file.friction)),
-        told("log", serde_json::to_string(&file.log)),
-        told("filter", serde_json::to_string(&file.filter)),
-        told("noise", serde_json::to_string(&file.noise)),
+        shown("robot", serde_json::to_string(&file.robot)),
+        shown("friction", serde_json::to_string(&file.friction)),
+        shown("log", serde_json::to_string(&file.log)),
+        shown("filter", serde_json::to_string(&file.filter)),
+        shown("noise", serde_json::to_string(&file.noise)),
     ])
 }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::cases::Case;
-use super::faults::{Fault, Given, told};
+use super::faults::{Fault, Given, shown};
 use super::fit::{Fit, rows};
 use super::machines::Machine;
 use super::names;
@@ -166,7 +166,7 @@ fn wrong(clean: &Clean, fault: &Fault, folder: &Path) -> Option<Value> {
         "distance": distance,
         "parameter": parameter,
         "status": mended.status,
-        "setup": told(&setup),
+        "setup": shown(&setup),
         "kinds": kinds,
         "said": if mended.status == 0 { String::new() } else { mended.message },
         "seconds": started.elapsed().as_secs_f64(),
@@ -287,7 +287,7 @@ impl Heard {
             .cloned()
             .collect();
         let entries = &entries[..];
-        let told = match entries {
+        let shown = match entries {
             [] => false,
             // all channels at once may be told one by one
             [entry, ..] if fault.channels() == 1 => first(entry),
@@ -312,7 +312,7 @@ impl Heard {
         });
         Self {
             named: !entries.is_empty() || snapped,
-            first: told || snapped,
+            first: shown || snapped,
             tied,
             right_joint: joint || snapped,
         }
@@ -378,8 +378,8 @@ fn row_of_clean(done: &Done, found: &Value, started: Instant) -> Value {
     json!({
         "false": in_fit + in_look > 0 || refused || !kinds.is_empty(),
         "status": done.status,
-        "setup": told(&done.document["setup"]),
-        "inspected": told(&found["setup"]),
+        "setup": shown(&done.document["setup"]),
+        "inspected": shown(&found["setup"]),
         "kinds": kinds,
         "said": if done.status == 0 { String::new() } else { done.message.clone() },
         "seconds": started.elapsed().as_secs_f64(),
