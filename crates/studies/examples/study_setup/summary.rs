@@ -48,7 +48,7 @@ impl Count {
             }
             out.matter += 1;
             out.named += usize::from(is(row, "named"));
-            out.likely += usize::from(row["sure"] == false && told(row));
+            out.likely += usize::from(row["sure"] == false && shown(row));
             out.first += usize::from(is(row, "first"));
             out.tied += usize::from(!is(row, "first") && is(row, "tied"));
             out.right_joint += usize::from(is(row, "right_joint"));
@@ -74,7 +74,7 @@ impl Count {
 }
 
 /// Whether the check of the set-up said anything of a case.
-fn told(row: &Value) -> bool {
+fn shown(row: &Value) -> bool {
     row["setup"].as_array().is_some_and(|list| !list.is_empty())
 }
 

@@ -271,7 +271,7 @@ impl Fault {
         }
     }
 
-    /// Words by which faults of the rows are told: kinds of `inspect`.
+    /// Words by which faults of the rows are shown: kinds of `inspect`.
     pub fn kinds_of_rows(&self) -> &'static [&'static str] {
         match self {
             Self::Wrap(_) => &["wrapped-encoder"],
@@ -314,10 +314,10 @@ fn exchange(machine: &Machine, logs: &mut [Table], side: Side, a: usize, b: usiz
 }
 
 /// An entry of `setup` in a few words, for the list of misses.
-pub fn told(setup: &Value) -> Vec<Value> {
+pub fn shown(setup: &Value) -> Vec<Value> {
     let short = |entry: &Value| {
         let tied: Vec<String> = entries(&entry["tied_with"]).iter().map(words).collect();
-        json!({"told": words(entry), "sure": entry["sure"], "tied": tied})
+        json!({"shown": words(entry), "sure": entry["sure"], "tied": tied})
     };
     entries(setup).iter().map(short).collect()
 }
