@@ -317,7 +317,7 @@ fn exchange(machine: &Machine, logs: &mut [Table], side: Side, a: usize, b: usiz
 pub fn shown(setup: &Value) -> Vec<Value> {
     let short = |entry: &Value| {
         let tied: Vec<String> = entries(&entry["tied_with"]).iter().map(words).collect();
-        json!({"shown": words(entry), "sure": entry["sure"], "tied": tied})
+        json!({"told": words(entry), "sure": entry["sure"], "tied": tied})
     };
     entries(setup).iter().map(short).collect()
 }
