@@ -34,38 +34,60 @@ pub struct QuietSample<'a> {
     pub variance: &'a [f64],
 }
 
-/// External torques of a robot that nothing touched, the samples one behind the other.
+/// External torques of a robot that nothing touched, the samples one behind the other. There are hundreds of thousands
+/// of them, and seven digits are more than their quantiles have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Quiet {
-    times: Vec<(f64, bool)>,
+    /// Time since the sample before \[s\], infinite where none goes before.
+    gaps: Vec<f64>,
     /// External torques, speeds and variances of each sample.
-    numbers: Vec<f64>,
+    numbers: Vec<f32>,
+    /// Time of the last sample \[s\].
+    last: f64,
     /// From one to the next \[s\].
     pub step_s: f64,
 }
 
+/// A sample that was kept.
+#[derive(Debug, Clone, Copy)]
+struct Kept<'a> {
+    gap: f64,
+    numbers: &'a [f32],
+}
+
+impl Kept<'_> {
+    fn external(&self, j: usize) -> f64 {
+        f64::from(self.numbers[j])
+    }
+
+    fn speed(&self, j: usize) -> f64 {
+        f64::from(self.numbers[self.numbers.len() / 3 + j])
+    }
+
+    fn variance(&self, j: usize) -> f64 {
+        f64::from(self.numbers[2 * self.numbers.len() / 3 + j])
+    }
+}
+
 impl Quiet {
     pub fn push(&mut self, sample: QuietSample) {
-        self.times.push((sample.t, sample.begins));
+        self.gaps.push(match sample.begins {
+            true => f64::INFINITY,
+            false => sample.t - self.last,
+        });
+        self.last = sample.t;
         for numbers in [sample.external, sample.speed, sample.variance] {
-            self.numbers.extend_from_slice(numbers);
+            self.numbers.extend(numbers.iter().map(|x| *x as f32));
         }
     }
 
-    fn samples(&self) -> impl Iterator<Item = QuietSample<'_>> + Clone {
-        let width = self.numbers.len() / self.times.len().max(1);
+    fn samples(&self) -> impl Iterator<Item = Kept<'_>> + Clone {
+        let width = self.numbers.len() / self.gaps.len().max(1);
         let rows = self.numbers.chunks_exact(width.max(1));
-        self.times.iter().zip(rows).map(move |((t, begins), row)| {
-            let (external, rest) = row.split_at(width / 3);
-            let (speed, variance) = rest.split_at(width / 3);
-            QuietSample {
-                t: *t,
-                begins: *begins,
-                external,
-                speed,
-                variance,
-            }
-        })
+        self.gaps
+            .iter()
+            .zip(rows)
+            .map(|(gap, numbers)| Kept { gap: *gap, numbers })
     }
 
     /// Completes what was held out with deviations of external torques, and returns their excesses; none where there
@@ -76,20 +98,20 @@ impl Quiet {
         cutoff_hz: f64,
         position_cutoff_hz: f64,
     ) -> Option<Excesses> {
-        if self.times.len() < MIN_SAMPLES {
+        if self.gaps.len() < MIN_SAMPLES {
             return None;
         }
         for (j, held) in held.iter_mut().enumerate() {
             let squares = |range: Option<usize>| {
-                let own = |s: &QuietSample| {
-                    let of = |edge: &&f64| s.speed[j] > **edge;
+                let own = |s: &Kept| {
+                    let of = |edge: &&f64| s.speed(j) > **edge;
                     let at = held.speed_edges.iter().take_while(of).count();
                     range.is_none_or(|range| range == at)
                 };
                 let chosen = self.samples().filter(own);
                 let (sum, own, count) = chosen.fold((0.0, 0.0, 0usize), |(sum, own, n), s| {
-                    let square = s.external[j] * s.external[j];
-                    (sum + square, own + square - s.variance[j], n + 1)
+                    let square = s.external(j) * s.external(j);
+                    (sum + square, own + square - s.variance(j), n + 1)
                 });
                 // what the parameters' deviation leaves, of which something always is there
                 (own.max(LEFT * sum), count)
@@ -102,14 +124,14 @@ impl Quiet {
             });
             held.external_std = each.collect();
             let share =
-                |s: QuietSample| s.external[j].abs() / held.external_std(s.speed[j], s.variance[j]);
+                |s: Kept| s.external(j).abs() / held.external_std(s.speed(j), s.variance(j));
             let mut shares: Vec<f64> = self.samples().map(share).collect();
             held.external_99 = quantile(&mut shares, 0.99).max(f64::MIN_POSITIVE);
         }
-        let greatest = |s: QuietSample| {
+        let greatest = |s: Kept| {
             let each = held.iter().enumerate().map(|(j, held)| {
-                s.external[j].abs()
-                    / (held.external_std(s.speed[j], s.variance[j]) * held.external_99)
+                s.external(j).abs()
+                    / (held.external_std(s.speed(j), s.variance(j)) * held.external_99)
             });
             each.fold(0.0, f64::max)
         };
@@ -132,7 +154,7 @@ impl Quiet {
         }
         let (scale, shape) = pareto(peaks.iter().map(|peak| peak - level).collect());
         Some(Excesses {
-            observed_s: self.times.len() as f64 * self.step_s,
+            observed_s: self.gaps.len() as f64 * self.step_s,
             position_cutoff_hz,
             level: *level,
             clusters: peaks.len() as u64,
@@ -145,19 +167,17 @@ impl Quiet {
     /// The greatest size of each cluster beyond a level.
     fn peaks(&self, sizes: &[f64], level: f64, hold_s: f64) -> Vec<f64> {
         let mut peaks: Vec<f64> = Vec::new();
-        let mut last = f64::NEG_INFINITY;
+        let mut since = f64::INFINITY;
         for (s, size) in self.samples().zip(sizes) {
-            if s.begins {
-                last = f64::NEG_INFINITY;
-            }
+            since += s.gap;
             if *size <= level {
                 continue;
             }
             match peaks.last_mut() {
-                Some(peak) if s.t - last <= hold_s => *peak = peak.max(*size),
+                Some(peak) if since <= hold_s => *peak = peak.max(*size),
                 _ => peaks.push(*size),
             }
-            last = s.t;
+            since = 0.0;
         }
         peaks
     }
