@@ -466,3 +466,6 @@ impl<'a> Reconstruction<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

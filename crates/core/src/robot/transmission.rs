@@ -249,3 +249,33 @@ impl Transmission {
 fn four(x: &[f64]) -> &[f64; 4] {
     x.try_into().expect("the pantograph moves four joints")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_the_encoders_are_seen_at_the_joints_through_the_pose() {
+        let drive = Transmission::pantograph(Setup::default());
+        let q = [0.35, 0.2, 0.9, 0.8];
+        let x = pantograph::cartesian(&q);
+        // each coordinate by itself moved to and fro by its step
+        let slopes = [0, 1, 2, 3].map(|k| {
+            let h = ENCODER_SCALE[k];
+            let at = |by: f64| {
+                let mut moved = x;
+                moved[k] += by;
+                pantograph::joints(&moved).unwrap()
+            };
+            let (above, below) = (at(h), at(-h));
+            [0, 1, 2, 3].map(|i| (above[i] - below[i]) / (2.0 * h))
+        });
+        for i in 0..4 {
+            let of = |k: usize| (slopes[k][i] * ENCODER_SCALE[k]).powi(2) / 12.0;
+            let wanted: f64 = (0..4).map(of).sum();
+            let found = drive.encoder_variance(i, &q).unwrap();
+            assert!((found / wanted - 1.0).abs() < 1e-6, "{i}: {found} {wanted}");
+        }
+        assert_eq!(Transmission::default().encoder_variance(0, &q), None);
+    }
+}
