@@ -3,6 +3,8 @@
 //! Rows are taken from the file when the first reader asks for them, and kept: in memory up to
 //! [`IN_MEMORY`], beyond that in one temporary file, of which a reader holds a chunk at a time.
 
+mod chunk;
+
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -10,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::time::SystemTime;
 
+use self::chunk::{Chunk, ROW_BYTES};
 use super::columns::position_of;
 use super::content::RawBytes;
 use super::held_files::{HeldFiles, lock};
@@ -17,7 +20,7 @@ use super::layout::Layout;
 use super::open::{Opened, open};
 use super::rows::{LogRows, Strictness};
 use super::source;
-use super::time::{Instant, Stamped};
+use super::time::Stamped;
 use super::{Block, LogError};
 
 /// Rows of a chunk, fewer where they are wide.
@@ -86,18 +89,6 @@ fn states(files: &[PathBuf]) -> States {
         Some((about.len(), about.modified().ok()?))
     };
     files.iter().map(state).collect()
-}
-
-/// Some consecutive rows.
-#[derive(Debug, Default, Clone, PartialEq)]
-struct Chunk {
-    stamps: Vec<Stamped>,
-    /// Line or message number of each row.
-    numbers: Vec<u64>,
-    /// Whether a row equals the one before it, and whether one of its channels cannot be used.
-    flags: Vec<(bool, bool)>,
-    /// Positions, torques and velocities of each row [SI].
-    values: Vec<f64>,
 }
 
 /// Rows that are kept, whose source hands out more.
@@ -383,54 +374,6 @@ impl Inner {
         file.seek(SeekFrom::Start(at))?;
         file.read_exact(&mut bytes)?;
         Ok(Chunk::of(&bytes, width))
-    }
-}
-
-/// Bytes of a row beside its values: kind and number of its stamp, its own number, its flags.
-const ROW_BYTES: usize = 1 + 16 + 8 + 1;
-
-impl Chunk {
-    fn bytes(&self) -> usize {
-        let row = size_of::<Stamped>() + size_of::<u64>() + size_of::<(bool, bool)>();
-        self.stamps.len() * row + 8 * self.values.len()
-    }
-
-    fn written(&self) -> Vec<u8> {
-        let rows = self.stamps.len();
-        let width = self.values.len() / rows.max(1);
-        let mut out = Vec::with_capacity(rows * (ROW_BYTES + 8 * width));
-        for row in 0..rows {
-            let (kind, stamp) = match self.stamps[row] {
-                Stamped::Seconds(t) => (0, i128::from(t.to_bits())),
-                Stamped::Exact(instant) => (1, instant.femtoseconds()),
-            };
-            out.push(kind);
-            out.extend(stamp.to_le_bytes());
-            out.extend(self.numbers[row].to_le_bytes());
-            let (repeats, bad) = self.flags[row];
-            out.push(u8::from(repeats) | u8::from(bad) << 1);
-            for value in &self.values[row * width..(row + 1) * width] {
-                out.extend(value.to_le_bytes());
-            }
-        }
-        out
-    }
-
-    fn of(bytes: &[u8], width: usize) -> Self {
-        let mut chunk = Self::default();
-        let number = |bytes: &[u8]| u64::from_le_bytes(std::array::from_fn(|k| bytes[k]));
-        for row in bytes.chunks_exact(ROW_BYTES + 8 * width) {
-            let stamp = i128::from_le_bytes(std::array::from_fn(|k| row[1 + k]));
-            chunk.stamps.push(match row[0] {
-                0 => Stamped::Seconds(f64::from_bits(stamp as u64)),
-                _ => Stamped::Exact(Instant::of_femtoseconds(stamp)),
-            });
-            chunk.numbers.push(number(&row[17..]));
-            chunk.flags.push((row[25] & 1 != 0, row[25] & 2 != 0));
-            let values = row[ROW_BYTES..].chunks_exact(8);
-            (chunk.values).extend(values.map(|value| f64::from_bits(number(value))));
-        }
-        chunk
     }
 }
 

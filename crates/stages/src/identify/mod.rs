@@ -44,6 +44,7 @@ mod known_friction;
 mod log;
 mod logged_robot;
 mod lsq;
+mod lsq_warnings;
 mod model;
 mod motion_fit;
 mod next_motion;
