@@ -104,14 +104,8 @@ impl<'a> BlocksLeftOut<'a> {
         let own = terms.own_of_all();
         let mut without = Vec::new();
         for (b, block) in sums.blocks.iter().enumerate() {
-            let mut others = all.clone();
-            if b < fitted {
-                terms.add_normal(&own, block, -1.0, &mut others);
-            }
-            let (mut normal, mut side) = others;
-            terms.firm(&mut normal, &mut side, &diagonal);
-            let factor = normal.cholesky()?;
-            let values = factor.solve(&side);
+            let times = if b < fitted { -1.0 } else { 0.0 };
+            let (factor, values) = fit_without(terms, &all, (&own, block, times), &diagonal)?;
             let pull = (0..total.len())
                 .map(|j| pull(&block[j], &own[j], &values))
                 .collect();
@@ -246,6 +240,76 @@ impl<'a> BlocksLeftOut<'a> {
         let right = &all.right - all.with.tr_mul(&factor.solve(&right));
         bounded::solve(&own, &right, &bounds)
     }
+}
+
+/// Errors of blocks by fits without them, and by the fit to all.
+pub struct LeftOut {
+    /// Squared errors of each block by the fit of the others, `[block][joint]`.
+    pub errors: Vec<Vec<f64>>,
+    /// Values of the terms by all blocks.
+    pub values: DVector<f64>,
+    /// The same without each block.
+    pub without: Vec<DVector<f64>>,
+}
+
+impl LeftOut {
+    /// Of blocks whose sum is `total`; none where these data determine nothing, or where the weighted error is surely above
+    /// `most`. The fit to all leaves no more of a block than the fit without it: it shows early what is above.
+    pub fn up_to(
+        total: &[DMatrix<f64>],
+        blocks: impl Iterator<Item = Vec<DMatrix<f64>>>,
+        terms: &Terms,
+        most: f64,
+    ) -> Option<Self> {
+        let all = terms.normal(total);
+        let diagonal: Vec<f64> = all.0.diagonal().iter().map(|x| x.max(1e-300)).collect();
+        let own = terms.own_of_all();
+        let fit = terms.fit(total, &[]);
+        let weigh = |squares: &[f64]| weighted(&[squares.to_vec()], &terms.weights);
+        // a fit that found nothing bounds nothing; sums of products hold half of a number's digits of an error
+        let found = fit.values.iter().any(|x| *x != 0.0);
+        let rounding = f64::EPSILON.sqrt();
+        let above = |least: f64| found && least > most * (1.0 + rounding) + rounding;
+        let mut to_come = weigh(&fit.squares);
+        if above(to_come) {
+            return None;
+        }
+        let mut out = Self {
+            errors: Vec::new(),
+            values: fit.values,
+            without: Vec::new(),
+        };
+        let mut so_far = 0.0;
+        for block in blocks {
+            let fitted = terms.squares(&block, &out.values);
+            let (_, values) = fit_without(terms, &all, (&own, &block, -1.0), &diagonal)?;
+            let errors = terms.squares(&block, &values);
+            so_far += weigh(&errors);
+            to_come -= weigh(&fitted);
+            if above(so_far + to_come) {
+                return None;
+            }
+            out.errors.push(errors);
+            out.without.push(values);
+        }
+        Some(out)
+    }
+}
+
+/// The factor and the values of the terms when a block is counted so many times more.
+fn fit_without(
+    terms: &Terms,
+    all: &(DMatrix<f64>, DVector<f64>),
+    (own, block, times): (&[Vec<(usize, usize)>], &[DMatrix<f64>], f64),
+    diagonal: &[f64],
+) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+    let mut others = all.clone();
+    terms.add_normal(own, block, times, &mut others);
+    let (mut normal, mut side) = others;
+    terms.firm(&mut normal, &mut side, diagonal);
+    let factor = normal.cholesky()?;
+    let values = factor.solve(&side);
+    Some((factor, values))
 }
 
 /// What is left to pull each of a joint's terms in some rows.

@@ -139,16 +139,29 @@ fn best(
     free: Free,
     (few, whole): (&Trial, &Trial),
 ) -> Option<SetupEstimate> {
-    let at = |x: f64, every: usize, same: &Trial| {
+    let at = |x: f64, least: f64| {
         let change = free.change(problem, x);
-        Trial::new(problem, (base, Some(&change)), every, Some(same))
+        Trial::new(problem, (base, Some(&change)), (problem.few(), least), Some(few))
     };
     let [low, high] = free.range();
     let count = ((high - low) / STEP).ceil();
     let grid = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
-    let (mut x, found) = grid
-        .filter_map(|x| Some((x, at(x, problem.few(), few)?)))
-        .min_by(|a, b| a.1.whole().total_cmp(&b.1.whole()))?;
+    let mut grid: Vec<f64> = grid.collect();
+    // what is near the declared set-up bounds what is far from it
+    grid.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let mut best: Option<(f64, Trial)> = None;
+    for x in grid {
+        let least = best.as_ref().map_or(f64::INFINITY, |(_, b)| b.whole());
+        let better = |trial: &Trial| match &best {
+            Some((first, _)) if trial.whole() == least => x < *first,
+            _ => trial.whole() < least,
+        };
+        let trial = at(x, least);
+        if let Some(trial) = trial.filter(better) {
+            best = Some((x, trial));
+        }
+    }
+    let (mut x, found) = best?;
     let own: Vec<usize> = free
         .joint()
         .map_or_else(|| problem.channels_that_move(), |j| vec![j]);
@@ -159,9 +172,9 @@ fn best(
     }
     let (mut std, mut h) = (0.0, 0.2 * STEP);
     for _ in 0..STEPS {
-        let of = |x: f64| -> Option<Vec<f64>> {
-            let fitted = at(x, 1, whole)?.fitted;
-            Some(fitted.iter().map(|block| block.iter().sum()).collect())
+        let of = |x: f64| {
+            let change = free.change(problem, x);
+            Trial::fitted(problem, (base, Some(&change)), whole)
         };
         let (below, here, above) = (of(x - h)?, of(x)?, of(x + h)?);
         let scores = below.iter().zip(&above).map(|(b, a)| (a - b) / (2.0 * h));

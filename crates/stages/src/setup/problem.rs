@@ -41,6 +41,8 @@ pub struct Problem<'a> {
 /// Sums of products by block and joint: the joint's inertial parameters, its own terms, the torque of each channel.
 pub(super) struct Rows {
     pub blocks: Vec<Vec<DMatrix<f64>>>,
+    /// Their sum.
+    pub total: Vec<DMatrix<f64>>,
     pub terms: Vec<Term>,
     /// Rows that are poses of the robot.
     pub count: usize,
@@ -195,11 +197,20 @@ impl<'a> Problem<'a> {
             }
         };
         (good > 0 && 2 * good >= all).then(|| Rows {
+            total: sum(&out),
             blocks: out,
             terms: (0..self.first_own(robot, n)).map(term).collect(),
             count: good,
         })
     }
+}
+
+fn sum(blocks: &[Vec<DMatrix<f64>>]) -> Vec<DMatrix<f64>> {
+    let mut total = blocks.first().cloned().unwrap_or_default();
+    for block in blocks.iter().skip(1) {
+        total.iter_mut().zip(block).for_each(|(t, x)| *t += x);
+    }
+    total
 }
 
 /// The column of a joint's own term in a row.

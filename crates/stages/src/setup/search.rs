@@ -1,5 +1,7 @@
 //! Which mistake is reported, if any: refused is the absurd that one mistake explains and no other does.
 
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 
 use super::LIMITS;
@@ -112,7 +114,7 @@ impl Look<'_> {
         change: Option<&Change>,
         same: Option<&Trial>,
     ) -> Option<Judged> {
-        let trial = Trial::new(self.problem, (base, change), 1, same)?;
+        let trial = Trial::new(self.problem, (base, change), (1, f64::INFINITY), same)?;
         let broken = Broken::of(self.problem, &trial);
         Some(Judged { trial, broken })
     }
@@ -122,10 +124,12 @@ impl Look<'_> {
         base: &Correction,
         change: Option<&Change>,
         same: Option<&Trial>,
+        most: f64,
     ) -> Option<Trial> {
+        let rows = (self.problem.few(), most);
         match (self.stopped)() {
             true => None,
-            false => Trial::new(self.problem, (base, change), self.problem.few(), same),
+            false => Trial::new(self.problem, (base, change), rows, same),
         }
     }
 
@@ -140,7 +144,7 @@ impl Look<'_> {
         if doubt.is_empty() && turned == 0 {
             return (None, None);
         }
-        let few = self.quick(base, None, None);
+        let few = self.quick(base, None, None, f64::INFINITY);
         let all = hypotheses::all(self.problem);
         let mut list = self.judged(base, all, (few.as_ref(), declared));
         let mut fitted: Option<(SetupEstimate, Trial)> = None;
@@ -206,17 +210,23 @@ impl Look<'_> {
         list: Vec<Change>,
         (few, declared): (Option<&Trial>, Option<&Judged>),
     ) -> Vec<Judged> {
-        let score = |change: &Change| Some(self.quick(base, Some(change), few)?.whole());
-        let scores: Vec<f64> = (list.par_iter())
-            .map(|change| score(change).unwrap_or(f64::INFINITY))
-            .collect();
-        let mut order: Vec<usize> = (0..list.len()).filter(|i| scores[*i].is_finite()).collect();
-        order.sort_by(|a, b| scores[*a].total_cmp(&scores[*b]));
         let turned = declared.map_or(&[][..], |d| &d.broken.turned);
         let turns = |i: &usize| match &list[*i] {
             Change::Scale(_, joints, -1.0) => joints.iter().any(|j| turned.contains(j)),
             _ => false,
         };
+        let best = Mutex::new(Vec::new());
+        let score = |i: usize| {
+            // what is surely above the best so far is none of them
+            let most = if turns(&i) { f64::INFINITY } else { last_of(&best) };
+            let trial = self.quick(base, Some(&list[i]), few, most);
+            let score = trial.map_or(f64::INFINITY, |trial| trial.whole());
+            keep(&best, score);
+            score
+        };
+        let scores: Vec<f64> = (0..list.len()).into_par_iter().map(score).collect();
+        let mut order: Vec<usize> = (0..list.len()).filter(|i| scores[*i].is_finite()).collect();
+        order.sort_by(|a, b| scores[*a].total_cmp(&scores[*b]));
         let (best, rest) = order.split_at(LIMITS.short_list.min(order.len()));
         let mut chosen: Vec<usize> = best.to_vec();
         chosen.extend(rest.iter().copied().filter(turns));
@@ -251,7 +261,7 @@ impl Look<'_> {
         let same = declared.map(|d| &d.trial);
         let far = |by: f64| {
             let other = trial.change.as_ref().and_then(|c| c.times(by));
-            let other = other.and_then(|c| Trial::new(self.problem, (base, Some(&c)), 1, same));
+            let other = other.and_then(|c| Trial::new(self.problem, (base, Some(&c)), (1, f64::INFINITY), same));
             other.is_none_or(|other| other.square(&seen) > LIMITS.far * trial.square(&seen))
         };
         far(LIMITS.yardstick) && far(LIMITS.yardstick.recip())
@@ -486,6 +496,20 @@ impl Look<'_> {
         let harms = Compared::of(self.problem, declared, &none).harms;
         (fewer && sound && !harms).then(|| [declared.errors(), none.errors()])
     }
+}
+
+/// The error that a hypothesis may have and still be on the short list.
+fn last_of(best: &Mutex<Vec<f64>>) -> f64 {
+    let best = best.lock().unwrap_or_else(PoisonError::into_inner);
+    let last = best.get(LIMITS.short_list - 1);
+    last.copied().unwrap_or(f64::INFINITY)
+}
+
+fn keep(best: &Mutex<Vec<f64>>, score: f64) {
+    let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
+    let at = best.partition_point(|other| *other <= score);
+    best.insert(at, score);
+    best.truncate(LIMITS.short_list);
 }
 
 /// Whether the joints of a change gain by it themselves: each mistake of it shows where it was made.

@@ -9,7 +9,7 @@ use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::problem::{Problem, Rows};
 use cft_ident_core::judge::{
-    BlockSums, BlocksLeftOut, ErrorGain, NUMBERS, Terms, agreement_on_share, compare,
+    ErrorGain, LeftOut, NUMBERS, Terms, agreement_on_share, compare,
 };
 use cft_ident_core::robot::Robot;
 
@@ -30,14 +30,20 @@ pub(super) struct Trial {
     pub without: Vec<DVector<f64>>,
     /// Squared errors of blocks that were left out, over the joint's squared torque, `[block][joint]`.
     left_out: Vec<Vec<f64>>,
-    /// The same by the fit to all blocks.
-    pub fitted: Vec<Vec<f64>>,
 }
 
-impl Trial {
-    /// Fits a change upon `base` to every so many rows. `same` is a trial of these rows at `base`, whose columns serve
-    /// where only torques change. None where most rows belong to no pose.
-    pub fn new(
+/// Sums of products as a hypothesis has them, and the terms that are fitted to them.
+struct Mixed {
+    by: Correction,
+    robot: Robot,
+    rows: Arc<Rows>,
+    mix: Vec<DVector<f64>>,
+    terms: Terms,
+    total: Vec<DMatrix<f64>>,
+}
+
+impl Mixed {
+    fn new(
         problem: &Problem,
         (base, change): (&Correction, Option<&Change>),
         every: usize,
@@ -55,13 +61,7 @@ impl Trial {
             }
         };
         let mix = problem.channels.mix(&by);
-        let of_joint = |(j, gram): (usize, &DMatrix<f64>)| mixed(gram, &mix[j]);
-        let of_block = |block: &Vec<DMatrix<f64>>| block.iter().enumerate().map(of_joint).collect();
-        let sums = BlockSums {
-            blocks: rows.blocks.iter().map(of_block).collect(),
-            rows: Vec::new(),
-        };
-        let total = sums.over(0..sums.blocks.len());
+        let total = mixed(&rows.total, &mix);
         let weight = |(j, m): (usize, &DMatrix<f64>)| {
             let power = m[(m.nrows() - 1, m.nrows() - 1)];
             let counts = problem.moving()[j] && power > 0.0;
@@ -73,19 +73,41 @@ impl Trial {
             prior: (DMatrix::zeros(0, 0), DVector::zeros(0)),
             ridge: NUMBERS.ridge,
         };
-        let left_out = BlocksLeftOut::new(&sums, 0, &terms)?;
-        let shares = |squares: Vec<f64>| -> Vec<f64> {
-            squares
-                .iter()
-                .zip(&terms.weights)
-                .map(|(s, w)| s * w)
-                .collect()
-        };
-        let errors: Vec<Vec<f64>> = left_out.errors().into_iter().map(shares).collect();
-        let without = left_out.values().cloned().collect();
-        let theta = terms.fit(&total, &[]).values;
-        let fitted = (sums.blocks.iter()).map(|block| shares(terms.squares(block, &theta)));
-        let fitted = fitted.collect();
+        Some(Self {
+            by,
+            robot,
+            rows,
+            mix,
+            terms,
+            total,
+        })
+    }
+}
+
+impl Trial {
+    /// Fits a change upon `base` to every so many rows. `same` is a trial of these rows at `base`, whose columns serve
+    /// where only torques change. None where most rows belong to no pose, or the whole error is surely above `most`.
+    pub fn new(
+        problem: &Problem,
+        (base, change): (&Correction, Option<&Change>),
+        (every, most): (usize, f64),
+        same: Option<&Trial>,
+    ) -> Option<Self> {
+        let Mixed {
+            by,
+            robot,
+            rows,
+            mix,
+            terms,
+            total,
+        } = Mixed::new(problem, (base, change), every, same)?;
+        let blocks = rows.blocks.iter().map(|block| mixed(block, &mix));
+        let left_out = LeftOut::up_to(&total, blocks, &terms, most)?;
+        let mut errors = left_out.errors;
+        for squares in &mut errors {
+            let pairs = squares.iter_mut().zip(&terms.weights);
+            pairs.for_each(|(s, w)| *s *= w);
+        }
         errors
             .iter()
             .flatten()
@@ -97,11 +119,26 @@ impl Trial {
                 rows,
                 terms,
                 total,
-                theta,
-                without,
+                theta: left_out.values,
+                without: left_out.without,
                 left_out: errors,
-                fitted,
             })
+    }
+
+    /// Errors of each block by the fit of a change to all rows, all joints together.
+    pub fn fitted(
+        problem: &Problem,
+        change: (&Correction, Option<&Change>),
+        same: &Trial,
+    ) -> Option<Vec<f64>> {
+        let all = Mixed::new(problem, change, 1, Some(same))?;
+        let theta = all.terms.fit(&all.total, &[]).values;
+        let of_block = |block: &Vec<DMatrix<f64>>| -> f64 {
+            let squares = all.terms.squares(&mixed(block, &all.mix), &theta);
+            let shares = squares.iter().zip(&all.terms.weights);
+            shares.map(|(s, w)| s * w).sum()
+        };
+        Some(all.rows.blocks.iter().map(of_block).collect())
     }
 
     /// Error of each joint in blocks left out, a share of its torque.
@@ -170,14 +207,18 @@ impl Compared {
     }
 }
 
-fn mixed(gram: &DMatrix<f64>, mix: &DVector<f64>) -> DMatrix<f64> {
-    let c = gram.nrows() - mix.len();
-    let mut out = DMatrix::zeros(c + 1, c + 1);
-    out.view_mut((0, 0), (c, c))
-        .copy_from(&gram.view((0, 0), (c, c)));
-    let across = gram.view((0, c), (c, mix.len())) * mix;
-    out.view_mut((0, c), (c, 1)).copy_from(&across);
-    out.view_mut((c, 0), (1, c)).copy_from(&across.transpose());
-    out[(c, c)] = mix.dot(&(gram.view((c, c), (mix.len(), mix.len())) * mix));
-    out
+/// Sums of products of each joint with the torque of its channels in one column.
+fn mixed(grams: &[DMatrix<f64>], mix: &[DVector<f64>]) -> Vec<DMatrix<f64>> {
+    let of_joint = |(gram, mix): (&DMatrix<f64>, &DVector<f64>)| {
+        let c = gram.nrows() - mix.len();
+        let mut out = DMatrix::zeros(c + 1, c + 1);
+        out.view_mut((0, 0), (c, c))
+            .copy_from(&gram.view((0, 0), (c, c)));
+        let across = gram.view((0, c), (c, mix.len())) * mix;
+        out.view_mut((0, c), (c, 1)).copy_from(&across);
+        out.view_mut((c, 0), (1, c)).copy_from(&across.transpose());
+        out[(c, c)] = mix.dot(&(gram.view((c, c), (mix.len(), mix.len())) * mix));
+        out
+    };
+    grams.iter().zip(mix).map(of_joint).collect()
 }
