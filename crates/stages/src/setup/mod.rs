@@ -25,11 +25,13 @@
 //! | `weight` | the masses of the robot file as a yardstick of its torques |
 //! | `undecided` | why data cannot tell |
 //! | `search` | all of it |
+//! | `found` | what it comes to |
 
 mod channels;
 mod correction;
 mod estimate;
 mod finding;
+mod found;
 mod hypotheses;
 mod physics;
 mod problem;
@@ -46,10 +48,11 @@ pub use finding::{
     Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, Setting,
     SetupErrors, SetupReport,
 };
+pub use found::{Found, Searched};
 pub use physics::Driven;
 pub use problem::{KnownBeforehand, Problem};
 pub use sample::{Sample, Thinner};
-pub use search::{Found, Searched, search};
+pub use search::search;
 pub use undecided::{Cause, Undecided};
 pub use weight::{Weight, WeightGain};
 

@@ -9,49 +9,14 @@ use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::estimate::{SetupEstimate, estimates};
 use super::finding::ChannelKind::Torque;
+use super::found::{Found, Searched};
 use super::hypotheses::{self, oddity};
-use super::physics::{Broken, Driven};
+use super::physics::Broken;
 use super::problem::Problem;
 use super::trial::{Compared, Trial};
-use super::undecided::{Undecided, proportion, undecided};
-use super::weight::{Weight, weights};
+use super::undecided::{proportion, undecided};
+use super::weight::weights;
 use cft_ident_core::judge::NUMBERS;
-
-/// A mistake, with the errors of every joint on blocks left out.
-#[derive(Debug, Clone)]
-pub struct Found {
-    pub change: Change,
-    /// As declared, and put right; not finite where the declared positions belong to no pose.
-    pub errors: [Vec<f64>; 2],
-    /// Beyond doubt: a fit refuses the logs.
-    pub sure: bool,
-    /// Readings that fit alike are of other joints: these data cannot tell.
-    pub open: bool,
-    /// Other readings that these data do not distinguish from it.
-    pub tied: Vec<Change>,
-    /// Joints of them that move in proportion.
-    pub together: Option<[usize; 2]>,
-    /// Joints that are beyond the limits of the file as declared, where that is what shows it.
-    pub beyond_limits: Vec<usize>,
-}
-
-/// What a search found.
-#[derive(Debug, Clone, Default)]
-pub struct Searched {
-    pub found: Vec<Found>,
-    /// All that is sure, together.
-    pub correction: Option<Correction>,
-    /// Joints whose friction drives them, where no mistake explains it.
-    pub driven: Vec<Driven>,
-    /// A value that is on no list, with the errors as declared and with it.
-    pub estimate: Option<(SetupEstimate, [Vec<f64>; 2])>,
-    /// Errors with gravity and without, where the torques hold none.
-    pub without_gravity: Option<[Vec<f64>; 2]>,
-    /// Gain of the measured weight over that of the file's own masses.
-    pub weights: Vec<Weight>,
-    /// Joints that miss much, and no mistake that repairs them.
-    pub undecided: Vec<Undecided>,
-}
 
 /// A reading with all that decides on it.
 struct Judged {
@@ -218,7 +183,11 @@ impl Look<'_> {
         let best = Mutex::new(Vec::new());
         let score = |i: usize| {
             // what is surely above the best so far is none of them
-            let most = if turns(&i) { f64::INFINITY } else { last_of(&best) };
+            let most = if turns(&i) {
+                f64::INFINITY
+            } else {
+                last_of(&best)
+            };
             let trial = self.quick(base, Some(&list[i]), few, most);
             let score = trial.map_or(f64::INFINITY, |trial| trial.whole());
             keep(&best, score);
@@ -261,7 +230,8 @@ impl Look<'_> {
         let same = declared.map(|d| &d.trial);
         let far = |by: f64| {
             let other = trial.change.as_ref().and_then(|c| c.times(by));
-            let other = other.and_then(|c| Trial::new(self.problem, (base, Some(&c)), (1, f64::INFINITY), same));
+            let other = other
+                .and_then(|c| Trial::new(self.problem, (base, Some(&c)), (1, f64::INFINITY), same));
             other.is_none_or(|other| other.square(&seen) > LIMITS.far * trial.square(&seen))
         };
         far(LIMITS.yardstick) && far(LIMITS.yardstick.recip())

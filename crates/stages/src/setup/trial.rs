@@ -8,9 +8,7 @@ use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::problem::{Problem, Rows};
-use cft_ident_core::judge::{
-    ErrorGain, LeftOut, NUMBERS, Terms, agreement_on_share, compare,
-};
+use cft_ident_core::judge::{ErrorGain, LeftOut, NUMBERS, Terms, agreement_on_share, compare};
 use cft_ident_core::robot::Robot;
 
 /// A hypothesis as it was fitted.
