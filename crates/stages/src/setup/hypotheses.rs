@@ -155,6 +155,23 @@ pub(super) fn round_numbers(side: ChannelKind, ratios: &[f64], [low, high]: [f64
     all
 }
 
+/// Whether two readings are about the same joints, or both about gravity.
+pub(super) fn same_place(a: &Change, b: &Change) -> bool {
+    let (a, b) = (a.joints(), b.joints());
+    a.is_empty() && b.is_empty() || a.iter().any(|j| b.contains(j))
+}
+
+/// Whether two readings turn the same joint: which of its channels it is, a symmetric machine does not show.
+pub(super) fn same_line(a: &Change, b: &Change) -> bool {
+    match (a, b) {
+        (Change::Scale(_, a, -1.0), Change::Scale(_, b, -1.0)) => a == b,
+        (Change::Scale(c, a, unit), Change::Scale(d, b, _)) => c == d && a == b && is_unit(*unit),
+        (Change::Scale(Torque, a, _), Change::Gear(b, _))
+        | (Change::Gear(b, _), Change::Scale(Torque, a, _)) => a.as_slice() == [*b],
+        _ => false,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

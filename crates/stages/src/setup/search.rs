@@ -8,9 +8,8 @@ use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::estimate::{SetupEstimate, estimates};
-use super::finding::ChannelKind::Torque;
 use super::found::{Found, Searched};
-use super::hypotheses::{self, oddity};
+use super::hypotheses::{self, oddity, same_line, same_place};
 use super::physics::Broken;
 use super::problem::Problem;
 use super::trial::{Compared, Trial};
@@ -489,24 +488,5 @@ fn own_gain(change: &Change, better: &[usize]) -> bool {
         Change::Exchange(_, a, b) => better.contains(a) && better.contains(b),
         Change::Reverse | Change::Gravity(_) => !better.is_empty(),
         one => one.joints().iter().all(|j| better.contains(j)),
-    }
-}
-
-/// Whether two readings are about the same joints, or both about gravity.
-fn same_place(a: &Change, b: &Change) -> bool {
-    let (a, b) = (a.joints(), b.joints());
-    a.is_empty() && b.is_empty() || a.iter().any(|j| b.contains(j))
-}
-
-/// Whether two readings turn the same joint: which of its channels it is, a symmetric machine does not show.
-fn same_line(a: &Change, b: &Change) -> bool {
-    match (a, b) {
-        (Change::Scale(_, a, -1.0), Change::Scale(_, b, -1.0)) => a == b,
-        (Change::Scale(c, a, unit), Change::Scale(d, b, _)) => {
-            c == d && a == b && hypotheses::is_unit(*unit)
-        }
-        (Change::Scale(Torque, a, _), Change::Gear(b, _))
-        | (Change::Gear(b, _), Change::Scale(Torque, a, _)) => a.as_slice() == [*b],
-        _ => false,
     }
 }
