@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::time::SystemTime;
 
-use self::chunk::{Chunk, ROW_BYTES};
+use self::chunk::{Chunk, NUMBERS, ROW_BYTES, ROWS};
 use super::columns::position_of;
 use super::content::RawBytes;
 use super::held_files::{HeldFiles, lock};
@@ -23,10 +23,6 @@ use super::source;
 use super::time::Stamped;
 use super::{Block, LogError};
 
-/// Rows of a chunk, fewer where they are wide.
-const ROWS: usize = 1024;
-/// Numbers of a chunk, but for its last row.
-const NUMBERS: usize = 1 << 15;
 /// Bytes of a log that are kept in memory.
 const IN_MEMORY: usize = 1 << 20;
 

@@ -2,6 +2,11 @@
 
 use super::super::time::{Instant, Stamped};
 
+/// Rows of a chunk, fewer where they are wide.
+pub(super) const ROWS: usize = 1024;
+/// Numbers of a chunk, but for its last row.
+pub(super) const NUMBERS: usize = 1 << 15;
+
 /// Some consecutive rows.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(super) struct Chunk {
