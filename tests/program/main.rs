@@ -65,6 +65,7 @@ mod simulate_serial;
 mod temperature;
 mod track;
 mod two_arms;
+mod version_0_2;
 mod watch;
 mod writers_readers;
 mod written_angles;
