@@ -141,7 +141,12 @@ fn best(
 ) -> Option<SetupEstimate> {
     let at = |x: f64, least: f64| {
         let change = free.change(problem, x);
-        Trial::new(problem, (base, Some(&change)), (problem.few(), least), Some(few))
+        Trial::new(
+            problem,
+            (base, Some(&change)),
+            (problem.few(), least),
+            &[few],
+        )
     };
     let [low, high] = free.range();
     let count = ((high - low) / STEP).ceil();
