@@ -51,4 +51,5 @@ def main():
     print({k: v for k, v in row.items() if k != "joints"})
 
 
-main()
+if __name__ == "__main__":
+    main()

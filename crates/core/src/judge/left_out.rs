@@ -253,11 +253,11 @@ pub struct LeftOut {
 }
 
 impl LeftOut {
-    /// Of blocks whose sum is `total`; none where these data determine nothing, or where the weighted error is surely above
-    /// `most`. The fit to all leaves no more of a block than the fit without it: it shows early what is above.
+    /// Of blocks whose sum is `total`, in this order; none where these data determine nothing, or where the weighted error is
+    /// surely above `most`. The fit to all leaves no more of a block than the fit without it: it shows early what is above.
     pub fn up_to(
         total: &[DMatrix<f64>],
-        blocks: impl Iterator<Item = Vec<DMatrix<f64>>>,
+        (order, block): (&[usize], impl Fn(usize) -> Vec<DMatrix<f64>>),
         terms: &Terms,
         most: f64,
     ) -> Option<Self> {
@@ -275,12 +275,13 @@ impl LeftOut {
             return None;
         }
         let mut out = Self {
-            errors: Vec::new(),
+            errors: vec![Vec::new(); order.len()],
             values: fit.values,
-            without: Vec::new(),
+            without: vec![DVector::zeros(0); order.len()],
         };
         let mut so_far = 0.0;
-        for block in blocks {
+        for &b in order {
+            let block = block(b);
             let fitted = terms.squares(&block, &out.values);
             let (_, values) = fit_without(terms, &all, (&own, &block, -1.0), &diagonal)?;
             let errors = terms.squares(&block, &values);
@@ -289,8 +290,8 @@ impl LeftOut {
             if above(so_far + to_come) {
                 return None;
             }
-            out.errors.push(errors);
-            out.without.push(values);
+            out.errors[b] = errors;
+            out.without[b] = values;
         }
         Some(out)
     }

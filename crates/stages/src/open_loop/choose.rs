@@ -123,63 +123,62 @@ pub fn fit_axis(
         None => doubled.take_while(|s| *s <= block_s).collect(),
     };
     let mut tried = Vec::new();
-    let (mut model, mut score) = (
-        start.clone(),
-        trial.best_length(start, &lengths, &mut tried)?,
-    );
+    let mut model = start.clone();
+    let mut chosen = trial.best_length(start, &lengths, &mut tried)?;
     loop {
         let rivals: Vec<AugmentedModel> = trial.rivals(&model);
-        let scores: Vec<Option<f64>> = rivals
+        let scores: Vec<Option<(f64, AugmentedModel)>> = rivals
             .iter()
-            .map(|rival| trial.held_out(rival, score.1))
+            .map(|rival| trial.held_out((rival, rival), chosen.length))
             .collect::<Result<_, _>>()?;
         let first = tried.len();
-        tried.extend(
-            rivals
-                .iter()
-                .zip(&scores)
-                .map(|(rival, held_out)| TriedAxis {
-                    window_s: score.1,
-                    effect: rival.effects.last().map(Added::name),
-                    held_out: *held_out,
-                    taken: false,
-                }),
-        );
-        let scores = scores.iter().enumerate();
-        let best = scores
-            .filter_map(|(i, e)| Some((i, (*e)?)))
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((i, error)) = best.filter(|(_, e)| *e < (1.0 - MIN_GAIN) * score.0) else {
+        let pairs = rivals.iter().zip(&scores);
+        tried.extend(pairs.map(|(rival, found)| TriedAxis {
+            window_s: chosen.length,
+            effect: rival.effects.last().map(Added::name),
+            held_out: found.as_ref().map(|(error, _)| *error),
+            taken: false,
+        }));
+        let found = scores.into_iter().enumerate();
+        let best = found
+            .filter_map(|(i, found)| Some((i, found?)))
+            .min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let enough = (1.0 - MIN_GAIN) * chosen.error;
+        let Some((i, (error, near))) = best.filter(|(_, (error, _))| *error < enough) else {
             break;
         };
         tried[first + i].taken = true;
         model = rivals[i].clone();
-        score = match lengths.len() {
-            1 => (error, score.1),
+        chosen = match lengths.len() {
+            1 => Chosen {
+                error,
+                length: chosen.length,
+                near,
+            },
             _ => trial.best_length(&model, &lengths, &mut tried)?,
         };
     }
     let all = trial.whole();
-    let windows = windows(stretches, &all, score.1);
+    let windows = windows(stretches, &all, chosen.length);
     let columns = trial.columns(&model);
     let fitted = trial
-        .fit(&model, &columns, (&all, score.1), true)?
+        .fit(&chosen.near, &columns, (&all, chosen.length), true)?
         .ok_or(AxisError::Astray)?;
     let of_start = |windows: &[RunSpan], positions| {
         errors(start, stretches, windows, positions).ok_or(AxisError::Astray)
     };
     let blocks: Vec<RunSpan> = (0..BLOCKS).flat_map(|b| trial.block(b)).collect();
     Ok(AxisFit {
-        window_s: score.1,
+        window_s: chosen.length,
         free: columns.free,
-        apart: apart(&windows, stretches, score.1),
+        apart: apart(&windows, stretches, chosen.length),
         before: PositionErrors {
             windows: rms(&of_start(&windows, super::fit::POSITIONS)?),
             blocks: rms(&of_start(&blocks, ALL)?),
         },
         after: PositionErrors {
             windows: fitted.rms,
-            blocks: score.0,
+            blocks: chosen.error,
         },
         windows: windows.len(),
         model: fitted.model,
@@ -188,6 +187,15 @@ pub fn fit_axis(
         steps: fitted.steps,
         tried,
     })
+}
+
+/// A length of windows.
+struct Chosen {
+    /// On blocks set aside.
+    error: f64,
+    length: f64,
+    /// The model of a fit to all.
+    near: AugmentedModel,
 }
 
 struct Trial<'a> {
@@ -246,11 +254,16 @@ impl Trial<'_> {
         Ok(fit(model, self.stretches, &windows, columns, told))
     }
 
-    /// Error on each block of a fit to the others; none where a motion goes astray.
-    fn held_out(&self, model: &AugmentedModel, length: f64) -> Result<Option<f64>, AxisError> {
+    /// Error on each block of a fit to the others, and the model of a fit to all that began at `near`; none where a motion
+    /// goes astray.
+    fn held_out(
+        &self,
+        (model, near): (&AugmentedModel, &AugmentedModel),
+        length: f64,
+    ) -> Result<Option<(f64, AugmentedModel)>, AxisError> {
         let columns = self.columns(model);
         // a start that is near saves steps, and changes no result
-        let Some(near) = self.fit(model, &columns, (&self.whole(), length), false)? else {
+        let Some(near) = self.fit(near, &columns, (&self.whole(), length), false)? else {
             return Ok(None);
         };
         let near = near.model;
@@ -261,23 +274,31 @@ impl Trial<'_> {
         };
         let found: Result<Vec<_>, AxisError> = (0..BLOCKS).into_par_iter().map(of_block).collect();
         let found: Option<Vec<Vec<f64>>> = found?.into_iter().collect();
-        Ok(found.map(|errors| rms(&errors.concat())))
+        Ok(found.map(|errors| (rms(&errors.concat()), near)))
     }
 
-    /// The least error on blocks over lengths of windows, and that length.
+    /// The least error on blocks over lengths of windows, and that length, each from the model that the one before found.
     fn best_length(
         &self,
         model: &AugmentedModel,
         lengths: &[f64],
         tried: &mut Vec<TriedAxis>,
-    ) -> Result<(f64, f64), AxisError> {
-        let mut best: Option<(f64, f64, usize)> = None;
+    ) -> Result<Chosen, AxisError> {
+        let mut best: Option<(Chosen, usize)> = None;
+        let mut near = model.clone();
         for length in lengths {
-            let held_out = self.held_out(model, *length)?;
-            if let Some(error) = held_out
-                && best.is_none_or(|(least, ..)| error < least)
-            {
-                best = Some((error, *length, tried.len()));
+            let found = self.held_out((model, &near), *length)?;
+            let held_out = found.as_ref().map(|(error, _)| *error);
+            if let Some((error, found)) = found {
+                near = found;
+                if best.as_ref().is_none_or(|(least, _)| error < least.error) {
+                    let chosen = Chosen {
+                        error,
+                        length: *length,
+                        near: near.clone(),
+                    };
+                    best = Some((chosen, tried.len()));
+                }
             }
             tried.push(TriedAxis {
                 window_s: *length,
@@ -286,9 +307,9 @@ impl Trial<'_> {
                 taken: false,
             });
         }
-        let (error, length, at) = best.ok_or(AxisError::Astray)?;
+        let (chosen, at) = best.ok_or(AxisError::Astray)?;
         tried[at].taken = true;
-        Ok((error, length))
+        Ok(chosen)
     }
 
     /// The model with one more effect: friction that is a law of speed, each from the shape that the torques determine best.

@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::abreast::{Abreast, is_of_speed};
 use super::numbers::{Columns, numbers, with_numbers};
 use super::stepper::Stepper;
 use super::windows::run;
@@ -66,11 +67,17 @@ pub(super) fn errors(
     windows: &[RunSpan],
     positions: usize,
 ) -> Option<Vec<f64>> {
+    if is_of_speed(model) {
+        let alike = windows.chunk_by(|a, b| a.0 == b.0 && a.2 - a.1 == b.2 - b.1);
+        let found =
+            alike.map(|windows| side_by_side(model, &stretches[windows[0].0], windows, positions));
+        return found.collect::<Option<Vec<_>>>().map(|all| all.concat());
+    }
     let mut out = Vec::new();
     let mut stepper: Option<(usize, Stepper)> = None;
     for &(s, begin, end) in windows {
         let stretch = &stretches[s];
-        let parts = (stretch.dt / STEP_S).ceil().max(1.0);
+        let parts = parts(stretch);
         if stepper.as_ref().is_none_or(|(of, _)| *of != s) {
             stepper = Some((s, Stepper::new(model, stretch.dt / parts)));
         }
@@ -95,6 +102,50 @@ pub(super) fn errors(
     Some(out)
 }
 
+/// Steps of a sample.
+fn parts(stretch: &Stretch) -> f64 {
+    (stretch.dt / STEP_S).ceil().max(1.0)
+}
+
+/// The same of windows of one length in one stretch, by a model whose effects are laws of speed.
+fn side_by_side(
+    model: &AugmentedModel,
+    stretch: &Stretch,
+    windows: &[RunSpan],
+    positions: usize,
+) -> Option<Vec<f64>> {
+    let size = windows[0].2 - windows[0].1;
+    let (parts, every) = (parts(stretch), every(0, size, positions));
+    let begins = windows.iter().map(|w| w.1);
+    let mut abreast = Abreast::begin(model, stretch, begins.clone(), stretch.dt / parts);
+    let (q, tau) = (&stretch.q[0], &stretch.tau[0]);
+    let mut now = vec![0.0; windows.len()];
+    let kept = (size - 1) / every + 1;
+    let mut out = vec![0.0; kept * windows.len()];
+    let mut place = 0;
+    for k in 0..size {
+        if k > 0 {
+            for part in 0..parts as usize {
+                let share = (part as f64 + 0.5) / parts;
+                for (now, begin) in now.iter_mut().zip(begins.clone()) {
+                    let (before, after) = (tau[begin + k - 1], tau[begin + k]);
+                    *now = before + share * (after - before);
+                }
+                if !abreast.step(&now) {
+                    return None;
+                }
+            }
+        }
+        if (size - 1 - k).is_multiple_of(every) {
+            for (i, (found, begin)) in abreast.positions().iter().zip(begins.clone()).enumerate() {
+                out[i * kept + place] = found - q[begin + k];
+            }
+            place += 1;
+        }
+    }
+    Some(out)
+}
+
 /// Root mean square.
 pub(super) fn rms(e: &[f64]) -> f64 {
     (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt()
@@ -108,7 +159,7 @@ pub(super) struct Fitted {
     pub rms: f64,
     pub ending: Ending,
     pub steps: usize,
-    /// Of all numbers; zero rows of what was not moved.
+    /// Of all numbers, where it is wanted; zero rows of what was not moved.
     pub covariance: DMatrix<f64>,
 }
 
@@ -172,20 +223,22 @@ pub(super) fn fit(
         if gain.is_nan() || gain <= 0.0 {
             return Ok(Trial::Rejected);
         }
-        let Some(next) = point(x, errors) else {
-            return Ok(Trial::Rejected);
-        };
-        Ok(match gain < SETTLED * before {
-            true => Trial::Last(next),
-            false => Trial::Accepted(next),
-        })
+        if gain < SETTLED * before {
+            // nearly those of the point before, and nothing moves by them any more
+            let slopes = at.slopes.clone();
+            return Ok(Trial::Last(At { x, errors, slopes }));
+        }
+        Ok(point(x, errors).map_or(Trial::Rejected, Trial::Accepted))
     });
     let Ok((mut at, ending, steps)) = found;
     // differences to both sides where deviations hang on them
     if told {
         at.slopes = slopes(&at.x, &at.errors, true)?;
     }
-    let covariance = covariance(&at, stretches, windows, free);
+    let covariance = match told {
+        true => covariance(&at, stretches, windows, free),
+        false => DMatrix::zeros(0, 0),
+    };
     Some(Fitted {
         rms: rms(at.errors.as_slice()),
         model: with_numbers(start, &at.x),

@@ -9,6 +9,7 @@
 //! [`free_run`] says how the error grows in windows, and whether a changed model runs worse. [`fit_axis`] moves the
 //! numbers of a single axis until its motion is that of the log.
 
+mod abreast;
 mod choose;
 mod fit;
 mod free_run;

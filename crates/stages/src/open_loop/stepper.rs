@@ -87,24 +87,19 @@ impl Stepper {
             model.torque(&self.q, &self.v, &self.a, &mut self.plain);
         }
         for (j, tau) in tau.iter().enumerate() {
-            let v = self.v[j];
-            self.limit[j] = 0.0;
-            let (friction, slope) = match &model.friction[j] {
-                JointFriction::None => (0.0, 0.0),
-                JointFriction::DoubleTanh(law) => (law.torque(v), law.slope(v).max(0.0)),
-                // what is proportional to the speed by the trapezoidal rule: its error falls with dt^2
-                JointFriction::ViscousCoulomb(law) if self.jumps[j] => {
-                    self.limit[j] = law.coulomb.max(0.0) * dt;
-                    (law.viscous * v, 0.5 * law.viscous.max(0.0))
-                }
-                JointFriction::ViscousCoulomb(law) => (law.torque(v), 0.5 * law.viscous.max(0.0)),
-            };
+            let of = held(&model.friction[j], self.jumps[j], self.v[j], dt);
+            self.limit[j] = of.limit;
             let added = self.with[j] - self.plain[j];
-            self.force[j] = tau - self.bias[j] - friction - model.offset[j] - added;
-            self.mass[j * n + j] += dt * slope;
+            self.force[j] = tau - self.bias[j] - of.torque - model.offset[j] - added;
+            self.mass[j * n + j] += dt * of.slope;
         }
         let found = match n {
-            1 => self.change_of_one(),
+            1 => {
+                let push = self.force[0] * dt;
+                let change = stopped_by(self.limit[0], push, self.mass[0], self.v[0]);
+                self.change[0] = change.unwrap_or(0.0);
+                change.is_some()
+            }
             _ => self.change_of_all(),
         };
         if !found {
@@ -117,19 +112,6 @@ impl Stepper {
             self.a[j] = change / dt;
         }
         self.q.iter().chain(&self.v).all(|x| x.is_finite())
-    }
-
-    /// Change of the speed of a single axis; false where it has no mass.
-    fn change_of_one(&mut self) -> bool {
-        let (mass, limit) = (self.mass[0], self.limit[0]);
-        if mass.is_nan() || mass <= 0.0 {
-            return false;
-        }
-        let free = self.force[0] * self.dt / mass;
-        // as much as stops it, where friction is as much
-        let impulse = (-(self.v[0] + free) * mass).clamp(-limit, limit);
-        self.change[0] = free + impulse / mass;
-        true
     }
 
     /// Changes of all speeds; false where the inertia matrix is none.
@@ -166,6 +148,45 @@ impl Stepper {
         self.change.copy_from_slice(change.as_slice());
         true
     }
+}
+
+/// The friction of a joint in one step.
+pub(super) struct Held {
+    pub torque: f64,
+    pub slope: f64,
+    /// Greatest impulse of friction that jumps.
+    pub limit: f64,
+}
+
+/// That of a law at a speed; `jumps` says that it holds the joint at rest.
+#[inline]
+pub(super) fn held(law: &JointFriction, jumps: bool, v: f64, dt: f64) -> Held {
+    let (torque, slope) = match law {
+        JointFriction::None => (0.0, 0.0),
+        JointFriction::DoubleTanh(law) => (law.torque(v), law.slope(v).max(0.0)),
+        // what is proportional to the speed by the trapezoidal rule: its error falls with dt^2
+        JointFriction::ViscousCoulomb(law) if jumps => {
+            (law.viscous * v, 0.5 * law.viscous.max(0.0))
+        }
+        JointFriction::ViscousCoulomb(law) => (law.torque(v), 0.5 * law.viscous.max(0.0)),
+    };
+    let limit = match law {
+        JointFriction::ViscousCoulomb(law) if jumps => law.coulomb.max(0.0) * dt,
+        _ => 0.0,
+    };
+    Held {
+        torque,
+        slope,
+        limit,
+    }
+}
+
+/// Change of the speed of a single axis that an impulse pushes: friction takes as much as stops it, up to its limit.
+#[inline]
+pub(super) fn stopped_by(limit: f64, push: f64, mass: f64, v: f64) -> Option<f64> {
+    let free = push / mass;
+    let impulse = (-(v + free) * mass).clamp(-limit, limit);
+    (mass > 0.0).then_some(free + impulse / mass)
 }
 
 #[cfg(test)]

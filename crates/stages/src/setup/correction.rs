@@ -86,6 +86,15 @@ impl Correction {
         out
     }
 
+    /// Whether positions and gravity are those of another.
+    pub(super) fn moves_as(&self, other: &Self) -> bool {
+        self.position_from == other.position_from
+            && self.position_factor == other.position_factor
+            && self.zero == other.zero
+            && self.begins == other.begins
+            && self.gravity == other.gravity
+    }
+
     fn multiply(&mut self, j: usize, of: [ChannelKind; 2], [position, torque]: [f64; 2]) {
         if of[0] != Torque {
             self.position_factor[j] *= position;

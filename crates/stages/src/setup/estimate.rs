@@ -145,7 +145,7 @@ fn best(
             problem,
             (base, Some(&change)),
             (problem.few(), least),
-            Some(few),
+            &[few],
         )
     };
     let [low, high] = free.range();

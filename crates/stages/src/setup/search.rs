@@ -78,7 +78,8 @@ impl Look<'_> {
         change: Option<&Change>,
         same: Option<&Trial>,
     ) -> Option<Judged> {
-        let trial = Trial::new(self.problem, (base, change), (1, f64::INFINITY), same)?;
+        let same: Vec<&Trial> = same.into_iter().collect();
+        let trial = Trial::new(self.problem, (base, change), (1, f64::INFINITY), &same)?;
         let broken = Broken::of(self.problem, &trial);
         Some(Judged { trial, broken })
     }
@@ -87,7 +88,7 @@ impl Look<'_> {
         &self,
         base: &Correction,
         change: Option<&Change>,
-        same: Option<&Trial>,
+        same: &[&Trial],
         most: f64,
     ) -> Option<Trial> {
         let rows = (self.problem.few(), most);
@@ -108,9 +109,9 @@ impl Look<'_> {
         if doubt.is_empty() && turned == 0 {
             return (None, None);
         }
-        let few = self.quick(base, None, None, f64::INFINITY);
+        let few = self.quick(base, None, &[], f64::INFINITY);
         let all = hypotheses::all(self.problem);
-        let mut list = self.judged(base, all, (few.as_ref(), declared));
+        let mut list = self.judged(base, all, (&few.iter().collect::<Vec<_>>(), declared));
         let mut fitted: Option<(SetupEstimate, Trial)> = None;
         if let (Some(few), Some(whole), true) = (&few, declared, moving.len() > 1) {
             let both = (few, &whole.trial);
@@ -150,8 +151,13 @@ impl Look<'_> {
             turned > 0 || errors.iter().any(|e| *e > LIMITS.unexplained)
         });
         if absurd && found.as_ref().is_none_or(|f| !f.sure) {
-            let pairs = self.pairs(&list);
-            let mut list = self.judged(base, pairs, (few.as_ref(), declared));
+            let (firsts, pairs) = self.pairs(&list);
+            let own: Vec<&Trial> = few.iter().collect();
+            let first = |c: &Change| self.quick(base, Some(c), &own, f64::INFINITY);
+            let firsts: Vec<Trial> = firsts.iter().filter_map(first).collect();
+            // a second mistake in the torques has the columns of the first
+            let same: Vec<&Trial> = few.iter().chain(&firsts).collect();
+            let mut list = self.judged(base, pairs, (&same, declared));
             let free = self.take_free(base, &mut list, declared);
             let both = self.decide(declared, &list, (None, free.as_ref()));
             found = both.filter(|f| f.sure).or(found);
@@ -172,7 +178,7 @@ impl Look<'_> {
         &self,
         base: &Correction,
         list: Vec<Change>,
-        (few, declared): (Option<&Trial>, Option<&Judged>),
+        (few, declared): (&[&Trial], Option<&Judged>),
     ) -> Vec<Judged> {
         let turned = declared.map_or(&[][..], |d| &d.broken.turned);
         let turns = |i: &usize| match &list[*i] {
@@ -226,18 +232,19 @@ impl Look<'_> {
             Some(d) => Compared::of(self.problem, &d.trial, trial).better,
             None => self.problem.channels_that_move(),
         };
-        let same = declared.map(|d| &d.trial);
+        let same: Vec<&Trial> = declared.iter().map(|d| &d.trial).collect();
         let far = |by: f64| {
             let other = trial.change.as_ref().and_then(|c| c.times(by));
-            let other = other
-                .and_then(|c| Trial::new(self.problem, (base, Some(&c)), (1, f64::INFINITY), same));
+            let other = other.and_then(|c| {
+                Trial::new(self.problem, (base, Some(&c)), (1, f64::INFINITY), &same)
+            });
             other.is_none_or(|other| other.square(&seen) > LIMITS.far * trial.square(&seen))
         };
         far(LIMITS.yardstick) && far(LIMITS.yardstick.recip())
     }
 
-    /// The best of a list each with every other hypothesis.
-    fn pairs(&self, list: &[Judged]) -> Vec<Change> {
+    /// The best of a list, and each with every other hypothesis.
+    fn pairs(&self, list: &[Judged]) -> (Vec<Change>, Vec<Change>) {
         let mut best: Vec<&Trial> = list.iter().map(|j| &j.trial).collect();
         best.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
         let firsts = best.iter().take(LIMITS.short_list / 4);
@@ -250,10 +257,9 @@ impl Look<'_> {
             let pair = |c: &Change| Change::Two(Box::new(first.clone()), Box::new(c.clone()));
             all.iter().filter(other).map(pair).collect()
         };
-        firsts
-            .filter_map(|trial| trial.change.as_ref())
-            .flat_map(with)
-            .collect()
+        let firsts: Vec<Change> = firsts.filter_map(|trial| trial.change.clone()).collect();
+        let pairs = firsts.iter().flat_map(with).collect();
+        (firsts, pairs)
     }
 
     /// The reading of the list that is reported, if any. `fitted` is the best value that is on no list, `free` the best

@@ -45,12 +45,12 @@ impl Mixed {
         problem: &Problem,
         (base, change): (&Correction, Option<&Change>),
         every: usize,
-        same: Option<&Trial>,
+        same: &[&Trial],
     ) -> Option<Self> {
         let by = change.map_or_else(|| base.clone(), |change| base.with(change));
-        let torques = change.is_none_or(Change::is_of_torques);
-        let serves = torques && problem.channels.drive == Drive::Joints;
-        let (robot, rows) = match same.filter(|_| serves) {
+        let joints = problem.channels.drive == Drive::Joints;
+        let serves = |same: &&&Trial| joints && same.by.moves_as(&by);
+        let (robot, rows) = match same.iter().find(serves) {
             Some(same) => (same.robot.clone(), Arc::clone(&same.rows)),
             None => {
                 let robot = problem.robot_under(&by)?;
@@ -83,13 +83,13 @@ impl Mixed {
 }
 
 impl Trial {
-    /// Fits a change upon `base` to every so many rows. `same` is a trial of these rows at `base`, whose columns serve
-    /// where only torques change. None where most rows belong to no pose, or the whole error is surely above `most`.
+    /// Fits a change upon `base` to every so many rows. `same` are trials of these rows, whose columns serve where only
+    /// torques differ. None where most rows belong to no pose, or the whole error is surely above `most`.
     pub fn new(
         problem: &Problem,
         (base, change): (&Correction, Option<&Change>),
         (every, most): (usize, f64),
-        same: Option<&Trial>,
+        same: &[&Trial],
     ) -> Option<Self> {
         let Mixed {
             by,
@@ -99,8 +99,14 @@ impl Trial {
             terms,
             total,
         } = Mixed::new(problem, (base, change), every, same)?;
-        let blocks = rows.blocks.iter().map(|block| mixed(block, &mix));
-        let left_out = LeftOut::up_to(&total, blocks, &terms, most)?;
+        // what is hardest to foresee as declared shows first that a hypothesis is no better
+        let mut order: Vec<usize> = (0..rows.blocks.len()).collect();
+        if let Some(same) = same.first() {
+            let error = |b: &usize| same.left_out[*b].iter().sum::<f64>();
+            order.sort_by(|a, b| error(b).total_cmp(&error(a)));
+        }
+        let block = |b: usize| mixed(&rows.blocks[b], &mix);
+        let left_out = LeftOut::up_to(&total, (&order, block), &terms, most)?;
         let mut errors = left_out.errors;
         for squares in &mut errors {
             let pairs = squares.iter_mut().zip(&terms.weights);
@@ -129,7 +135,7 @@ impl Trial {
         change: (&Correction, Option<&Change>),
         same: &Trial,
     ) -> Option<Vec<f64>> {
-        let all = Mixed::new(problem, change, 1, Some(same))?;
+        let all = Mixed::new(problem, change, 1, &[same])?;
         let theta = all.terms.fit(&all.total, &[]).values;
         let of_block = |block: &Vec<DMatrix<f64>>| -> f64 {
             let squares = all.terms.squares(&mixed(block, &all.mix), &theta);
