@@ -124,7 +124,9 @@ pub fn diagnosed(
             .into_iter()
             .skip(MAX_CHANGES_ON_SCREEN),
     );
-    formulas::told(&mut report.terminal(), machine, found);
+    formulas::in_short(&mut report.usual(), machine, found);
+    formulas::told(&mut report.detail(), machine, found);
+    formulas::candidates(&mut report.detail(), machine, found);
     let mut terminal = report.terminal();
     terminal.line("");
     terminal.note("", &first_screen::next(machine, found, written.1), 2);
