@@ -176,6 +176,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         found: &found,
         refined: &refined,
         path: &typed::quoted(&written.to_string_lossy()),
+        logs: &typed::logs(args.logs.iter().map(LogSpec::to_string)),
     };
     let mut report = stages::diagnose::diagnose(&of);
     context.check()?;

@@ -286,6 +286,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         identification: logs_of(&training),
         validation: logs_of(&unseen),
     };
+    let fitted = typed::logs(training.iter().map(LogSpec::to_string));
     training.extend(one_joint.iter().cloned());
     let mut with_draft = args.setup.clone();
     if draft.is_some() && !with_draft.as_declared {
@@ -364,6 +365,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         limit: campaign.settings.max_relative_error,
         guesses: &guesses,
         path: &typed::quoted(&written.to_string_lossy()),
+        logs: &fitted,
     };
     let mut report = stages::identify::identify(&of);
     let numbers = (&found.model, &found.numbers);

@@ -45,6 +45,11 @@ pub(super) fn line(arguments: &[OsString]) -> String {
     words.join(" ")
 }
 
+/// Logs one after the other.
+pub(super) fn logs(all: impl Iterator<Item = String>) -> String {
+    all.map(|log| quoted(&log)).collect::<Vec<_>>().join(" ")
+}
+
 /// `--model=/a/b.toml` and `-m/a/b.toml` are `--model=b.toml` and `-mb.toml`; relative paths stay.
 fn local(word: &str) -> String {
     let start = match word.strip_prefix("--") {

@@ -58,7 +58,7 @@ pub struct Subject {
     besides: &'static [&'static str],
 }
 
-/// The laws: ten, then ten more, then clean machines.
+/// The laws, ten by ten, then clean machines.
 pub fn subjects() -> Vec<Subject> {
     use Uncatalogued::*;
     let of = |name, (kind, joint), law, signals, besides| Subject {
@@ -185,6 +185,46 @@ pub fn subjects() -> Vec<Subject> {
             LoadedHysteresis,
             &["memory", "load"],
             &["v"],
+        ),
+        of(
+            "wheel spun by another joint",
+            far,
+            SpunWheel { other },
+            &["v_o", "q"],
+            &[],
+        ),
+        of(
+            "friction off a pose",
+            far,
+            FrictionOffPose { other },
+            &["v", "q_o"],
+            &[],
+        ),
+        of("taut hose", far, TautHose { other }, &["q", "q_o"], &[]),
+        of("cam lobe", one, CamLobe, &["q"], &[]),
+        of(
+            "cogging by load size",
+            shoulder,
+            CoggingByLoadSize,
+            &["load", "q"],
+            &[],
+        ),
+        of("uneven slip", one, UnevenSlip, &["memory"], &["v"]),
+        of("warm spring", one, WarmSpring, &["warm", "q"], &[]),
+        of(
+            "hysteresis by pole",
+            one,
+            PoleHysteresis,
+            &["memory", "q"],
+            &["v"],
+        ),
+        of("creep friction", one, CreepFriction, &["v"], &[]),
+        of(
+            "belt between joints",
+            far,
+            BeltBetween { other },
+            &["q", "q_o"],
+            &[],
         ),
         clean(Kind::Single),
         clean(Kind::Arm3),

@@ -1,6 +1,7 @@
 //! Laws that stand in no catalogue of the tool: what a search for a formula is judged by. The first ten were fixed
-//! before the search was judged on any; the second ten too, from what machines are known to do. Their signals are what a
-//! formula must be in, whatever its form.
+//! before the search was judged on any; the second ten too, from what machines are known to do; the third ten after a first
+//! run of some of the others, from a list of causes and not from the terms of the search. Their signals are what a formula
+//! must be in, whatever its form.
 
 use serde::Serialize;
 
@@ -51,6 +52,26 @@ pub enum Uncatalogued {
     InertiaByPosition,
     /// Hysteresis of a gear, wider under load.
     LoadedHysteresis,
+    /// A wheel that another joint spins: its torque turns with the pose.
+    SpunWheel { other: usize },
+    /// Friction that grows as another joint leaves the pose it was aligned in.
+    FrictionOffPose { other: usize },
+    /// A hose over two joints that pulls only where it is taut.
+    TautHose { other: usize },
+    /// A lobe on a cam, away from zero.
+    CamLobe,
+    /// Cogging that the size of the load deepens, either way it pushes.
+    CoggingByLoadSize,
+    /// Two elements that slip, one much stiffer than the other.
+    UnevenSlip,
+    /// A spring whose rate a logged temperature sets.
+    WarmSpring,
+    /// A magnet's hysteresis that changes its sign from pole to pole.
+    PoleHysteresis,
+    /// Friction that grows with the logarithm of speed: creep of the asperities.
+    CreepFriction,
+    /// A toothed belt between two joints.
+    BeltBetween { other: usize },
 }
 
 /// Remembered by the plant for each joint.
@@ -98,6 +119,11 @@ impl Memory {
         let of = |(slip, width): (&f64, f64)| (q - slip) / (0.5 * width);
         self.slips.iter().zip(WIDTHS).map(of).sum::<f64>() / 3.0
     }
+
+    fn uneven_slip(&self, q: f64) -> f64 {
+        let of = |i: usize| (q - self.slips[i]) / (0.5 * WIDTHS[i]);
+        0.8 * of(0) + 0.2 * of(2)
+    }
 }
 
 /// Temperature of every drive [degC]: it warms up, and the hall breathes.
@@ -119,7 +145,10 @@ pub struct Seen<'a> {
 impl Uncatalogued {
     /// Whether it hangs on a temperature.
     pub fn is_warm(self) -> bool {
-        matches!(self, Self::ThermalFriction | Self::ThermalViscosity)
+        matches!(
+            self,
+            Self::ThermalFriction | Self::ThermalViscosity | Self::WarmSpring
+        )
     }
 
     /// What the law makes of a joint, `k` large.
@@ -152,6 +181,16 @@ impl Uncatalogued {
             Self::FrictionByAcceleration => level(k * seen.a.abs()),
             Self::InertiaByPosition => torque(k * seen.a * (2.0 * q).sin()),
             Self::LoadedHysteresis => torque(k * seen.memory.slip(q) * seen.load.abs()),
+            Self::SpunWheel { other } => torque(k * at(other).1 * q.sin()),
+            Self::FrictionOffPose { other } => level(k * (at(other).0 - 0.4).powi(2)),
+            Self::TautHose { other } => torque(k * (q + at(other).0 - 0.3).max(0.0)),
+            Self::CamLobe => torque(k * (-((q - 0.3) / 0.2).powi(2)).exp()),
+            Self::CoggingByLoadSize => torque(k * seen.load.abs() * (7.0 * q).sin()),
+            Self::UnevenSlip => torque(k * seen.memory.uneven_slip(q)),
+            Self::WarmSpring => torque(k * q * (warm - 30.0) / 10.0),
+            Self::PoleHysteresis => torque(k * seen.memory.bristle * (5.0 * q).sin()),
+            Self::CreepFriction => level(k * (v.abs() / 0.1).ln_1p()),
+            Self::BeltBetween { other } => torque(k * (4.0 * (q - at(other).0)).sin()),
         }
     }
 }

@@ -130,6 +130,8 @@ pub struct FoundFormula {
     pub signals: Vec<(FormulaSignal, usize)>,
     /// None where the parts do not agree, or nothing is held out.
     pub picture: Option<FormulaPicture>,
+    /// Root mean square of the residual without and with it within 0.1 s of a reversal, on the same data.
+    pub at_reversals: Option<[f64; 2]>,
     /// Effects of the catalogue at the joint in whose place it stands.
     pub in_place_of: Vec<Added>,
 }

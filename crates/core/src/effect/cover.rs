@@ -75,8 +75,8 @@ impl Cover {
             }
             joint.speed_rms = (square / count.max(1) as f64).sqrt();
             joint.acceleration_rms = (acceleration / count.max(1) as f64).sqrt();
-            let least = 1e-3 * (position[1] - position[0]);
-            joint.reversals = moving.iter().map(|s| reversals(&s.q[j], least)).sum();
+            let least = TURN * (position[1] - position[0]);
+            joint.reversals = moving.iter().map(|s| reversals(&s.q[j], least).len()).sum();
             joint.position = position;
             joint.full_range = robot.transmission().full_travel(j);
         }
@@ -195,28 +195,33 @@ pub fn stationary_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>>
     travels.iter().map(small).collect()
 }
 
-/// Turning points with at least `least` between them.
-fn reversals(q: &[f64], least: f64) -> usize {
-    let Some(&first) = q.first() else { return 0 };
-    let (mut extreme, mut direction, mut count) = (first, 0i8, 0);
-    for &x in q {
+/// Part of its travel that a joint goes back before it has turned.
+pub const TURN: f64 = 1e-3;
+
+/// Samples of turning points with at least `least` between them.
+pub fn reversals(q: &[f64], least: f64) -> Vec<usize> {
+    let Some(&first) = q.first() else {
+        return Vec::new();
+    };
+    let (mut extreme, mut at, mut direction, mut all) = (first, 0, 0i8, Vec::new());
+    for (k, &x) in q.iter().enumerate() {
         match direction {
             0 if (x - first).abs() > least => {
                 direction = if x > first { 1 } else { -1 };
-                extreme = x;
+                (extreme, at) = (x, k);
             }
             0 => {}
-            1 if x > extreme => extreme = x,
-            -1 if x < extreme => extreme = x,
+            1 if x > extreme => (extreme, at) = (x, k),
+            -1 if x < extreme => (extreme, at) = (x, k),
             _ if (x - extreme).abs() > least => {
                 direction = -direction;
-                extreme = x;
-                count += 1;
+                all.push(at);
+                (extreme, at) = (x, k);
             }
             _ => {}
         }
     }
-    count
+    all
 }
 
 #[cfg(test)]
@@ -229,7 +234,9 @@ mod tests {
             .map(|k| (f64::from(k) * 0.01).sin() + 1e-5 * f64::from(k % 2))
             .collect();
         // sin turns at pi/2, 3 pi/2, .. below 20: six times
-        assert_eq!(reversals(&q, 1e-3), 6);
-        assert_eq!(reversals(&[0.0; 50], 1e-3), 0);
+        let found = reversals(&q, 1e-3);
+        assert_eq!(found.len(), 6);
+        assert!(found[0].abs_diff(157) <= 1);
+        assert!(reversals(&[0.0; 50], 1e-3).is_empty());
     }
 }

@@ -8,7 +8,7 @@
 mod added;
 pub mod as_code;
 mod augmented_model;
-mod cover;
+pub(crate) mod cover;
 pub(crate) mod entry;
 mod facts;
 pub mod formula;

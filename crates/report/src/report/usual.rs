@@ -109,6 +109,32 @@ pub fn band(torque_is: Option<TorqueIs>) -> [f64; 2] {
     }
 }
 
+/// Errors that are usual, as a picture has them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Usual {
+    /// Least and largest.
+    pub band: [f64; 2],
+    pub words: String,
+}
+
+/// The band of a picture, with what it is made of.
+pub fn drawn(torque_is: Option<TorqueIs>) -> Usual {
+    let percent = |ends: [f64; 2]| {
+        let [least, most] = ends.map(|error| number::significant(100.0 * error, 2));
+        format!("{least} to {most} %")
+    };
+    let (band, currents) = (band(torque_is), range(Measured::Currents));
+    let words = match band == currents {
+        true => format!("usual for motor currents: {}", percent(band)),
+        false => format!(
+            "usual: {} (joint sensors) up to {} (motor currents)",
+            percent(range(Measured::Sensors)),
+            percent(currents)
+        ),
+    };
+    Usual { band, words }
+}
+
 /// How large errors usually are, in a sentence; of both kinds where a log does not say how its torques were measured.
 pub fn words(torque_is: Option<TorqueIs>) -> String {
     let percent = |measured| {

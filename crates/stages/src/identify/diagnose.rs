@@ -72,6 +72,8 @@ pub struct Diagnosed {
     pub in_memory: InMemory,
     /// Names of the logs, in order: fitted, veto, holdout.
     pub logs: Vec<String>,
+    /// Stretches in which something may push the robot, one sentence each.
+    pub contacts: Vec<String>,
     /// The model as it was given.
     pub given: AugmentedModel,
     /// What the refined model leaves of data set aside.
@@ -171,7 +173,7 @@ pub fn diagnose(
     let machine = &together;
     let mut in_memory = read_each(machine, &each, &all, control)?;
     let contact = contacts(machine, logs.train, control)?;
-    in_memory.warnings.splice(0..0, contact);
+    in_memory.warnings.splice(0..0, contact.iter().cloned());
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
         &settings.candidates,
@@ -238,6 +240,7 @@ pub fn diagnose(
         diagnosis,
         in_memory,
         logs,
+        contacts: contact,
         given: case.given.clone(),
         held: Held::default(),
         free_run: None,

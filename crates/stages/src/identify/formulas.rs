@@ -94,6 +94,9 @@ pub struct FormulaResult {
     pub gain: Vec<JointGain>,
     /// Errors on data set aside without and with it, joint by joint.
     pub joints: Vec<JointChange>,
+    /// Root mean square of the residual without and with it within 0.1 s of a reversal, on data set aside, in the unit of
+    /// the joint's torque.
+    pub at_reversals: Option<[f64; 2]>,
     /// Effects of the catalogue at the joint in whose place it stands.
     pub in_place_of: Vec<&'static str>,
     /// As a file for `--candidates`.
@@ -150,6 +153,7 @@ pub fn formula_result(machine: &LoggedRobot, found: &FoundFormula) -> FormulaRes
         shrinkage: found.step.shrinkage,
         gain: gain_of_each(names, &found.step.gain),
         joints: found.step.joints.clone(),
+        at_reversals: found.at_reversals,
         in_place_of: found.in_place_of.iter().map(|e| e.name()).collect(),
         candidate: candidates::to_toml(&[formula_section(&found.definition)]).unwrap_or_default(),
     }

@@ -13,7 +13,7 @@ pub fn found(names: &[&str]) -> Rendered {
         let machine = name.split('_').next().unwrap_or(name).to_uppercase();
         let formulas = rows(&result["formulas"]);
         if formulas.is_empty() {
-            let none = ["-", "no formula", "-", "-", "-", "-"].map(str::to_owned);
+            let none = ["-", "no formula", "-", "-", "-", "-", "-"].map(str::to_owned);
             all.push([vec![machine.clone()], none.to_vec()].concat());
         }
         all.extend(formulas.iter().map(|f| row(&machine, f)));
@@ -25,6 +25,7 @@ pub fn found(names: &[&str]) -> Rendered {
         "<kind",
         "of what is left",
         "<unseen error without, with",
+        "<rms at reversals without, with",
         "<end",
     ];
     Ok(table(&heads, &all))
@@ -38,6 +39,12 @@ fn row(machine: &str, of: &Value) -> Vec<String> {
         let shown = |key: &str| significant(100.0 * number(&j[key]), 3);
         format!("{}, {} %", shown("before"), shown("after"))
     });
+    let at_reversals = match rows(&of["at_reversals"]) {
+        [without, with] => [without, with]
+            .map(|x| significant(number(x), 3))
+            .join(", "),
+        _ => "-".to_owned(),
+    };
     vec![
         machine.to_owned(),
         text(&of["joint"]).to_owned(),
@@ -45,6 +52,7 @@ fn row(machine: &str, of: &Value) -> Vec<String> {
         text(&of["kind"]).to_owned(),
         percent(number(&of["share"])),
         errors,
+        at_reversals,
         text(&of["end"]).to_owned(),
     ]
 }

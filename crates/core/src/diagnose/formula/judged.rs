@@ -2,6 +2,7 @@
 //! parts and of data set aside.
 
 use super::Proposed;
+use super::picture::OnHeldOut;
 use super::term::{FormulaTerm, Names, ShapeNumber, Source, named};
 use crate::diagnose::candidates::refined_shapes;
 use crate::diagnose::error::DiagnoseError;
@@ -52,7 +53,9 @@ impl PreparedCase<'_> {
             for ((p, definition), step) in each {
                 let mut told = self.told(searched, confirmed, (p, definition), step.clone());
                 if let Some(place) = step.judged {
-                    told.picture = self.picture((&judged.judge, place), p.joint, &told.signals)?;
+                    let held = OnHeldOut::of(self, (&judged.judge, place), p.joint)?;
+                    told.picture = held.picture(&told.signals);
+                    told.at_reversals = held.at_reversals();
                 }
                 formulas.push(told);
             }
@@ -246,6 +249,7 @@ impl PreparedCase<'_> {
             symmetry: self.symmetry(of),
             signals: signals(&of.terms),
             picture: None,
+            at_reversals: None,
             in_place_of: replaced
                 .map(|c| searched.candidates[c.candidate].effect.clone())
                 .collect(),

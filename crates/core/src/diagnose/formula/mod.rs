@@ -22,7 +22,7 @@
 //! | `select` | few of them |
 //! | `judged` | a formula as an effect of the user's own, before the judge |
 //! | `symmetry` | what kind of physics it is, whatever its terms |
-//! | `picture` | it over its first signal, on data set aside |
+//! | `picture` | it on data set aside: over its first signal, and next to reversals |
 
 mod columns;
 mod judged;

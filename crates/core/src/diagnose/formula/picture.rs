@@ -1,62 +1,98 @@
-//! A formula over its first signal, on data that nothing was fitted to.
+//! A formula on data that nothing was fitted to: over its first signal, and next to reversals.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::outcome::FormulaPicture;
 use crate::diagnose::prepared::{PreparedCase, filtered};
 use crate::diagnose::problem::data_split::LogRole;
 use crate::diagnose::unexplained::signal::{Signal, values};
+use crate::effect::cover::{TURN, reversals};
 use crate::effect::{AugmentedModel, Torques};
 use crate::robot::FormulaSignal;
 
 /// Rows that are kept of it, about.
 const MOST: usize = 700;
 
-impl PreparedCase<'_> {
-    /// The effect that stands at a place in a model, over a signal of joint `j`, on held-out rows.
-    pub(super) fn picture(
-        &self,
-        (model, place): (&AugmentedModel, usize),
-        j: usize,
-        signals: &[(FormulaSignal, usize)],
-    ) -> Result<Option<FormulaPicture>, DiagnoseError> {
-        let Some(over) = signals.iter().map(shown).next() else {
-            return Ok(None);
-        };
+/// Time about a reversal [s] within which hysteresis is judged by itself.
+const ABOUT_REVERSAL: f64 = 0.1;
+
+/// A joint on held-out rows.
+pub(super) struct OnHeldOut<'a> {
+    prepared: &'a PreparedCase<'a>,
+    model: &'a AugmentedModel,
+    joint: usize,
+    /// Stretch and sample of each row, the residual without the formula, and with it.
+    rows: Vec<([usize; 2], [f64; 2])>,
+}
+
+impl<'a> OnHeldOut<'a> {
+    /// The effect that stands at a place in a model, at a joint.
+    pub fn of(
+        prepared: &'a PreparedCase<'a>,
+        (model, place): (&'a AugmentedModel, usize),
+        joint: usize,
+    ) -> Result<Self, DiagnoseError> {
+        let (split, data) = (&prepared.split, &prepared.data);
         let mut without = model.clone();
         without.effects[place].linear.fill(0.0);
-        let [with, without] = [
-            filtered(model, &self.data)?,
-            filtered(&without, &self.data)?,
-        ];
-        let held = self
-            .split
+        let [without, with] = [filtered(&without, data)?, filtered(model, data)?];
+        let held = split
             .pieces
             .iter()
-            .filter(|p| p.role == LogRole::Holdout && !self.split.is_stationary(p.stretch, j));
-        let of_piece = |p: &crate::diagnose::problem::data_split::Piece| {
-            p.rows
-                .clone()
-                .map(|row| (p.stretch, row))
-                .collect::<Vec<_>>()
+            .filter(|p| p.role == LogRole::Holdout && !split.is_stationary(p.stretch, joint));
+        let rows = held.flat_map(|p| p.rows.clone().map(|row| (p.stretch, row)));
+        let of_row = |(s, row): (usize, usize)| {
+            let sample = data.filters.of(&prepared.case.stretches[s]).sample_of(row);
+            (
+                [s, sample],
+                [&without, &with].map(|left| left[s][joint][row]),
+            )
         };
-        let rows: Vec<(usize, usize)> = held.flat_map(of_piece).collect();
-        let every = rows.len().div_ceil(MOST).max(1);
-        let rows: Vec<(usize, usize)> = rows.into_iter().step_by(every).collect();
-        let stretches = &self.case.stretches;
-        let sample =
-            |(s, row): &(usize, usize)| (*s, self.data.filters.of(&stretches[*s]).sample_of(*row));
-        let samples: Vec<(usize, usize)> = rows.iter().map(sample).collect();
+        let rows = rows.map(of_row).collect();
+        Ok(Self {
+            prepared,
+            model,
+            joint,
+            rows,
+        })
+    }
+
+    /// Its torque over the first of these signals.
+    pub fn picture(&self, signals: &[(FormulaSignal, usize)]) -> Option<FormulaPicture> {
+        let over = shown(signals.first()?);
+        let stretches = &self.prepared.case.stretches;
+        let every = self.rows.len().div_ceil(MOST).max(1);
+        let rows: Vec<_> = self.rows.iter().step_by(every).collect();
+        let samples: Vec<(usize, usize)> = rows.iter().map(|([s, k], _)| (*s, *k)).collect();
         let torques: Vec<Torques> = match over {
-            Signal::Load => stretches.iter().map(|s| model.torques(s)).collect(),
+            Signal::Load => stretches.iter().map(|s| self.model.torques(s)).collect(),
             _ => stretches.iter().map(|_| Torques::default()).collect(),
         };
-        let x = values(over, j, &samples, stretches, &torques);
-        let of_row = |(x, (s, row)): (f64, (usize, usize))| {
-            let (a, b) = (without[s][j][row], with[s][j][row]);
-            [x, a, a - b]
-        };
+        let x = values(over, self.joint, &samples, stretches, &torques);
+        let of_row = |(x, (_, [a, b])): (f64, &([usize; 2], [f64; 2]))| [x, *a, a - b];
         let rows: Vec<[f64; 3]> = x.into_iter().zip(rows).map(of_row).collect();
-        Ok((!rows.is_empty()).then_some(FormulaPicture { over, rows }))
+        (!rows.is_empty()).then_some(FormulaPicture { over, rows })
+    }
+
+    /// Root mean square of the residual without and with it next to reversals.
+    pub fn at_reversals(&self) -> Option<[f64; 2]> {
+        let least = TURN * self.prepared.cover.joints[self.joint].range();
+        let stretches = self.prepared.case.stretches.iter();
+        let turns = stretches.map(|s| reversals(&s.q[self.joint], least));
+        let turns: Vec<Vec<usize>> = turns.collect();
+        let near = |s: usize, k: usize| {
+            let most = ABOUT_REVERSAL / self.prepared.case.stretches[s].dt;
+            let after = turns[s].partition_point(|turn| *turn < k);
+            let both = [after.checked_sub(1), Some(after)].into_iter().flatten();
+            both.filter_map(|i| turns[s].get(i))
+                .any(|turn| turn.abs_diff(k) as f64 <= most)
+        };
+        let own = self.rows.iter().filter(|([s, k], _)| near(*s, *k));
+        let own: Vec<[f64; 2]> = own.map(|(_, left)| *left).collect();
+        let rms = |i: usize| {
+            let square: f64 = own.iter().map(|left| left[i] * left[i]).sum();
+            (square / own.len() as f64).sqrt()
+        };
+        (!own.is_empty()).then(|| [0, 1].map(rms))
     }
 }
 

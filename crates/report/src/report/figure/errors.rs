@@ -3,6 +3,7 @@
 use super::colour;
 use super::legend::{self, Key};
 use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use crate::report::usual::Usual;
 use cft_ident_core::number;
 
 /// An error and its 95 % confidence interval, as fractions.
@@ -32,8 +33,8 @@ pub struct ErrorFigure {
     pub joints: Vec<JointBars>,
     /// Largest error that is wanted, as a fraction.
     pub limit: Option<f64>,
-    /// Least and largest error that is usual, as fractions.
-    pub usual: Option<[f64; 2]>,
+    /// Errors that are usual.
+    pub usual: Option<Usual>,
 }
 
 const WIDTH: f64 = 440.0;
@@ -86,11 +87,10 @@ impl ErrorFigure {
         let room = WIDTH - left - NUMBERS;
         let most = self.most();
         let x = |error: f64| left + room * (error / most).clamp(0.0, 1.0);
-        if let Some(usual) = self.usual {
-            let name = usual_words(usual);
-            let key = (Key::Patch(colour::COVERED), name.as_str());
+        if let Some(usual) = &self.usual {
+            let key = (Key::Patch(colour::COVERED), usual.words.as_str());
             legend::draw(&mut svg, [14.0, 44.0 + LINE], &[key]);
-            let [from, to] = usual.map(x);
+            let [from, to] = usual.band.map(x);
             let band = [from, top - 4.0, to - from, bottom - top + 4.0];
             svg.rect(band, colour::COVERED, None);
         }
@@ -148,7 +148,7 @@ impl ErrorFigure {
         let bars = self.joints.iter();
         let bars = bars.flat_map(|joint| joint.before.into_iter().chain([joint.after]));
         let ends = bars.flat_map(|bar| [Some(bar.error), bar.interval_95.map(|[_, high]| high)]);
-        let usual = self.usual.map(|[_, most]| most);
+        let usual = self.usual.as_ref().map(|usual| usual.band[1]);
         let all = ends.flatten().chain(self.limit).chain(usual);
         let most = all.filter(|x| x.is_finite()).fold(0.0, f64::max);
         if most > 0.0 { 1.02 * most } else { 1.0 }
@@ -171,16 +171,13 @@ impl ErrorFigure {
         let limit = self.limit.map_or(String::new(), |limit| {
             format!("; limit {}", number::percent(limit))
         });
-        let usual = self.usual.map(|usual| format!("; {}", usual_words(usual)));
+        let usual = self
+            .usual
+            .as_ref()
+            .map(|usual| format!("; {}", usual.words));
         let usual = usual.unwrap_or_default();
         format!("Relative torque error: {}{limit}{usual}", joints.join("; "))
     }
-}
-
-/// `usual: 3.1 to 13 %`.
-fn usual_words(usual: [f64; 2]) -> String {
-    let [least, most] = usual.map(|error| number::significant(100.0 * error, 2));
-    format!("usual: {least} to {most} %")
 }
 
 /// `5.17 % (4.25..6.11)`.
@@ -230,7 +227,10 @@ mod tests {
                 after: bar(after),
             }],
             limit: Some(0.1),
-            usual: Some([0.031, 0.129]),
+            usual: Some(Usual {
+                band: [0.031, 0.129],
+                words: "usual: 3.1 to 13 %".to_owned(),
+            }),
         }
     }
 

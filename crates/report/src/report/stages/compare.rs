@@ -216,7 +216,7 @@ fn bars(of: &Compared, tried: &TriedOnLogs, names: &[String; 2]) -> ErrorFigure 
         names: names.clone(),
         joints: joints.collect(),
         limit: None,
-        usual: Some(usual::band(of.machine.file.log.torque_is)),
+        usual: Some(usual::drawn(of.machine.file.log.torque_is)),
     }
 }
 

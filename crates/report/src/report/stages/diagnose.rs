@@ -2,7 +2,7 @@
 
 use super::diagnose_words::errors as errors_of;
 pub use super::diagnose_words::words;
-use super::step_words::{alternatives, grade, in_words, worsened};
+use super::step_words::{agreement, alternatives, grade, in_words, worsened};
 use super::{first_screen, formulas, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
@@ -34,8 +34,9 @@ pub struct Diagnose<'a> {
     pub found: &'a Diagnosed,
     /// The model that is written.
     pub refined: &'a ModelFile,
-    /// Its path as a shell takes it.
+    /// Its path, and the logs, as a shell takes them.
     pub path: &'a str,
+    pub logs: &'a str,
 }
 
 /// The effects, their numbers, what is left, and the errors before and after.
@@ -43,9 +44,10 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
     let (text, good) = words(of.machine, of.found);
     report.everywhere().verdict(&text, good);
-    diagnosed(&mut report, (of.machine, of.found), (of.refined, of.path));
+    let typed = (of.refined, of.path, of.logs);
+    diagnosed(&mut report, (of.machine, of.found), typed);
     let mut page = report.page();
-    first_screen::show(&mut page, of.machine, of.found);
+    first_screen::show(&mut page, (of.machine, of.found), (of.path, of.logs));
     errors(&mut page, of.machine, of.found);
     formulas::told(&mut page, of.machine, of.found);
     free_run::section(&mut page, of.found.free_run.as_ref());
@@ -99,7 +101,7 @@ pub fn at_fault(fault: &DataFault) -> String {
 pub fn diagnosed(
     report: &mut Report,
     (machine, found): (&LoggedRobot, &Diagnosed),
-    written: (&ModelFile, &str),
+    (file, path, logs): (&ModelFile, &str, &str),
 ) {
     let d = &found.diagnosis;
     report.terminal().line("");
@@ -124,11 +126,14 @@ pub fn diagnosed(
             .into_iter()
             .skip(MAX_CHANGES_ON_SCREEN),
     );
-    formulas::told(&mut report.terminal(), machine, found);
+    formulas::in_short(&mut report.usual(), machine, found);
+    formulas::told(&mut report.detail(), machine, found);
+    formulas::candidates(&mut report.detail(), machine, found);
     let mut terminal = report.terminal();
     terminal.line("");
-    terminal.note("", &first_screen::next(machine, found, written.1), 2);
-    first_screen::next_motion(&mut terminal, (machine, found), written);
+    let next = first_screen::next(machine, found, (path, logs));
+    terminal.note("", &next, 2);
+    first_screen::next_motion(&mut terminal, (machine, found), (file, path));
 }
 
 /// Errors joint by joint, those of a screen.
@@ -193,7 +198,8 @@ fn step_told(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usiz
         in_words(machine, step)
     );
     terminal.note(&format!("{number:>3}. "), &name, 7);
-    terminal.note(MARGIN, &grade(step, effect), 7);
+    let shown = format!("{}: {}", grade(step), agreement(step));
+    terminal.note(MARGIN, &shown, 7);
     let shown = format!(
         "takes {} off the squared error of blocks left out ({} standard errors)",
         number::percent(step.share),
@@ -231,19 +237,20 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
     );
     let hundred = number::hundredths;
     let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
+    let now = d.errors_now();
     for (j, joint) in machine.robot.joint_names().iter().enumerate() {
         let of = |errors: &Errors| errors.joints[j].relative_error;
         let unseen = |p: &SplitErrors| p.holdout.as_ref().map(of);
-        let interval = d.after.holdout.as_ref().map(|e| {
+        let interval = now.holdout.as_ref().map(|e| {
             let [low, high] = e.joints[j].interval_95;
             format!("{}..{}", hundred(low), hundred(high))
         });
         table.row([
             joint.as_str(),
             &hundred(of(&d.before.train)),
-            &hundred(of(&d.after.train)),
+            &hundred(of(&now.train)),
             &known(unseen(&d.before)),
-            &known(unseen(&d.after)),
+            &known(unseen(now)),
             interval.as_deref().unwrap_or(number::ABSENT),
             &hundred(d.unexplained[j].share),
         ]);
@@ -306,9 +313,8 @@ pub fn sections(
     replayed: &ReplayedDiagnosis,
 ) {
     let d = &found.diagnosis;
-    let errors = d.after.holdout.as_ref().unwrap_or(&d.after.train);
-    let errors = errors.joints.iter().map(|joint| joint.relative_error);
-    let errors: Vec<f64> = errors.collect();
+    let (_, errors) = errors_of(d.errors_now());
+    let errors: Vec<f64> = errors.joints.iter().map(|e| e.relative_error).collect();
     if !d.steps.is_empty() {
         page.heading("What the model lacks");
     }
@@ -363,51 +369,40 @@ fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     );
 }
 
-/// Errors of every joint before and after, on the logs that were fitted and on those that were not.
+/// Errors of every joint, on the logs that were fitted and on those that were not: before and after where the model that
+/// is written is another one.
 pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
-    let percent = |e: Option<f64>| e.map_or("-".to_owned(), number::percent);
-    let rows: Vec<Vec<String>> = machine
-        .robot
-        .joint_names()
-        .iter()
-        .enumerate()
-        .map(|(j, joint)| {
-            let relative = |e: &Errors| e.joints[j].relative_error;
-            let unseen = |p: &SplitErrors| p.holdout.as_ref().map(relative);
-            let interval = d.after.holdout.as_ref().map_or("-".to_owned(), |e| {
-                let [low, high] = e.joints[j].interval_95;
-                format!("{} to {}", number::percent(low), number::percent(high))
-            });
-            let rms = d.after.holdout.as_ref().unwrap_or(&d.after.train).joints[j].rmse;
-            vec![
-                joint.clone(),
-                percent(Some(relative(&d.before.train))),
-                percent(Some(relative(&d.after.train))),
-                percent(unseen(&d.before)),
-                percent(unseen(&d.after)),
-                interval,
-                format!(
-                    "{} {}",
-                    number::significant(rms, 3),
-                    machine.file.torque_unit(j)
-                ),
-                number::percent(d.unexplained[j].share),
-            ]
-        })
-        .collect();
-    page.rows(
-        "relative torque error",
-        &[
-            "joint",
-            "fitted, as given",
-            "fitted, after",
-            "held-out, as given",
-            "held-out, after",
-            "95 % CI",
-            "rms after",
-            "residual with a pattern, of torque power",
-        ],
-        rows,
-    );
+    let now = d.errors_now();
+    let sides: Vec<(&str, &SplitErrors)> = match d.written().next() {
+        Some(_) => vec![(", as given", &d.before), (", after", now)],
+        None => vec![("", now)],
+    };
+    let held_out = now.holdout.is_some();
+    let mut head = vec!["joint".to_owned()];
+    head.extend(sides.iter().map(|(side, _)| format!("fitted{side}")));
+    if held_out {
+        head.extend(sides.iter().map(|(side, _)| format!("held-out{side}")));
+        head.push("95 % CI".to_owned());
+    }
+    head.push("rms".to_owned());
+    head.push("residual with a pattern, of torque power".to_owned());
+    let row = |(j, joint): (usize, &String)| {
+        let percent = |e: &Errors| number::percent(e.joints[j].relative_error);
+        let mut row = vec![joint.clone()];
+        row.extend(sides.iter().map(|(_, errors)| percent(&errors.train)));
+        let unseen = sides.iter().filter_map(|(_, e)| e.holdout.as_ref());
+        row.extend(unseen.map(percent));
+        if let Some(errors) = &now.holdout {
+            let [low, high] = errors.joints[j].interval_95.map(number::percent);
+            row.push(format!("{low} to {high}"));
+        }
+        let rms = number::significant(errors_of(now).1.joints[j].rmse, 3);
+        row.push(format!("{rms} {}", machine.file.torque_unit(j)));
+        row.push(number::percent(d.unexplained[j].share));
+        row
+    };
+    let rows = machine.robot.joint_names().iter().enumerate().map(row);
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    page.rows("relative torque error", &head, rows.collect());
 }

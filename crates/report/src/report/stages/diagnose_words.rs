@@ -162,11 +162,7 @@ fn bought(d: &Diagnosis) -> (String, bool) {
         ),
     };
     if after.joints.len() > 1 {
-        text += " (rms over the joints";
-        if let Some(all) = after.overall.relative_error {
-            text += &format!("; {} of all their torques together", number::percent(all));
-        }
-        text += ")";
+        text += " (rms over the joints)";
     }
     (text + ".", goes != "falls" && d.written().next().is_some())
 }

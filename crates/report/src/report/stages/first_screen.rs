@@ -9,9 +9,24 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, separating_command};
 
 /// Errors per joint as bars, and the next thing to do.
-pub fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+pub fn show(
+    page: &mut Writer,
+    (machine, found): (&LoggedRobot, &Diagnosed),
+    (path, logs): (&str, &str),
+) {
     page.figure(&bars(machine, found).svg());
-    page.paragraph(&next(machine, found, "MODEL.toml"));
+    let typed = (&*local(path), &*local(logs));
+    page.paragraph(&next(machine, found, typed));
+}
+
+/// Paths of a command as a page has them: an absolute one by its last part, for a page is the same on every machine.
+fn local(words: &str) -> String {
+    let word = |word: &str| match word.strip_prefix('/').and_then(|w| w.rsplit('/').next()) {
+        Some(last) => last.to_owned(),
+        None => word.to_owned(),
+    };
+    let words: Vec<String> = words.split(' ').map(word).collect();
+    words.join(" ")
 }
 
 /// Errors of every joint before and after: held-out ones where there are any.
@@ -42,8 +57,8 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
 }
 
 /// The errors that are usual, where they are of use beside those of this model.
-fn usual_of(machine: &LoggedRobot, d: &Diagnosis) -> Option<[f64; 2]> {
-    (!is_exact(d)).then(|| usual::band(machine.file.log.torque_is))
+fn usual_of(machine: &LoggedRobot, d: &Diagnosis) -> Option<usual::Usual> {
+    (!is_exact(d)).then(|| usual::drawn(machine.file.log.torque_is))
 }
 
 /// The first effect of the written model that the data do not separate from another.
@@ -82,9 +97,12 @@ pub fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
     }
 }
 
-/// What to do next; `path` is the model's as a shell takes it.
-pub fn next(machine: &LoggedRobot, found: &Diagnosed, path: &str) -> String {
+/// What to do next; the paths of the model and of the logs are those that a shell takes.
+pub fn next(machine: &LoggedRobot, found: &Diagnosed, (path, logs): (&str, &str)) -> String {
     let d = &found.diagnosis;
+    if let Some(contact) = found.contacts.first() {
+        return format!("Next: see whether something touched the robot. {contact}.");
+    }
     if !d.determined {
         return "Next: move the joints faster and farther, or log a torque with less noise."
             .to_owned();
@@ -112,7 +130,7 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed, path: &str) -> String {
         .max_by(|a, b| share(a).total_cmp(&share(b)));
     match worst {
         Some(j) if !found.searched => format!(
-            "Next: search a formula for what is left of {}: `cft-ident diagnose LOG -m {path} --search`.",
+            "Next: search a formula for what is left of {}: `cft-ident diagnose {logs} -m {path} --search`.",
             machine.robot.joint_names()[j]
         ),
         Some(j) => format!(

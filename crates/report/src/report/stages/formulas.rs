@@ -7,6 +7,48 @@ use cft_ident_core::diagnose::{FormulaEnd, FormulaPicture};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, FormulaResult, LoggedRobot, formula_result};
 
+const NONE: &str = "No formula of few terms explains what is left of a joint: the signals on which it depends stand with it.";
+
+/// What a search came to, for a screen: each formula that is confirmed, and why the others are not.
+pub fn in_short(usual: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    if !found.searched {
+        return;
+    }
+    let formulas = found.diagnosis.formulas.iter();
+    let results: Vec<FormulaResult> = formulas.map(|f| formula_result(machine, f)).collect();
+    if results.is_empty() {
+        usual.paragraph(NONE);
+    }
+    let (confirmed, others): (Vec<_>, Vec<_>) =
+        results.iter().partition(|f| f.end == FormulaEnd::Found);
+    for of in confirmed {
+        usual.paragraph(&format!(
+            "Formula of {}: {}, {} of what is left; `--accept formula:{}` writes it.",
+            of.joint,
+            of.text,
+            number::percent(of.share),
+            of.joint
+        ));
+    }
+    let others: Vec<String> = others
+        .iter()
+        .map(|of| format!("{} ({})", of.joint, why_not(of)))
+        .collect();
+    if !others.is_empty() {
+        usual.paragraph(&format!("No formula confirmed: {}.", others.join(", ")));
+    }
+}
+
+/// The formulas as a file for `--candidates`.
+pub fn candidates(detail: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    for formula in &found.diagnosis.formulas {
+        if formula.end == FormulaEnd::Found {
+            let result = formula_result(machine, formula);
+            result.candidate.lines().for_each(|line| detail.line(line));
+        }
+    }
+}
+
 /// What a search came to, joint by joint.
 pub fn told(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     if !found.searched {
@@ -15,16 +57,14 @@ pub fn told(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     writer.heading("Formulas of what is left");
     let formulas = &found.diagnosis.formulas;
     if formulas.is_empty() {
-        writer.paragraph(
-            "No formula of few terms explains what is left of a joint: the signals on which it depends are told with it.",
-        );
+        writer.paragraph(NONE);
     }
     for formula in formulas {
         let result = formula_result(machine, formula);
-        writer.paragraph(&sentence(&result));
+        writer.paragraph(&sentence(machine, &result));
         if result.end == FormulaEnd::Found {
             writer.list(numbers(&result));
-            writer.code(result.candidate.trim());
+            writer.details("as a table for --candidates", result.candidate.trim());
             if let Some(picture) = &formula.picture {
                 writer.figures(&figure(machine, &result, picture));
             }
@@ -32,8 +72,20 @@ pub fn told(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     }
 }
 
-fn sentence(of: &FormulaResult) -> String {
-    let end = match of.end {
+fn why_not(of: &FormulaResult) -> String {
+    match of.end {
+        FormulaEnd::Found => String::new(),
+        FormulaEnd::Chance => format!(
+            "chance makes as much in {} of searches",
+            number::percent(of.p_value)
+        ),
+        FormulaEnd::Parts => "the parts of the data do not agree".to_owned(),
+        FormulaEnd::Worse => "a joint gets worse on data set aside".to_owned(),
+    }
+}
+
+fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
+    let mut end = match of.end {
         FormulaEnd::Found => format!(
             "It gains on blocks left out, all parts agree (s = {}), and chance makes as much in {} of searches; \
              `--accept formula:{}` writes it.",
@@ -41,15 +93,21 @@ fn sentence(of: &FormulaResult) -> String {
             number::percent(of.p_value),
             of.joint
         ),
-        FormulaEnd::Chance => format!(
-            "Not told from chance: {} of searches with other signs find as much.",
-            number::percent(of.p_value)
-        ),
-        FormulaEnd::Parts => "Not confirmed: the parts of the data do not agree on it.".to_owned(),
-        FormulaEnd::Worse => {
-            "Not confirmed: a joint gets worse by it on data set aside.".to_owned()
-        }
+        _ => format!("Not confirmed: {}.", why_not(of)),
     };
+    if let Some([without, with]) = of.at_reversals {
+        let joint = machine
+            .robot
+            .joint_names()
+            .iter()
+            .position(|n| *n == of.joint);
+        end += &format!(
+            " Within 0.1 s of a reversal, on data set aside, the residual is {} without it and {} {} with it (rms).",
+            number::significant(without, 3),
+            number::significant(with, 3),
+            machine.file.torque_unit(joint.unwrap_or(0))
+        );
+    }
     let place = match of.in_place_of.is_empty() {
         true => String::new(),
         false => format!(", in place of {}", of.in_place_of.join(", ")),

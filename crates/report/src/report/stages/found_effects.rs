@@ -1,6 +1,6 @@
 //! The effects that a diagnosis found, on a page: a table of their numbers, and a card for each that is written.
 
-use super::step_words::{alternatives, grade, in_words, titled, worsened};
+use super::step_words::{agreement, alternatives, grade, in_words, titled, worsened};
 use crate::report::Writer;
 use crate::report::sections::effects::{self, Said};
 use cft_ident_core::diagnose::FoundEffect;
@@ -44,7 +44,7 @@ fn no_gain(step: &FoundEffect) -> Option<String> {
 
 /// What is said of one effect besides its picture.
 fn words(machine: &LoggedRobot, step: &FoundEffect) -> Vec<String> {
-    let mut words = vec![format!("{}.", grade(step, &step.estimate))];
+    let mut words = vec![format!("{}.", grade(step))];
     if let Some([before, after]) = step.holdout {
         words.push(format!(
             "Held-out error, as the rms over the joints, the others kept and refitted: {} without it, {} with it{}.",
@@ -64,12 +64,19 @@ fn table(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             step.estimate.title(&machine.robot),
             in_words(machine, step),
             number::percent(step.share),
-            grade(step, &step.estimate),
+            grade(step).to_owned(),
+            agreement(step),
         ]
     };
     page.rows(
         "estimates, in the order in which the effects were found",
-        &["effect", "parameters", "gain on blocks left out", "grade"],
+        &[
+            "effect",
+            "parameters",
+            "gain on blocks left out",
+            "grade",
+            "agreement",
+        ],
         d.steps.iter().map(row).collect(),
     );
 }

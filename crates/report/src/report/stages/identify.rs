@@ -27,8 +27,9 @@ pub struct Identify<'a> {
     pub limit: Option<f64>,
     /// What was guessed of the robot file, with the lines to change.
     pub guesses: &'a [String],
-    /// Path of the model that is written last, as a shell takes it.
+    /// Path of the model that is written last, and the logs that were fitted, as a shell takes them.
     pub path: &'a str,
+    pub logs: &'a str,
 }
 
 impl Identify<'_> {
@@ -91,7 +92,8 @@ pub fn identify(of: &Identify) -> Report {
     of.verdicts(&mut report.everywhere());
     guesses(&mut report.terminal(), of.guesses);
     if let Some(diagnosed) = of.diagnosed() {
-        diagnose::diagnosed(&mut report, (machine, diagnosed), (of.model(), of.path));
+        let typed = (of.model(), of.path, of.logs);
+        diagnose::diagnosed(&mut report, (machine, diagnosed), typed);
     }
     if let Some(validated) = &found.validated {
         let caption = format!("torque on held-out data ({})", of.unseen.join(", "));
@@ -117,7 +119,7 @@ pub fn identify(of: &Identify) -> Report {
     let mut page = report.page();
     match (of.diagnosed(), &found.validated) {
         (Some(diagnosed), _) => {
-            first_screen::show(&mut page, machine, diagnosed);
+            first_screen::show(&mut page, (machine, diagnosed), (of.path, of.logs));
             diagnose::errors(&mut page, machine, diagnosed);
         }
         (None, Some(validated)) => {

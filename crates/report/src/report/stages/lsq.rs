@@ -103,7 +103,7 @@ fn bars(of: &Lsq) -> ErrorFigure {
         names: [String::new(), String::new()],
         joints: joints.collect(),
         limit: None,
-        usual: Some(usual::band(of.machine.file.log.torque_is)),
+        usual: Some(usual::drawn(of.machine.file.log.torque_is)),
     }
 }
 

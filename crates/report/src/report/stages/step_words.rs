@@ -23,38 +23,38 @@ pub(super) fn worsened(step: &FoundEffect) -> String {
     }
 }
 
-/// How firm an effect is, and how much of it is written.
-pub(super) fn grade(step: &FoundEffect, effect: &Added) -> String {
-    let parts = step.parts.len();
-    let s = number::significant(step.shrinkage, 2);
-    let percent = number::percent(step.shrinkage);
-    if step.accepted_by_user {
-        return format!("accepted by you; {parts} parts of the data give s = {s}");
-    }
+/// How firm an effect is, in a word, and whether it is written.
+pub(super) fn grade(step: &FoundEffect) -> &'static str {
     match (step.status, step.written) {
-        (StepStatus::Confirmed, Some(_)) if effect.law.entry.measurable => {
-            format!("confirmed by {parts} parts of the data (s = {s}), written as estimated")
-        }
-        (StepStatus::Confirmed, _) => {
-            format!("confirmed by {parts} parts of the data, written with {percent} of it")
-        }
-        (StepStatus::Indicated, Some(_)) if effect.law.entry.measurable => {
-            format!("indicated by {parts} parts of the data (s = {s}), written as estimated")
-        }
-        (StepStatus::Indicated, Some(_)) => {
-            format!("indicated by {parts} parts of the data, written with {percent} of it")
-        }
-        (StepStatus::Indicated, None) if step.vetoed() => {
-            format!("indicated (s = {s}), not written: held-out data are worse with it")
-        }
-        (StepStatus::Indicated, None) => format!(
-            "indicated (s = {s}), not written: it can be measured, and is written from s = 0.8 on"
+        _ if step.accepted_by_user => "written because you asked for it",
+        (StepStatus::Confirmed, _) => "confirmed",
+        (StepStatus::Indicated, Some(_)) => "indicated",
+        (StepStatus::Indicated, None) => "indicated, not written",
+        (StepStatus::Seen, _) => "nothing",
+    }
+}
+
+/// How far the parts of the data agree on an effect, and how much of it is written for that.
+pub(super) fn agreement(step: &FoundEffect) -> String {
+    let of_parts = format!(
+        "s = {} by {} parts of the data",
+        number::significant(step.shrinkage, 2),
+        step.parts.len()
+    );
+    let measurable = step.estimate.law.entry.measurable;
+    match (step.status, step.written) {
+        _ if step.accepted_by_user => of_parts,
+        (StepStatus::Seen, _) => "the parts of the data do not agree on its size".to_owned(),
+        (_, Some(_)) if measurable => format!("{of_parts}, written as estimated"),
+        (_, Some(_)) => format!(
+            "{of_parts}, written with {} of it",
+            number::percent(step.shrinkage)
         ),
-        (StepStatus::Seen, _) => {
-            "seen, not confirmed: the parts of the data do not agree on its size. It is not written, and nothing \
-             weaker in its place"
-                .to_owned()
+        (_, None) if step.vetoed() => format!("{of_parts}; held-out data are worse with it"),
+        (_, None) if measurable => {
+            format!("{of_parts}; it can be measured, and is written from s = 0.8 on")
         }
+        (_, None) => format!("{of_parts}; the model is worse with all that was found"),
     }
 }
 

@@ -93,7 +93,7 @@ fn bars(of: &Validate) -> ErrorFigure {
         names: ["on logs that made the model", "on unseen logs"].map(str::to_owned),
         joints: joints.collect(),
         limit: of.limit,
-        usual: Some(usual::band(of.machine.file.log.torque_is)),
+        usual: Some(usual::drawn(of.machine.file.log.torque_is)),
     }
 }
 
@@ -220,12 +220,8 @@ pub fn words(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, boo
     if let Some(worst) = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))
         && of.joints.len() > 1
     {
-        text += " (rms over the joints";
-        if let Some(all) = of.overall.relative_error {
-            text += &format!("; {} of all their torques together", number::percent(all));
-        }
         text += &format!(
-            "), most at {}: {}",
+            " (rms over the joints), most at {}: {}",
             worst.joint,
             number::percent(worst.relative_error)
         );
