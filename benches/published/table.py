@@ -8,7 +8,7 @@ import pathlib
 import sys
 
 results = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "docs/results")
-order = ["emps", "tx40", "panda", "ur10", "ur10e", "xmate7p", "kr300", "pendulum", "cogging"]
+order = ["emps", "tx40", "panda", "ur10", "ur10e", "dvrk", "xmate7p", "kr300", "pendulum", "cogging"]
 rows = [row for name in order for row in json.load(open(results / "published" / f"{name}.json"))["rows"]]
 rows = [{k: v if isinstance(v, str) else f"{v:.2f}" for k, v in row.items() if k != "joints"} for row in rows]
 study = {"study": "published errors of models, and ours by the same protocol [%]", "rows": rows}

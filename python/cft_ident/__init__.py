@@ -278,6 +278,16 @@ class Model:
         rows = _native.regressor(self._native, q, v, a)
         return rows[0] if one else rows
 
+    def regressor_blocks(self, q: Any, v: Any, a: Any, rows: int = 10_000) -> Iterator[Array]:
+        """The matrices Y of so many rows after one another, (rows, n, p) each: all together may not fit into memory.
+
+        Contiguous arrays of floats are not copied.
+        """
+        (q, v, a), _ = _motion(q, v, a)
+        for first in range(0, len(q), rows):
+            block = slice(first, first + rows)
+            yield _native.regressor(self._native, q[block], v[block], a[block])
+
     def mass_matrix(self, q: Any) -> Array:
         """The mass matrix: (N, n, n), or (n, n) for one row, in kg, kg m or kg m^2."""
         (q,), one = _motion(q)

@@ -29,6 +29,13 @@ def test_torques_are_links_and_friction_and_one_row_is_a_row_of_many(model):
     assert np.allclose(model.torque(q, still, still), model.gravity(q) + offset)
 
 
+def test_blocks_of_the_regressor_are_its_rows_one_after_the_other(model):
+    motions = motion(25, 6)
+    blocks = list(model.regressor_blocks(*motions, rows=10))
+    assert [len(block) for block in blocks] == [10, 10, 5]
+    assert np.array_equal(np.concatenate(blocks), model.regressor(*motions))
+
+
 def test_the_mass_matrix_is_symmetric_positive_and_the_derivative_of_the_torque(model):
     q, v, a = motion(20, 6)
     mass = model.mass_matrix(q)
