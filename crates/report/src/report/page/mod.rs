@@ -192,8 +192,11 @@ fn open_table(table: &Table) -> String {
         out.push_str("<tr>");
         for (c, cell) in row.iter().enumerate() {
             let name = head.get(c).filter(|_| cards && c > 0);
-            let name = name.map_or(String::new(), |n| format!(" data-of=\"{}\"", escaped(n)));
-            let _ = write!(out, "<td{}{name}>{}</td>", class(c), escaped(cell));
+            let name = name.map_or(String::new(), |n| {
+                format!(" data-of=\"{}\"", bound(&escaped(n)))
+            });
+            let cell = bound(&escaped(cell));
+            let _ = write!(out, "<td{}{name}>{cell}</td>", class(c));
         }
         out.push_str("</tr>\n");
     }
@@ -296,10 +299,15 @@ fn prose(text: &str) -> String {
                 out.push('`');
                 out.push_str(&safe);
             }
-            (false, _) => out.push_str(&safe.replace(" %", "\u{a0}%")),
+            (false, _) => out.push_str(&bound(&safe)),
         }
     }
     out
+}
+
+/// No line ends between a number and its percent sign.
+fn bound(safe: &str) -> String {
+    safe.replace(" %", "\u{a0}%")
 }
 
 /// Text as HTML may hold it.
