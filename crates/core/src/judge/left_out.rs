@@ -243,7 +243,7 @@ impl<'a> BlocksLeftOut<'a> {
 }
 
 /// Errors of blocks by fits without them, and by the fit to all.
-pub struct LeftOut {
+pub struct BlockErrors {
     /// Squared errors of each block by the fit of the others, `[block][joint]`.
     pub errors: Vec<Vec<f64>>,
     /// Values of the terms by all blocks.
@@ -252,7 +252,7 @@ pub struct LeftOut {
     pub without: Vec<DVector<f64>>,
 }
 
-impl LeftOut {
+impl BlockErrors {
     /// Of blocks whose sum is `total`, in this order; none where these data determine nothing, or where the weighted error is
     /// surely above `most`. The fit to all leaves no more of a block than the fit without it: it shows early what is above.
     pub fn up_to(

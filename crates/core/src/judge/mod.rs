@@ -28,7 +28,7 @@ mod tests;
 
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
-pub use left_out::{BlocksLeftOut, ErrorGain, LeftOut, compare, weighted};
+pub use left_out::{BlockErrors, BlocksLeftOut, ErrorGain, compare, weighted};
 pub use parts::{Agreement, LEAST_PARTS, agreement, agreement_on_share};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 

@@ -16,7 +16,7 @@ use super::hold_out::{Held, hold_out, or_warning};
 use super::known_friction::{FrictionBefore, FrictionOfFit};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::lsq_warnings::{confounded, held_by_parts, negative, rests, with_friction};
+use super::lsq_warnings::{confounded, negative, rests, with_friction};
 use super::model::{new_model, refined};
 use super::motion_fit::MotionFit;
 use super::open_loop::is_in_si;
@@ -317,6 +317,20 @@ pub fn lsq(
         found.held = or_warning(tried, &mut found.warnings)?;
     }
     Ok(found)
+}
+
+/// Friction that could move with the rows of logs stays where reduced ones have it: a warning.
+fn held_by_parts(settings: &LsqSettings, reduced: &[&ReducedLog]) -> Option<String> {
+    let part = reduced.first()?;
+    let moved = settings.friction.is_some()
+        && !settings.hold_friction
+        && settings.estimator == EstimatorKind::Wls;
+    moved.then(|| {
+        format!(
+            "the friction stays as it was given to `reduce`, as by --hold-friction: {} is a reduced log, and its rows hold no other; give logs to refine it",
+            part.name()
+        )
+    })
 }
 
 /// Adds to the covariance of a fit that of the gains by which its torques were made.

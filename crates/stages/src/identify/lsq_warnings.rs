@@ -2,8 +2,6 @@
 
 use super::estimate::Account;
 use super::logged_robot::LoggedRobot;
-use super::lsq::LsqSettings;
-use super::reduced::reduced_log::ReducedLog;
 use super::unknowns::FittedUnknown;
 use cft_ident_core::inertia::instruments::ReferenceSource;
 use cft_ident_core::inertia::solution::Confounded;
@@ -12,20 +10,6 @@ use cft_ident_core::math::descent::Ending;
 use cft_ident_core::number;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::model_file::is_positive;
-
-/// Friction that could move with the rows of logs stays where reduced ones have it: a warning.
-pub(super) fn held_by_parts(settings: &LsqSettings, reduced: &[&ReducedLog]) -> Option<String> {
-    let part = reduced.first()?;
-    let moved = settings.friction.is_some()
-        && !settings.hold_friction
-        && settings.estimator == EstimatorKind::Wls;
-    moved.then(|| {
-        format!(
-            "the friction stays as it was given to `reduce`, as by --hold-friction: {} is a reduced log, and its rows hold no other; give logs to refine it",
-            part.name()
-        )
-    })
-}
 
 pub(super) fn with_friction(law: bool) -> &'static str {
     match law {

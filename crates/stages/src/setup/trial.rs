@@ -8,7 +8,7 @@ use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::problem::{Problem, Rows};
-use cft_ident_core::judge::{ErrorGain, LeftOut, NUMBERS, Terms, agreement_on_share, compare};
+use cft_ident_core::judge::{BlockErrors, ErrorGain, NUMBERS, Terms, agreement_on_share, compare};
 use cft_ident_core::robot::Robot;
 
 /// A hypothesis as it was fitted.
@@ -106,7 +106,7 @@ impl Trial {
             order.sort_by(|a, b| error(b).total_cmp(&error(a)));
         }
         let block = |b: usize| mixed(&rows.blocks[b], &mix);
-        let left_out = LeftOut::up_to(&total, (&order, block), &terms, most)?;
+        let left_out = BlockErrors::up_to(&total, (&order, block), &terms, most)?;
         let mut errors = left_out.errors;
         for squares in &mut errors {
             let pairs = squares.iter_mut().zip(&terms.weights);
