@@ -105,7 +105,7 @@ impl<'a> BlocksLeftOut<'a> {
         let mut without = Vec::new();
         for (b, block) in sums.blocks.iter().enumerate() {
             let times = if b < fitted { -1.0 } else { 0.0 };
-            let (factor, values) = fit_without(terms, &all, (&own, block, times), &diagonal)?;
+            let (factor, values) = fit_without((terms, &own), &all, (block, times), &diagonal)?;
             let pull = (0..total.len())
                 .map(|j| pull(&block[j], &own[j], &values))
                 .collect();
@@ -283,7 +283,7 @@ impl BlockErrors {
         for &b in order {
             let block = block(b);
             let fitted = terms.squares(&block, &out.values);
-            let (_, values) = fit_without(terms, &all, (&own, &block, -1.0), &diagonal)?;
+            let (_, values) = fit_without((terms, &own), &all, (&block, -1.0), &diagonal)?;
             let errors = terms.squares(&block, &values);
             so_far += weigh(&errors);
             to_come -= weigh(&fitted);
@@ -299,9 +299,9 @@ impl BlockErrors {
 
 /// The factor and the values of the terms when a block is counted so many times more.
 fn fit_without(
-    terms: &Terms,
+    (terms, own): (&Terms, &[Vec<(usize, usize)>]),
     all: &(DMatrix<f64>, DVector<f64>),
-    (own, block, times): (&[Vec<(usize, usize)>], &[DMatrix<f64>], f64),
+    (block, times): (&[DMatrix<f64>], f64),
     diagonal: &[f64],
 ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
     let mut others = all.clone();

@@ -271,8 +271,8 @@ mod tests {
             [0, 1, 2, 3].map(|i| (above[i] - below[i]) / (2.0 * h))
         });
         for i in 0..4 {
-            let of = |k: usize| (slopes[k][i] * ENCODER_SCALE[k]).powi(2) / 12.0;
-            let wanted: f64 = (0..4).map(of).sum();
+            let steps = slopes.iter().zip(ENCODER_SCALE);
+            let wanted: f64 = steps.map(|(s, step)| (s[i] * step).powi(2) / 12.0).sum();
             let found = drive.encoder_variance(i, &q).unwrap();
             assert!((found / wanted - 1.0).abs() < 1e-6, "{i}: {found} {wanted}");
         }
