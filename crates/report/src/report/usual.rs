@@ -127,7 +127,7 @@ pub fn drawn(torque_is: Option<TorqueIs>) -> Usual {
     let words = match band == currents {
         true => format!("usual for motor currents: {}", percent(band)),
         false => format!(
-            "usual: {} (joint sensors) up to {} (motor currents)",
+            "usual: {} (joint sensors), {} (motor currents)",
             percent(range(Measured::Sensors)),
             percent(currents)
         ),

@@ -44,7 +44,7 @@ fn no_gain(step: &FoundEffect) -> Option<String> {
 
 /// What is said of one effect besides its picture.
 fn words(machine: &LoggedRobot, step: &FoundEffect) -> Vec<String> {
-    let mut words = vec![format!("{}.", grade(step))];
+    let mut words = vec![format!("Grade: {}.", grade(step))];
     if let Some([before, after]) = step.holdout {
         words.push(format!(
             "Held-out error, as the rms over the joints, the others kept and refitted: {} without it, {} with it{}.",
