@@ -277,6 +277,7 @@ pub fn diagnose(
                     found: &found,
                     refined: &refined,
                     path: "refined.toml",
+                    logs: "LOG",
                 });
                 let model = Model::of("refined.toml", refined)?;
                 Ok((told(&document.map_err(of_input)?, &report), Some(model)))
