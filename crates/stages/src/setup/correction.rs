@@ -136,10 +136,10 @@ impl Change {
         }
     }
 
-    /// Whether both are factors of the same channel.
+    /// Whether both are factors or signs of the same channel.
     pub(super) fn is_value_of(&self, other: &Change) -> bool {
         match (self, other) {
-            (Self::Scale(a, of, _), Self::Scale(b, also, f)) => a == b && of == also && *f != -1.0,
+            (Self::Scale(a, of, _), Self::Scale(b, also, _)) => a == b && of == also,
             (Self::Gear(a, _), Self::Gear(b, _)) => a == b,
             _ => false,
         }

@@ -109,6 +109,9 @@ impl<'a> Problem<'a> {
 
     /// Joints that are beyond the limits of the robot file under a correction.
     pub(super) fn beyond_limits(&self, by: &Correction) -> Vec<usize> {
+        if self.known.position.iter().all(Option::is_none) {
+            return Vec::new();
+        }
         let n = self.robot.joints();
         let mut carried = Carried::new(n);
         let mut beyond = vec![false; n];

@@ -34,10 +34,12 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
     }
     let look = Look { problem, stopped };
     let mut base = Correction::none(n);
+    let mut declared = None;
     for _ in 0..2 {
-        let declared = look.whole(&base, None, None);
+        declared = look.whole(&base, None, None);
         let (found, estimate) = look.round(&base, declared.as_ref());
-        out.driven = declared.map_or_else(Vec::new, |d| d.broken.friction);
+        let driven = declared.as_ref().map(|d| d.broken.friction.clone());
+        out.driven = driven.unwrap_or_default();
         out.estimate = estimate.filter(|_| out.found.is_empty());
         let Some(found) = found else { break };
         let sure = found.sure;
@@ -52,7 +54,7 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
         }
     }
     if out.found.is_empty()
-        && let Some(declared) = look.whole(&base, None, None)
+        && let Some(declared) = declared
     {
         out.without_gravity = look.without_gravity(&declared.trial);
         out.weights = weights(problem);
@@ -316,7 +318,8 @@ impl Look<'_> {
         }
         // another value of the same thing, clearly better, contradicts that of the list
         let contradicts = |f: &Trial| {
-            let same = f.change.as_ref().is_some_and(|c| c.is_value_of(&change));
+            let value = f.change.as_ref().filter(|_| change.times(1.0).is_some());
+            let same = value.is_some_and(|c| c.is_value_of(&change));
             let less = f.whole() * (1.0 + LIMITS.same) < best.trial.whole();
             same && less
                 && best
@@ -441,10 +444,7 @@ impl Look<'_> {
         let best = *order.first()?;
         let odd = |j: &Judged| j.trial.change.as_ref().map_or(0, |c| self.oddity(c));
         let alike = |j: &&&Judged| match (&best.trial.change, &j.trial.change) {
-            (Some(Change::Scale(a, of, _)), Some(Change::Scale(b, other, _))) => {
-                a == b && of == other
-            }
-            (Some(Change::Gear(a, _)), Some(Change::Gear(b, _))) => a == b,
+            (Some(best), Some(other)) => other.is_value_of(best),
             _ => false,
         };
         let everyone = self.problem.channels_that_move();

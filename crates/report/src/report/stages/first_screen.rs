@@ -20,7 +20,7 @@ pub fn show(
 }
 
 /// Paths of a command as a page has them: an absolute one by its last part, for a page is the same on every machine.
-fn local(words: &str) -> String {
+pub(super) fn local(words: &str) -> String {
     let word = |word: &str| match word.strip_prefix('/').and_then(|w| w.rsplit('/').next()) {
         Some(last) => last.to_owned(),
         None => word.to_owned(),

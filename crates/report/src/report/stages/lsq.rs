@@ -81,10 +81,8 @@ pub fn lsq(of: &Lsq) -> Report {
         motion(&mut page, fit);
     }
     page.figure(&bars(of).svg());
-    // a page is the same in another folder: names alone
-    let model = std::path::Path::new(of.path).file_name();
-    let model = model.map_or(of.path.into(), |name| name.to_string_lossy());
-    page.paragraph(&next(&names.join(" "), &escape(&model)));
+    let [logs, model] = [of.typed, of.path].map(first_screen::local);
+    page.paragraph(&next(&logs, &model));
     residuals(&mut page, of.found, &all);
     page.paragraph(&format!("{tally}."));
     report
