@@ -2,23 +2,26 @@
 //! are found, for what goes by a joint's direction goes by its law.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::candidates::{Candidate, NotTried, candidates, is_friction_law};
 use super::error::DiagnoseError;
 use super::prepared::PreparedCase;
 use super::problem::fit::determines_some;
-use super::problem::pass::{ColumnLayout, pass};
+use super::problem::pass::{ColumnLayout, Data, pass};
 use super::search::{Chosen, Field, Looked};
 use super::tables::verified;
 use super::watch::{UNWATCHED, Watch};
 use crate::effect::{Added, AugmentedModel};
 use crate::judge::{BlockSums, BlocksLeftOut, LEAST_PARTS, Terms, compare, weighted};
-use crate::motion::MotionError;
+use crate::motion::{MotionError, Stretch};
 
 /// Sums of products about a model.
 pub struct Summed {
     /// The declared model that they are about.
     pub about: AugmentedModel,
+    /// Friction laws by whose direction friction goes.
+    directions: Vec<Added>,
     pub layout: ColumnLayout,
     pub sums: BlockSums,
     /// The declared terms.
@@ -36,6 +39,8 @@ pub struct SearchedCase {
     pub looked: Vec<Looked>,
     /// Squared error of blocks left out by all that was chosen, in the weights of the joints.
     pub error: f64,
+    /// The same with as much noise again in the positions.
+    pub noisier: BlockSums,
     /// Friction laws by whose direction friction goes.
     pub directions: Vec<Added>,
     /// Whether the declared model explains more of blocks left out than no torque does.
@@ -51,18 +56,56 @@ impl PreparedCase<'_> {
         directions: &[Added],
     ) -> Result<Summed, MotionError> {
         let layout = ColumnLayout::of(&self.unknowns, candidates);
-        let mut beside = about.clone();
-        beside.effects.extend_from_slice(directions);
-        let columns = (&self.unknowns, candidates);
-        let sums = pass(&beside, columns, &layout, &self.data, &self.all_blocks)?;
         let mut declared = self.declared.terms(&self.unknowns, &layout, &about);
         declared.weights.clone_from(&self.fitted.weights);
-        Ok(Summed {
+        let mut summed = Summed {
             about,
+            directions: directions.to_vec(),
             layout,
-            sums,
+            sums: BlockSums::default(),
             declared,
-        })
+        };
+        summed.sums = self.passed(&summed, candidates, self.data.stretches)?;
+        Ok(summed)
+    }
+
+    /// A pass over stretches for the same columns.
+    fn passed(
+        &self,
+        summed: &Summed,
+        candidates: &[Candidate],
+        stretches: &[Stretch],
+    ) -> Result<BlockSums, MotionError> {
+        let mut beside = summed.about.clone();
+        beside.effects.extend_from_slice(&summed.directions);
+        let columns = (&self.unknowns, candidates);
+        let data = Data {
+            stretches,
+            ..self.data
+        };
+        pass(&beside, columns, &summed.layout, &data, &self.all_blocks)
+    }
+
+    /// The sums with as much noise again in the positions as they have, in the mean over both signs of it.
+    pub fn noisier(
+        &self,
+        summed: &Summed,
+        candidates: &[Candidate],
+    ) -> Result<BlockSums, MotionError> {
+        let mut candidates = candidates.to_vec();
+        let summed_too = candidates.iter_mut().zip(&summed.layout.candidates);
+        let not = summed_too.filter(|(_, terms)| terms.is_empty());
+        not.for_each(|(candidate, _)| candidate.bounds.clear());
+        let with = |sign: f64| {
+            let stretches = self.data.stretches.par_iter().enumerate();
+            let noisy = stretches.map(|(seed, s)| {
+                let filter = self.data.filters.of(s);
+                filter.with_added_noise(s, seed as u64, sign)
+            });
+            let noisy: Vec<Stretch> = noisy.collect::<Result<_, _>>()?;
+            self.passed(summed, &candidates, &noisy)
+        };
+        Ok(with(1.0)?.mean(&with(-1.0)?))
     }
 
     /// What is searched, by sums of products.
@@ -124,7 +167,9 @@ impl PreparedCase<'_> {
         if !chosen.is_empty() {
             summed = self.polished(&mut candidates, &summed, &chosen, &directions)?;
         }
+        let noisier = self.noisier(&summed, &candidates)?;
         Ok(SearchedCase {
+            noisier,
             error,
             determined,
             candidates,
@@ -148,7 +193,7 @@ impl PreparedCase<'_> {
         }
         let polished = self.polished(candidates, summed, laws, &[])?;
         let field = self.field(candidates, &polished, UNWATCHED);
-        let found = verified(&field, &polished.declared, laws, &self.blocks);
+        let found = verified(&field, &polished.declared, laws, &self.blocks, None);
         let agreed = found.iter().filter(|v| v.agreement.s > 0.0);
         let effects = agreed.map(|v| candidates[v.chosen.candidate].effect.clone());
         Ok(effects.collect())

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::problem::unknowns::{Unknowns, step};
 use super::search::{Chosen, Field, own_joint};
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{Agreement, Blocks, BlocksLeftOut, ErrorGain, Terms, agreement};
+use crate::judge::{Agreement, BlockSums, Blocks, BlocksLeftOut, ErrorGain, Terms, agreement};
 
 /// An effect that was chosen, with what its parts say.
 #[derive(Debug, Clone)]
@@ -50,18 +50,27 @@ fn places(field: &Field, declared: usize, effects: &[Chosen]) -> Vec<Vec<usize>>
 }
 
 /// Asks the parts of the data for every effect that was chosen; one that gains nothing beside all the others is not
-/// confirmed.
+/// confirmed. What sums with `noisier` positions change in an amplitude, the positions' own noise has done too.
 pub fn verified(
     field: &Field,
     declared: &Terms,
     chosen: &[Chosen],
     blocks: &Blocks,
+    noisier: Option<&BlockSums>,
 ) -> Vec<Verified> {
     let terms = declared.with(&field.terms_of(chosen));
     let values = terms.fit(&field.total(), &[]).values;
+    let fitted = 0..field.sums.blocks.len() - field.judging;
+    let noisier = noisier.map(|sums| sums.over(fitted));
     let places = places(field, declared.len(), chosen);
     let of = |(at, own): (usize, Vec<usize>)| {
         let mut agreement = agreement(field.sums, blocks, &terms, (&own, &values), field.numbers);
+        if let Some(sums) = &noisier {
+            let part = by_noise(&terms, sums, (declared.len(), &own, &values), &agreement);
+            let effect = &field.candidates[chosen[at].candidate].effect;
+            let measured = effect.law.entry.measurable;
+            agreement.doubt(if measured { part } else { part.max(0.0) }, field.numbers);
+        }
         if !is_needed(field, declared, chosen, at) {
             agreement.s = 0.0;
         }
@@ -72,6 +81,21 @@ pub fn verified(
         }
     };
     places.into_iter().enumerate().map(of).collect()
+}
+
+/// The part of an effect's amplitude that noise of the positions adds, or takes off, beside all the others as they are.
+/// An effect must not be made by noise; a number that can be measured must not be hidden by it either.
+fn by_noise(
+    terms: &Terms,
+    noisier: &[DMatrix<f64>],
+    (declared, own, values): (usize, &[usize], &DVector<f64>),
+    agreement: &Agreement,
+) -> f64 {
+    let others = (declared..terms.len()).filter(|i| !own.contains(i));
+    let held: Vec<(usize, f64)> = others.map(|i| (i, values[i])).collect();
+    let change = terms.fit(noisier, &held).values - values;
+    let own = own.iter().map(|i| change[*i]);
+    agreement.part(&DVector::from_vec(own.collect()))
 }
 
 /// Whether an effect passes the screen beside all the others, those that came after it too.

@@ -15,6 +15,36 @@ pub struct Agreement {
     pub s: f64,
     /// Amplitudes by part, those of parts in which its torque is next to nothing left out.
     pub parts: Vec<Vec<f64>>,
+    /// The amplitude of all parts, and their information on it.
+    whole: (DVector<f64>, DMatrix<f64>),
+}
+
+impl Agreement {
+    /// The part that a change is of the amplitude, along it.
+    pub fn part(&self, change: &DVector<f64>) -> f64 {
+        let (amplitude, information) = &self.whole;
+        let along = information * amplitude;
+        let size = amplitude.dot(&along);
+        if size > 0.0 {
+            change.dot(&along) / size
+        } else {
+            0.0
+        }
+    }
+
+    /// Counts an error of this part of the amplitude, which all parts of the data share, to their scatter.
+    pub fn doubt(&mut self, part: f64, numbers: &Numbers) {
+        let shape = (self.parts.len(), self.whole.0.len());
+        if self.z > 0.0 && part != 0.0 {
+            self.z = 1.0 / (1.0 / self.z + shape.0 as f64 * part * part);
+            self.s = factor(self.z, shape, numbers);
+        }
+    }
+}
+
+/// s of parts that agree so well on k numbers.
+fn factor(z: f64, (parts, k): (usize, usize), numbers: &Numbers) -> f64 {
+    doubt(parts, k, numbers).map_or(0.0, |doubt| (1.0 - doubt / z).max(0.0))
 }
 
 /// Least number of parts that have a deviation of their own.
@@ -89,6 +119,7 @@ fn judged(mut found: Vec<(DMatrix<f64>, DVector<f64>)>, numbers: &Numbers) -> Ag
         z: 0.0,
         s: 0.0,
         parts: Vec::new(),
+        whole: (DVector::zeros(k), DMatrix::zeros(k, k)),
     };
     let Some(all) = firm(&total, &total).cholesky() else {
         return none;
@@ -112,8 +143,9 @@ fn judged(mut found: Vec<(DMatrix<f64>, DVector<f64>)>, numbers: &Numbers) -> Ag
     };
     Agreement {
         z,
-        s: doubt(count, k, numbers).map_or(0.0, |doubt| (1.0 - doubt / z).max(0.0)),
+        s: factor(z, (count, k), numbers),
         parts,
+        whole: (amplitude, total),
     }
 }
 

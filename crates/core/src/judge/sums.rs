@@ -56,6 +56,15 @@ impl BlockSums {
         total
     }
 
+    /// The mean with other sums of the same blocks.
+    pub fn mean(mut self, other: &BlockSums) -> Self {
+        let pairs = self.blocks.iter_mut().zip(&other.blocks);
+        for (own, other) in pairs.flat_map(|(own, other)| own.iter_mut().zip(other)) {
+            *own = (&*own + other) * 0.5;
+        }
+        self
+    }
+
     /// Rows of each joint in all blocks.
     pub fn rows_of(&self, joint: usize) -> f64 {
         self.rows.iter().map(|rows| rows[joint]).sum()

@@ -187,6 +187,27 @@ fn what_is_there_is_chosen_confirmed_and_has_its_amplitude() {
 }
 
 #[test]
+fn an_error_that_all_parts_share_is_counted_to_their_scatter() {
+    let truth = |c: &[Vec<f64>], k: usize| 2.0 * c[2][k] + 0.6 * c[DECLARED + 8][k];
+    let found = Campaign::of(2, 1, 0.0, &truth).judged();
+    let (_, agreement, amplitude) = found.into_iter().find(|(c, ..)| *c == 8).unwrap();
+    let part = agreement.part(&nalgebra::DVector::from_element(1, 0.1 * amplitude));
+    assert!((part - 0.1).abs() < 0.01, "{part}");
+    let doubted = |part: f64| {
+        let mut own = agreement.clone();
+        own.doubt(part, &NUMBERS);
+        own
+    };
+    assert_eq!(doubted(0.0), agreement);
+    // an amplitude that is sure to a third is not there: P z is F with one degree of freedom above, 12 x 0.75 = 3 x 3
+    let parts = agreement.parts.len() as f64;
+    let third = doubted(1.0 / 3.0);
+    assert!(third.s == 0.0 && third.z < 9.0 / parts, "{third:?}");
+    let tenth = doubted(-0.1);
+    assert!(0.0 < tenth.s && tenth.s < agreement.s, "{tenth:?}");
+}
+
+#[test]
 fn what_only_one_part_asks_for_is_seen_and_not_written() {
     let rows = (RATE * SECONDS) as usize;
     let event = |c: &[Vec<f64>], k: usize| {

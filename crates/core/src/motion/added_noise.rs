@@ -1,5 +1,5 @@
-//! What biased the positions, done to them again: the filter that smoothed them, or added noise of their own level
-//! (SIMEX). What estimates make of it shows their bias.
+//! What biased the positions, done to them again: noise of their own level is added (SIMEX). What estimates make of it
+//! shows their bias.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,24 +8,6 @@ use super::MotionError;
 use super::stretch::{Parallel, Stretch};
 
 impl Parallel {
-    /// The stretch with its motion through the position filter a second time; none where there is no such
-    /// filter. To leading order this doubles what the filter took (Tukey's twicing, Exploratory Data Analysis, 1977).
-    ///
-    /// # Errors
-    /// [`MotionError`] where the stretch is too short for the filter.
-    pub fn smoothed_twice(&self, stretch: &Stretch) -> Result<Option<Stretch>, MotionError> {
-        let Some(filter) = &self.position else {
-            return Ok(None);
-        };
-        let mut again = stretch.clone();
-        for motion in [&mut again.q, &mut again.v, &mut again.a] {
-            for (j, channel) in motion.iter_mut().enumerate() {
-                filter.of(j).run(channel, 1)?;
-            }
-        }
-        Ok(Some(again))
-    }
-
     /// The stretch with white noise of its own positions' level, times `sign`, added to them. In the mean over both
     /// signs what is of first order in the noise is gone, and what is of second is there twice
     /// (Cook and Stefanski, J. Am. Stat. Assoc. 89, 1994). Velocity and acceleration get the noise as
@@ -116,53 +98,6 @@ pub(super) fn middle_roughness(x: &[f64], lag: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::motion::FilterSettings;
-
-    #[test]
-    fn smoothing_once_more_doubles_what_the_filter_takes_of_a_slow_wave() {
-        let settings = FilterSettings {
-            q_cutoff_hz: Some(60.0),
-            ..FilterSettings::default()
-        };
-        let parallel = Parallel::design(&settings, 1e-3).unwrap();
-        let filter = parallel.position.clone().unwrap();
-        let wave = |k: usize| (std::f64::consts::TAU * 30.0 * k as f64 * 1e-3).sin();
-        let raw: Vec<f64> = (0..3000).map(wave).collect();
-        let mut once = raw.clone();
-        filter.run(&mut once, 1).unwrap();
-        let stretch = Stretch {
-            dt: 1e-3,
-            t: (0..3000).map(|k| k as f64 * 1e-3).collect(),
-            q: vec![once.clone()],
-            v: vec![vec![0.0; 3000]],
-            a: vec![vec![0.0; 3000]],
-            tau: vec![vec![0.0; 3000]],
-            ..Stretch::default()
-        };
-        let twice = parallel.smoothed_twice(&stretch).unwrap().unwrap();
-        let off = |x: &[f64]| -> f64 {
-            let inner = 500..2500;
-            let pairs = x[inner.clone()].iter().zip(&raw[inner]);
-            pairs.map(|(x, r)| (x - r).powi(2)).sum::<f64>().sqrt()
-        };
-        let ratio = off(&twice.q[0]) / off(&once);
-        assert!((1.95..2.05).contains(&ratio), "{ratio}");
-        assert_eq!(twice.tau, stretch.tau);
-    }
-
-    #[test]
-    fn without_a_position_filter_there_is_nothing_to_double() {
-        let settings = FilterSettings {
-            q_order: 0,
-            ..FilterSettings::default()
-        };
-        let parallel = Parallel::design(&settings, 1e-3).unwrap();
-        assert!(
-            parallel
-                .smoothed_twice(&Stretch::default())
-                .unwrap()
-                .is_none()
-        );
-    }
 
     /// A slow motion read by an encoder of a known count, sampled slowly and fast, filtered wide and narrow: the
     /// noise that comes to it has the variance of the rounding, and the two signs are opposite.

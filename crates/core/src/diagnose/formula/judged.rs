@@ -134,13 +134,15 @@ impl PreparedCase<'_> {
             (chosen[at].gain, chosen[at].error) = judged;
         }
         let case = SearchedCase {
+            noisier: self.noisier(&summed, &candidates)?,
             candidates,
             summed,
             chosen,
             not_tried: searched.not_tried.clone(),
             looked: searched.looked.clone(),
             directions: searched.directions.clone(),
-            ..*searched
+            error: searched.error,
+            determined: searched.determined,
         };
         let judged = judge(self, &case)?;
         Ok((case, judged))

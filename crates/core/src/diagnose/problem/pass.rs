@@ -32,6 +32,7 @@ const MOST_ROWS: usize = 40_000;
 const LITTLE: f64 = 1e-4;
 
 /// Rows and what each of them counts.
+#[derive(Clone, Copy)]
 pub struct Data<'a> {
     pub stretches: &'a [Stretch],
     pub filters: &'a ParallelFilters,
