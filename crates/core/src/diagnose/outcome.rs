@@ -157,6 +157,16 @@ pub struct FormulaPicture {
     pub rows: Vec<[f64; 3]>,
 }
 
+/// What a model leaves of the torques.
+#[derive(Debug, Clone)]
+pub struct WhatIsLeft {
+    pub unexplained: Vec<Unexplained>,
+    /// What the residuals of joints with structure depend on, the strongest of each joint first.
+    pub dependence: Vec<Dependence>,
+    /// Part of the structure of each joint's residual that is unexplained on the fitted logs.
+    pub part_unexplained: Vec<f64>,
+}
+
 /// The outcome.
 pub struct Diagnosis {
     /// The model that is written: the given one where nothing is.
@@ -177,11 +187,10 @@ pub struct Diagnosis {
     pub after: SplitErrors,
     /// By the model that is written, where held-out data took something out of it.
     pub selected: Option<SplitErrors>,
-    pub unexplained: Vec<Unexplained>,
-    /// What the residuals of joints with structure depend on, the strongest of each joint first.
-    pub dependence: Vec<Dependence>,
-    /// Part of the structure of each joint's residual that is unexplained on the fitted logs.
-    pub part_unexplained: Vec<f64>,
+    /// What the model that is written leaves.
+    pub left: WhatIsLeft,
+    /// The same of the declared model alone, where something was added to it.
+    pub left_alone: Option<WhatIsLeft>,
     pub set_aside: Vec<SetAside>,
     pub changes: Vec<FrictionChange>,
     /// Root mean square of the filtered residual per joint.
@@ -209,7 +218,7 @@ impl Diagnosis {
 
     /// Joints whose residual still holds structure.
     pub fn structured_joints(&self) -> impl Iterator<Item = usize> {
-        let joints = self.unexplained.iter().enumerate();
+        let joints = self.left.unexplained.iter().enumerate();
         joints
             .filter(|(_, left)| left.is_structure())
             .map(|(j, _)| j)
@@ -254,6 +263,9 @@ impl Diagnosis {
             }
         }
         self.selected = Some(self.before.clone());
+        if let Some(alone) = self.left_alone.take() {
+            self.left = alone;
+        }
         self.model = given.clone();
         true
     }

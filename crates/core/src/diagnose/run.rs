@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::change::friction_changes;
 use super::error::DiagnoseError;
 use super::held_out::split_errors;
-use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors};
+use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors, WhatIsLeft};
 use super::prepared::{PreparedCase, filtered, residuals};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
@@ -111,40 +111,15 @@ impl PreparedCase<'_> {
             false => None,
         };
         // what is left is looked at with the numbers refitted: those that other logs gave are no missing physics
-        let last = match judged.written.effects.len() > case.given.effects.len() {
-            true => &judged.written,
-            false => &self.fitted.model,
-        };
-        let floor_of = |role| -> Result<Option<Vec<f64>>, MotionError> {
-            let own = case.stretches_of(role);
-            match own.is_empty() {
-                true => Ok(None),
-                false => noise(&residuals(last, &own), case, &own).map(Some),
-            }
-        };
-        let floor = floor_of(LogRole::Train)?.unwrap_or_default();
-        let floor_unseen = floor_of(LogRole::Holdout)?;
-        let found = self.moving(last, LogRole::Train)?;
-        let given = self.moving(&case.given, LogRole::Train)?;
-        let (found, given) = found
-            .zip(given)
-            .unwrap_or((refitted.clone(), refitted.clone()));
-        let unseen = self.moving(last, LogRole::Holdout)?;
-        let left = unexplained(&found, &floor, unseen.as_ref().zip(floor_unseen));
-        let structured = left.iter().enumerate().filter(|(_, l)| l.is_structure());
-        let structured: Vec<usize> = structured.map(|(j, _)| j).collect();
-        let residual = filtered(last, &self.data)?;
-        let torques: Vec<Torques> = case.stretches.par_iter().map(|s| last.torques(s)).collect();
-        let left_of = Left {
-            data: &self.data,
-            residual: &residual,
-            torques: &torques,
-        };
+        let alone = &self.fitted.model;
+        let added = judged.written.effects.len() > case.given.effects.len();
+        let last = if added { &judged.written } else { alone };
         let numbers = &case.numbers;
+        let left = self.what_is_left(last)?;
+        let residual_std = rms_of(&filtered(last, &self.data)?, self.split);
         Ok(Diagnosis {
-            dependence: dependences(&left_of, &structured, self.together),
-            part_unexplained: part_unexplained(&floor, &given, &found),
-            unexplained: left,
+            left,
+            left_alone: added.then(|| self.what_is_left(alone)).transpose()?,
             changes: friction_changes(self, searched),
             candidates: left_candidates(searched, numbers),
             determined: searched.determined,
@@ -159,13 +134,55 @@ impl PreparedCase<'_> {
             after,
             selected,
             set_aside: self.split.set_aside.clone(),
-            residual_std: rms_of(&residual, self.split),
+            residual_std,
             fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
             together: self.together,
             parts: self.blocks.parts,
             block_s: self.blocks.least_s,
             parts_needed: numbers.parts,
             formulas: Vec::new(),
+        })
+    }
+
+    /// What a model leaves of the torques, beside the noise.
+    fn what_is_left(&self, model: &AugmentedModel) -> Result<WhatIsLeft, DiagnoseError> {
+        let case = self.case;
+        let floor_of = |role| -> Result<Option<Vec<f64>>, MotionError> {
+            let own = case.stretches_of(role);
+            match own.is_empty() {
+                true => Ok(None),
+                false => noise(&residuals(model, &own), case, &own).map(Some),
+            }
+        };
+        let floor = floor_of(LogRole::Train)?.unwrap_or_default();
+        let floor_unseen = floor_of(LogRole::Holdout)?;
+        let found = self.moving(model, LogRole::Train)?;
+        let given = self.moving(&case.given, LogRole::Train)?;
+        let (found, given) = match found.zip(given) {
+            Some(both) => both,
+            None => {
+                let refitted = self.split_errors(&self.fitted.model)?.train;
+                (refitted.clone(), refitted)
+            }
+        };
+        let unseen = self.moving(model, LogRole::Holdout)?;
+        let unexplained = unexplained(&found, &floor, unseen.as_ref().zip(floor_unseen));
+        let structured = unexplained.iter().enumerate();
+        let structured = structured.filter(|(_, l)| l.is_structure()).map(|(j, _)| j);
+        let structured: Vec<usize> = structured.collect();
+        let residual = filtered(model, &self.data)?;
+        let torques: Vec<Torques> = (case.stretches.par_iter())
+            .map(|s| model.torques(s))
+            .collect();
+        let left = Left {
+            data: &self.data,
+            residual: &residual,
+            torques: &torques,
+        };
+        Ok(WhatIsLeft {
+            dependence: dependences(&left, &structured, self.together),
+            part_unexplained: part_unexplained(&floor, &given, &found),
+            unexplained,
         })
     }
 }

@@ -254,8 +254,8 @@ impl Diagnosed {
     pub fn result(&self, machine: &LoggedRobot) -> DiagnosisResult {
         let d = &self.diagnosis;
         let names = machine.robot.joint_names();
-        let left = d
-            .unexplained
+        let unexplained = &d.left.unexplained;
+        let left = unexplained
             .iter()
             .zip(names)
             .map(|(left, joint)| UnexplainedResult {
@@ -296,7 +296,12 @@ impl Diagnosed {
             free_run: self.free_run.clone(),
             changes: d.changes.iter().map(change).collect(),
             unexplained: left.collect(),
-            dependence: d.dependence.iter().map(|d| dependence(names, d)).collect(),
+            dependence: d
+                .left
+                .dependence
+                .iter()
+                .map(|d| dependence(names, d))
+                .collect(),
             formulas: self.searched.then(|| {
                 let all = d.formulas.iter();
                 all.map(|f| formula_result(machine, f)).collect()

@@ -252,7 +252,7 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
             &known(unseen(&d.before)),
             &known(unseen(now)),
             interval.as_deref().unwrap_or(number::ABSENT),
-            &hundred(d.unexplained[j].share),
+            &hundred(d.left.unexplained[j].share),
         ]);
     }
     table
@@ -264,7 +264,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let robot = &machine.robot;
     let open: Vec<String> = d
         .structured_joints()
-        .map(|j| match d.unexplained[j].over_floor {
+        .map(|j| match d.left.unexplained[j].over_floor {
             Some(over) => {
                 let times = match over < 100.0 {
                     true => number::significant(over, 2),
@@ -295,7 +295,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
 
 /// Part of the residual power above the noise that is explained, of all joints together.
 fn explained(d: &Diagnosis) -> Option<f64> {
-    let parts = d.unexplained.iter().zip(&d.part_unexplained);
+    let parts = d.left.unexplained.iter().zip(&d.left.part_unexplained);
     let known = parts.filter(|(left, part)| left.share > 0.0 && **part > 0.0 && part.is_finite());
     let (left, all) = known.fold((0.0, 0.0), |(left, all), (u, part)| {
         (left + u.share, all + u.share / part)
@@ -399,7 +399,7 @@ pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
         }
         let rms = number::significant(errors_of(now).1.joints[j].rmse, 3);
         row.push(format!("{rms} {}", machine.file.torque_unit(j)));
-        row.push(number::percent(d.unexplained[j].share));
+        row.push(number::percent(d.left.unexplained[j].share));
         row
     };
     let rows = machine.robot.joint_names().iter().enumerate().map(row);

@@ -193,7 +193,7 @@ fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
 /// The joint with the largest share of its torque left beyond the noise, and on what that depends.
 fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let names = machine.robot.joint_names();
-    let share = |j: &usize| d.unexplained[*j].share;
+    let share = |j: &usize| d.left.unexplained[*j].share;
     let worst = d
         .structured_joints()
         .max_by(|a, b| share(a).total_cmp(&share(b)))?;
@@ -205,7 +205,7 @@ fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
             names[worst]
         ),
     };
-    let dependence = d.dependence.iter().find(|of| of.joint == worst);
+    let dependence = d.left.dependence.iter().find(|of| of.joint == worst);
     let on = dependence.map(|of| {
         let signals = of.signals.iter().map(|s| signal_words(names, worst, *s));
         format!(

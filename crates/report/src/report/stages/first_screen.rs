@@ -124,7 +124,7 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed, (path, logs): (&str, &str)
             step.alternatives[0].title(&machine.robot)
         );
     }
-    let share = |j: &usize| d.unexplained[*j].share;
+    let share = |j: &usize| d.left.unexplained[*j].share;
     let worst = d
         .structured_joints()
         .max_by(|a, b| share(a).total_cmp(&share(b)));

@@ -10,7 +10,7 @@ use cft_ident_stages::identify::{Diagnosed, LoggedRobot, signal_words};
 /// What the residual that is left depends on, a sentence for each joint.
 pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let names = machine.robot.joint_names();
-    let all = &found.diagnosis.dependence;
+    let all = &found.diagnosis.left.dependence;
     let of_joint = |(j, name): (usize, &String)| {
         let told = all.iter().filter(|d| d.joint == j).map(|d| {
             let signals = d.signals.iter().map(|s| signal_words(names, j, *s));
@@ -35,7 +35,7 @@ pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String>
 
 /// The residual over the two signals on which it depends most, a map and a curve for each joint.
 pub(super) fn section(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
-    let all = found.diagnosis.dependence.iter();
+    let all = found.diagnosis.left.dependence.iter();
     let drawn = all.filter_map(|d| d.map.as_ref().map(|map| figure(machine, d.joint, map)));
     let drawn: Vec<MapFigure> = drawn.collect();
     if drawn.is_empty() {
