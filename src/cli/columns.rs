@@ -1,6 +1,7 @@
 //! Which columns of a log are which channels: by the robot file, or by their names.
 
 use super::CliError;
+use cft_ident_core::problem::{Explain, Problem};
 use cft_ident_logs::inspect::{
     ChannelColumn, ChannelRole, ColumnPlan, FaultKind, InspectedChannel, LogFault, Severity,
     is_time,
@@ -38,11 +39,8 @@ pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError>
     let names = log.names();
     let time = names.iter().position(|name| is_time(name));
     let time = time.or(log.split_clock()).ok_or_else(|| {
-        CliError::input(format!(
-            "{}: no column is a time; the header has {}",
-            log.log_name(),
-            log::list(names.iter().map(String::as_str))
-        ))
+        CliError::input(format!("{}: no column is a time", log.log_name()))
+        .hint(format!("the header has {}", log::list(names.iter().map(String::as_str))))
         .hint("name the time column, `time = ..`, or say the rate, `rate_hz = ..`, in [log] of a robot file and give it with -r")
         .hint("`cft-ident new NAME --log LOG --rate HZ` writes such a file")
     })?;
@@ -83,7 +81,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, V
         held: None,
         band_hz: Some(machine.settings().cutoff_hz),
     };
-    let refused = log.refused().map(|error| refusal(error.to_string()));
+    let refused = log.refused().map(|error| refusal(error.problem()));
     (plan, refused.into_iter().chain(missing).collect())
 }
 
@@ -245,15 +243,13 @@ fn limits(
 }
 
 /// What keeps the strict reader from a log, as a fault.
-fn refusal(text: String) -> LogFault {
-    let (effect, remedy) = text
-        .rsplit_once("; ")
-        .unwrap_or((&text, "correct the file"));
+fn refusal(problem: Problem) -> LogFault {
+    let remedy = problem.remedies.join("; ");
     LogFault::whole(
         Severity::Error,
         FaultKind::MissingChannel,
         0.0,
-        effect.to_owned(),
-        remedy,
+        problem.what,
+        &remedy,
     )
 }

@@ -2,6 +2,7 @@
 
 mod words;
 
+use cft_ident_core::problem::Explain;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -285,7 +286,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         false => (identify::refined(&given.value, &given.name)?, Vec::new()),
     };
     let model = &refined.model;
-    let failed = |error: ExportError| CliError::input(format!("{}: {error}", given.name));
+    let failed = |error: ExportError| CliError::input(error.problem().of(&given.name));
     let mut program = Program::with_effects(&refined).map_err(failed)?;
     program.rest_by(&given.value.robot);
     if let Some(rate_hz) = args.observer {

@@ -60,7 +60,7 @@ use cft_ident_stages::identify::{Log, ReducedLogs, is_reduced};
 
 pub use arguments::Destination;
 pub use context::{Context, RunningBar};
-pub use error::{CliError, with_sources};
+pub use error::CliError;
 pub use exit::Exit;
 pub use outcome::Outcome;
 

@@ -9,41 +9,42 @@ use std::path::Path;
 
 /// Rooms in pipeline order, each with the rooms that it may import. A new room gets a line here.
 const ROOMS: &[(&str, &str)] = &[
-    ("math", ""),
+    ("problem", ""),
+    ("math", "problem"),
     ("block", ""),
     ("verdict", ""),
     ("number", ""),
-    ("robot", "math"),
-    ("log", "math number robot block"),
-    ("config", "number robot log verdict"),
-    ("output", "log"),
-    ("motion", "math robot block"),
-    ("effect", "math number robot motion"),
-    ("export", "number robot config motion effect"),
+    ("robot", "problem math"),
+    ("log", "problem math number robot block"),
+    ("config", "problem number robot log verdict"),
+    ("output", "problem log"),
+    ("motion", "problem math robot block"),
+    ("effect", "problem math number robot motion"),
+    ("export", "problem number robot config motion effect"),
     ("band", "math number robot config motion effect"),
     (
         "observe",
         "math robot block log config motion effect band export",
     ),
-    ("open_loop", "math number robot motion effect"),
-    ("friction", "math robot block motion verdict"),
-    ("inertia", "math robot block motion verdict"),
+    ("open_loop", "problem math number robot motion effect"),
+    ("friction", "problem math robot block motion verdict"),
+    ("inertia", "problem math robot block motion verdict"),
     ("judge", ""),
-    ("diagnose", "math robot block motion effect judge"),
+    ("diagnose", "problem math robot block motion effect judge"),
     ("validate", "math robot block motion verdict"),
     ("inspect", "math number block log"),
-    ("setup", "math robot motion inertia judge"),
-    ("mapping", "robot log inspect"),
-    ("simulate", "math number robot log config effect"),
+    ("setup", "problem math robot motion inertia judge"),
+    ("mapping", "problem robot log inspect"),
+    ("simulate", "problem math number robot log config effect"),
     (
         "excite",
-        "math number verdict robot log config inertia simulate",
+        "problem math number verdict robot log config inertia simulate",
     ),
-    ("compare", "math robot config motion effect verdict"),
+    ("compare", "problem math robot config motion effect verdict"),
     ("track", ""),
     (
         "identify",
-        "math block verdict number robot log config motion effect friction inertia judge diagnose \
+        "problem math block verdict number robot log config motion effect friction inertia judge diagnose \
          validate inspect setup compare band observe open_loop track export",
     ),
     (
@@ -52,12 +53,12 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     (
         "report",
-        "math verdict number robot log config motion effect friction inertia diagnose validate \
+        "problem math verdict number robot log config motion effect friction inertia diagnose validate \
          inspect setup excite compare identify band observe open_loop track replay",
     ),
     (
         "cli",
-        "math block verdict number robot log config output motion effect friction inertia diagnose \
+        "problem math block verdict number robot log config output motion effect friction inertia diagnose \
          validate inspect mapping setup simulate excite compare identify report export band \
          observe open_loop track replay",
     ),

@@ -33,9 +33,13 @@
 
 #![forbid(unsafe_code)]
 
+// `cft-ident-derive` names this crate
+extern crate self as cft_ident_core;
+
 pub mod block;
 pub mod math;
 pub mod number;
+pub mod problem;
 pub mod robot;
 pub mod verdict;
 

@@ -1,5 +1,6 @@
 //! Noise levels, and what is used together with a design: logs and other trajectories.
 
+use cft_ident_core::problem::Explain;
 use std::path::Path;
 
 use super::Bench;
@@ -7,7 +8,7 @@ use crate::cli::error::CliError;
 use crate::cli::files;
 use cft_ident_core::inertia::accumulate;
 use cft_ident_files::config::RobotFile;
-use cft_ident_logs::log::LogSpec;
+use cft_ident_logs::log::{LogError, LogSpec};
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::{GivenInformation, Motion, foresee};
 use cft_ident_stages::identify::{IdentifyError, Log, LoggedRobot};
@@ -53,7 +54,7 @@ pub(super) fn add(
     }
     let spec: LogSpec = name
         .parse()
-        .map_err(|error| CliError::usage(format!("--with {name}: {error}")))?;
+        .map_err(|error: LogError| CliError::usage(error.problem().of(format!("--with {name}"))))?;
     let logs = LoggedRobot::new(name, bench.file.clone());
     let mut log = logs.open_positions(&Log::from(&spec), bench.context.control())?;
     let (sums, summary) = accumulate(

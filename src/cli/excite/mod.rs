@@ -189,19 +189,12 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A search that the user ended.
-#[derive(Debug, thiserror::Error)]
-#[error("interrupted; the best motion so far is written to {file}")]
-struct Stopped {
-    file: String,
-}
-
 impl From<ExciteError> for CliError {
     fn from(error: ExciteError) -> Self {
         match error {
             ExciteError::Config(error) => error.into(),
             ExciteError::Reference(error) => error.into(),
-            error => Self::from_room(Exit::BadInput, &error),
+            error => Self::input(error),
         }
     }
 }
@@ -395,9 +388,9 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         warnings.extend(judged.warnings.iter().cloned());
         all.push(judged);
         if found.stopped {
-            let stopped = Stopped { file: shown };
             context.files().commit()?;
-            return Err(CliError::from_room(Exit::Interrupted, &stopped));
+            return Err(CliError::new(Exit::Interrupted, "interrupted")
+                .hint(format!("the best motion so far is written to {shown}")));
         }
         let (information, rows) =
             foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;

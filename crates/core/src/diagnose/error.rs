@@ -2,28 +2,30 @@
 
 use crate::effect::formula::FormulaError;
 use crate::motion::MotionError;
+use crate::problem::{Explain, Problem};
 
 /// Why no diagnosis came out.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum DiagnoseError {
-    #[error(transparent)]
+    #[problem(_0.problem())]
     Motion(#[from] MotionError),
-    #[error(
-        "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} \
-         unknowns; give a longer log, or logs of their own by --holdout"
+    #[problem(
+        "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} unknowns",
+        "give a longer log, or logs of their own by --holdout"
     )]
     TooFewRows { rows: usize, unknowns: usize },
-    #[error(
-        "these logs determine none of the {unknowns} unknowns of the model; log a motion of every joint"
+    #[problem(
+        "these logs determine none of the {unknowns} unknowns of the model",
+        "log a motion of every joint"
     )]
     NothingDetermined { unknowns: usize },
-    #[error("the torque of joint {joint} is zero throughout; check its channel")]
+    #[problem("the torque of joint {joint} is zero throughout", "check its channel")]
     NoTorque { joint: String },
-    #[error("no effect {name} can be accepted: {why}")]
-    Accept { name: String, why: String },
-    #[error(transparent)]
+    #[problem(why.clone().of(format!("no effect {name} can be accepted")))]
+    Accept { name: String, why: Problem },
+    #[problem(_0.problem())]
     Formula(Box<FormulaError>),
-    #[error("interrupted")]
+    #[problem("interrupted")]
     Interrupted,
 }
 

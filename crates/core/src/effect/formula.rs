@@ -5,6 +5,7 @@ use super::law_text::exact;
 use super::place::Place;
 use super::scene::Scene;
 use crate::math::formula::{Formula, MOST_NAMES};
+use crate::problem::Explain;
 use crate::robot::{FormulaSignal, Robot};
 
 /// What a formula effect is made of, by name.
@@ -32,26 +33,29 @@ pub struct Shape {
 }
 
 /// Why a formula cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum FormulaError {
-    #[error("candidate `{name}` has the name of an effect that is known: give it another")]
+    #[problem("candidate `{name}` has the name of an effect that is known: give it another")]
     Known { name: String },
-    #[error("candidate `{name}`: this robot has no joint `{joint}`; it has {known}")]
+    #[problem(
+        "candidate `{name}`: this robot has no joint `{joint}`",
+        "it has {known}"
+    )]
     Joint {
         name: String,
         joint: String,
         known: String,
     },
-    #[error("candidate `{name}`, `{coefficient}`: `{formula}` is no formula: {why}")]
+    #[problem("candidate `{name}`, `{coefficient}`: `{formula}` is no formula: {why}")]
     Syntax {
         name: String,
         coefficient: String,
         formula: String,
         why: String,
     },
-    #[error(
-        "candidate `{name}`, `{coefficient}`: `{variable}` is not known; known are q, v, a, load, direction, \
-         temperature, since_reversal, play and dahl of the joint, the same of others (q_{joint}), t{shapes}"
+    #[problem(
+        "candidate `{name}`, `{coefficient}`: `{variable}` is not known",
+        "known are q, v, a, load, direction, temperature, since_reversal, play and dahl of the joint, the same of others (q_{joint}), t{shapes}"
     )]
     Variable {
         name: String,
@@ -60,7 +64,7 @@ pub enum FormulaError {
         joint: String,
         shapes: String,
     },
-    #[error(
+    #[problem(
         "candidate `{name}`, `{coefficient}`: `{variable}` needs its scale in m or rad: give it in `shapes` as `{scale}`"
     )]
     Scale {

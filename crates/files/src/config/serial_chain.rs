@@ -9,6 +9,7 @@ use super::robot_file::RobotSection;
 use super::serial_section::{
     BASE, CouplingSection, FollowsSection, LinkSection, MOST_LINKS, SineSection,
 };
+use cft_ident_core::problem::Explain;
 use cft_ident_core::robot::tree::space::{Rotation, Vector};
 use cft_ident_core::robot::tree::{
     Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError,
@@ -282,11 +283,12 @@ impl Misfit {
     }
 
     fn of_tree(error: &TreeError) -> Self {
-        let text = error.to_string();
-        let (problem, remedy) = text
-            .rsplit_once("; ")
-            .unwrap_or((&text, "correct [[robot.link]]"));
-        Self::of_robot(&format!("is \"serial\", but {problem}"), remedy)
+        let problem = error.problem();
+        let remedy = problem.remedies.first().map(String::as_str);
+        Self::of_robot(
+            &format!("is \"serial\", but {}", problem.what),
+            remedy.unwrap_or("correct [[robot.link]]"),
+        )
     }
 }
 

@@ -7,6 +7,7 @@
 //! sample, 2 (F S) . F + sum kappa c, with S and kappa fixed: the chain rule through the singular
 //! vectors and the multipliers.
 
+use cft_ident_core::problem::Explain;
 use nalgebra::DMatrix;
 
 use cft_ident_core::math::MathError;
@@ -26,11 +27,11 @@ const STEP: f64 = 2e-3;
 const FINER: usize = 4;
 
 /// Why a point has no value.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum NoValue {
-    #[error(transparent)]
+    #[problem(_0.problem())]
     Robot(#[from] RobotError),
-    #[error(transparent)]
+    #[problem(_0.problem())]
     Math(#[from] MathError),
 }
 

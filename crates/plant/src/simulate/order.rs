@@ -1,5 +1,6 @@
 //! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
 
+use cft_ident_core::problem::Problem;
 use std::ops::ControlFlow;
 
 use super::SimulateError;
@@ -306,13 +307,16 @@ fn drive<const J: usize>(
     }
     let Experiment::Volts { times, volts } = experiment else {
         return Err(SimulateError::Reference {
-            what: "there is neither a reference nor a series of volts".to_owned(),
+            what: "there is neither a reference nor a series of volts"
+                .to_owned()
+                .into(),
         });
     };
     let n = mechanism.joints();
     if !volts.len().is_multiple_of(n) {
         return Err(SimulateError::Volts {
-            what: format!("the robot has {n} motors, and the rows do not divide into {n} volts"),
+            what: format!("the robot has {n} motors, and the rows do not divide into {n} volts")
+                .into(),
         });
     }
     let rows = volts.chunks_exact(n);
@@ -360,9 +364,7 @@ fn built_effects(
         Some(fault) if !joint_channels => Err(SimulateError::EffectPlace {
             effect: fault.to_owned(),
             place: "this log".to_owned(),
-            why: "the robot file's [log] has the motors' channels alone, and faults of the data sit in joint \
-                  channels; let [log] read those"
-                .to_owned(),
+            why: Problem::new("the robot file's [log] has the motors' channels alone, and faults of the data sit in joint channels").remedy("let [log] read those"),
         }),
         _ => Ok((effects, values)),
     }

@@ -6,6 +6,7 @@
 use super::SimulateError;
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
+use cft_ident_core::problem::Problem;
 use cft_ident_core::robot::dynamics::Dynamics;
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::JointFriction;
@@ -91,7 +92,8 @@ impl<const J: usize> Plant<J> {
                     _ => "a serial robot",
                 };
                 return Err(SimulateError::Unsupported {
-                    what: format!("{what} has no parameters of its own; give a model with -m"),
+                    what: Problem::new(format!("{what} has no parameters of its own"))
+                        .remedy("give a model with -m"),
                 });
             }
         };

@@ -1,5 +1,6 @@
 //! What the torque residual still holds, and the effects behind it.
 
+use cft_ident_core::problem::Explain;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -279,13 +280,12 @@ pub fn diagnose(
 
 /// Channels that are no torques, as a fault: gains that differ look like friction and loads.
 fn without_gains(machine: &LoggedRobot) -> Option<DataFault> {
-    let error = machine.check_gains().err()?.to_string();
-    let (effect, remedy) = error.split_once("; ").unwrap_or((&error, ""));
+    let problem = machine.check_gains().err()?.problem();
     Some(DataFault {
         kind: "gains".to_owned(),
         channel: Some("torque".to_owned()),
-        effect: effect.to_owned(),
-        remedy: remedy.to_owned(),
+        effect: problem.what,
+        remedy: problem.remedies.join("; "),
     })
 }
 

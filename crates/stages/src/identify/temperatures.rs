@@ -5,6 +5,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::effect::{AugmentedModel, Law};
 use cft_ident_core::motion::Stretch;
+use cft_ident_core::problem::{Explain, Problem};
 use cft_ident_logs::log::{Instant, LogError, Temperatures};
 
 /// A temperature that an effect takes.
@@ -50,7 +51,10 @@ pub(super) fn none_on(stream: &str, model: &AugmentedModel) -> IdentifyError {
         log: stream.to_owned(),
         effect,
         joint: model.model.robot.joint_names()[joint].clone(),
-        why: "rows that arrive on a stream carry none; watch the log as a file".to_owned(),
+        why: Box::new(
+            Problem::new("rows that arrive on a stream carry none")
+                .remedy("watch the log as a file"),
+        ),
     }
 }
 
@@ -147,18 +151,19 @@ impl LoggedRobot {
     fn no_temperature(&self, log: &Log, effect: &str, joint: usize) -> IdentifyError {
         let name = &self.robot.joint_names()[joint];
         let why = match (self.temperatures(log, Instant::default()), log) {
-            (Err(error), _) => error.to_string(),
-            (Ok(_), Log::Arrays(_)) => "give it with the log's other arrays".to_owned(),
+            (Err(error), _) => error.problem(),
+            (Ok(_), Log::Arrays(_)) => "give it with the log's other arrays".into(),
             (Ok(_), _) => format!(
                 "name its column, `[log.joint.{name}] temperature = \"COLUMN\"` in the robot or model file, or leave {name} \
                  out of the formula and of the `joints` of its [[candidate]] table"
-            ),
+            )
+            .into(),
         };
         IdentifyError::NoTemperature {
             log: log.name(),
             effect: effect.to_owned(),
             joint: name.clone(),
-            why,
+            why: Box::new(why),
         }
     }
 }

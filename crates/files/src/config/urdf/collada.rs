@@ -23,7 +23,7 @@ type Affine = (Rotation, Vector);
 /// What the file lacks, and what it holds that is not known.
 pub(super) fn vertices(text: &str) -> Result<Vec<Vector>, String> {
     let text = xml::without_comments(text);
-    let tree = xml::Tree::parse(&text).map_err(|e| format!("line {}: {}", e.line, e.message))?;
+    let tree = xml::Tree::parse(&text).map_err(|e| format!("line {}: {}", e.line, e.problem))?;
     let root = tree.root();
     if root.name() != "COLLADA" {
         return Err("has no <COLLADA>".to_owned());

@@ -120,7 +120,7 @@ impl UrdfChain {
         let tree = xml::Tree::parse(&text).map_err(|wrong| ConfigError::Syntax {
             file: file.to_owned(),
             line: wrong.line,
-            message: wrong.message,
+            problem: wrong.problem,
         })?;
         let place = Place { file, angles };
         tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)

@@ -1,5 +1,6 @@
 //! `weight`: the moment of a point mass on a lever.
 
+use cft_ident_core::problem::Problem;
 use super::{Built, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::weight::ENTRY;
 
@@ -10,7 +11,7 @@ pub static LAW: PlantLaw = PlantLaw {
         if !site.turns {
             return Err(site.refuse(
                 ENTRY.name,
-                "its lever turns about an axis, and this joint slides; use `torque-offset`",
+                Problem::new("its lever turns about an axis, and this joint slides").remedy("use `torque-offset`"),
             ));
         }
         Built::plant(Weight {

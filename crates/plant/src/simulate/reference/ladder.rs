@@ -6,6 +6,7 @@
 //! range (there gravity and inertia show their dependence on position); slow strokes are inserted in
 //! pairs behind them and take the time that is left.
 
+use cft_ident_core::problem::Problem;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -147,13 +148,13 @@ impl LadderPlan {
         let shortest = self.lay_out(&order, 0.0, mirrored);
         if shortest.end > self.seconds {
             return Err(SimulateError::Reference {
-                what: format!(
-                    "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s; give more \
-                     seconds, fewer speeds or a smaller range",
+                what: Problem::new(format!(
+                    "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s",
                     speeds.len(),
                     shortest.end / passes as f64,
                     self.seconds / passes as f64
-                ),
+                ))
+                .remedy("give more seconds, fewer speeds or a smaller range"),
             });
         }
         let (mut low, mut high) = (0.0, self.seconds);
@@ -187,31 +188,28 @@ impl LadderPlan {
             return Ok(ladder);
         };
         Err(SimulateError::Reference {
-            what: format!(
-                "the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]; give a \
-                 shorter turn, a lower speed or a wider range",
-                stroke.speed,
-                self.turn,
-                stroke.length()
-            ),
+            what: Problem::new(format!("the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]", stroke.speed, self.turn, stroke.length())).remedy("give a shorter turn, a lower speed or a wider range"),
         })
     }
 
     fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: String| Err(SimulateError::Reference { what });
+        let reject = |what: Problem| Err(SimulateError::Reference { what });
         let (low, high) = self.range;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(low.is_finite() && high.is_finite() && high > low) {
-            return reject(format!("the range [{low}, {high}] of the ladder is empty"));
+            return reject(format!("the range [{low}, {high}] of the ladder is empty").into());
         }
         if !(positive(self.acceleration) && positive(self.turn) && positive(self.seconds)) {
-            return reject(format!(
-                "acceleration {}, turn time {} s and duration {} s must be positive",
-                self.acceleration, self.turn, self.seconds
-            ));
+            return reject(
+                format!(
+                    "acceleration {}, turn time {} s and duration {} s must be positive",
+                    self.acceleration, self.turn, self.seconds
+                )
+                .into(),
+            );
         }
         if self.speeds.is_empty() {
-            return reject("the ladder has no speeds; give at least one".to_owned());
+            return reject(Problem::new("the ladder has no speeds").remedy("give at least one"));
         }
         let fastest = top_speed(self.range, self.acceleration);
         for &speed in &self.speeds {
@@ -220,7 +218,7 @@ impl LadderPlan {
                     "the speed {speed} does not fit: over the range [{low}, {high}] at an acceleration of {} \
                      the ladder reaches {fastest:.4}",
                     self.acceleration
-                ));
+                ).into());
             }
         }
         Ok(())
@@ -472,7 +470,7 @@ mod tests {
             let mut plan = plan();
             change(&mut plan);
             match plan.build(None).and_then(|built| plan.within_range(built)) {
-                Err(SimulateError::Reference { what }) => what,
+                Err(SimulateError::Reference { what }) => what.to_string(),
                 other => panic!("{other:?}"),
             }
         };

@@ -1,6 +1,7 @@
 //! A figure as PNG: the SVG drawn in pixels, with the fonts that come with the crate, so that it looks
 //! the same on every machine.
 
+use cft_ident_core::problem::Explain;
 use std::sync::{Arc, OnceLock};
 
 use resvg::tiny_skia::{Pixmap, Transform};
@@ -15,13 +16,16 @@ const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
 const SCALE: f32 = 3.0;
 
 /// Why there is no picture.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum PngError {
-    #[error("the figure cannot be read back: {0}; write it as .svg")]
+    #[problem("the figure cannot be read back: {_0}", "write it as .svg")]
     Figure(#[from] resvg::usvg::Error),
-    #[error("a picture of {width} x {height} px does not fit into memory; write it as .svg")]
+    #[problem(
+        "a picture of {width} x {height} px does not fit into memory",
+        "write it as .svg"
+    )]
     Size { width: u32, height: u32 },
-    #[error("the picture cannot be encoded: {0}; write it as .svg")]
+    #[problem("the picture cannot be encoded: {_0}", "write it as .svg")]
     Encoding(String),
 }
 
