@@ -10,9 +10,6 @@ use cft_ident_logs::log::{self, DeclaredChannels, Layout, RawReader};
 use cft_ident_stages::identify::LoggedRobot;
 
 /// Channels by their names alone.
-///
-/// # Errors
-/// Where no column is a time.
 pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>), CliError> {
     let time = match log.is_timed() && !log.is_recording() {
         true => None,
@@ -32,9 +29,6 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>)
 }
 
 /// Place of the time, and seconds per unit of it.
-///
-/// # Errors
-/// Where no column is a time.
 pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError> {
     let names = log.names();
     let time = names.iter().position(|name| is_time(name));
@@ -53,8 +47,7 @@ pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError>
     }
 }
 
-/// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
-/// reading the log.
+/// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from reading the log.
 pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Vec<LogFault>) {
     let layout = log.layout();
     let names = log.names();

@@ -119,8 +119,7 @@ impl Context {
         ending.take()
     }
 
-    /// The command as it was typed, without folders from the root on and without what does not
-    /// change a result.
+    /// The command as it was typed, without folders from the root on and without what does not change a result.
     pub fn command(&self) -> &str {
         &self.command
     }
@@ -151,10 +150,6 @@ impl Context {
 
     /// Looks at the outputs of a command, the JSON document's file among them, before the long run.
     /// A file that is renewed in place is not given in `inputs`.
-    ///
-    /// # Errors
-    /// Usage, when two outputs are one file, or an output would overwrite one of `inputs`; output,
-    /// when a folder is missing or cannot be written.
     pub(crate) fn check_outputs(
         &self,
         inputs: &[&Path],
@@ -198,8 +193,7 @@ impl Context {
         Ok(self.files.write(path, &picture)?)
     }
 
-    /// A warning about what was given, for the document and for standard error; once, however often it is
-    /// found.
+    /// A warning about what was given, for the document and for standard error; once, however often it is found.
     pub(crate) fn warn(&self, text: &str) {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         if !told.iter().any(|known| known == text) {

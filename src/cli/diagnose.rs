@@ -75,9 +75,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
     let inputs: Vec<&Path> = logs

@@ -248,9 +248,6 @@ fn without(file: &ModelFile, effects: bool) -> ModelFile {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; a file that cannot be made keeps none from being written that was.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let side = args.urdf.as_ref().map(|path| path.with_extension("toml"));
     let formats = formats(args);

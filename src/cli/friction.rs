@@ -52,9 +52,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     let mut outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());

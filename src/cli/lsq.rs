@@ -66,9 +66,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     inputs.extend(

@@ -278,9 +278,6 @@ fn removed(answer: &clap::Error) -> Option<CliError> {
 
 /// Runs one command line, the program's name first, and gives its result instead of showing it; the files that it
 /// writes get their names.
-///
-/// # Errors
-/// Every [`CliError`]; arguments that are not understood are one of usage.
 pub fn perform(arguments: &[OsString], interrupted: Arc<AtomicBool>) -> Result<Outcome, CliError> {
     let cli = Cli::try_parse_from(arguments)
         .map_err(|answer| CliError::usage(answer.render().to_string().trim_end()))?;

@@ -45,9 +45,6 @@ pub struct ShownModel {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs: Vec<&Path> = args.report.as_deref().into_iter().collect();
     context.check_outputs(&[&args.model], &outputs)?;

@@ -35,9 +35,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
     let outputs = args.output.iter().chain(&args.report);

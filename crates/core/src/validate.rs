@@ -219,9 +219,6 @@ impl<'a> Reconstruction<'a> {
 
     /// Runs one log through with the processing that the model declares. `row` gets every raw
     /// sample.
-    ///
-    /// # Errors
-    /// Those of the source and of [`motion::run`].
     pub fn add<E>(
         &mut self,
         settings: &FilterSettings,

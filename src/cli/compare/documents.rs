@@ -12,9 +12,6 @@ use cft_ident_report::report::stages;
 use cft_ident_stages::compare::runs;
 
 /// Lists what differs between two documents.
-///
-/// # Errors
-/// A file that is no such document; documents of two commands.
 pub(super) fn run([a, b]: [&Path; 2], context: &Context) -> Result<Outcome, CliError> {
     let (a, b) = (read(a)?, read(b)?);
     let names = [&a, &b].map(|(name, ..)| name.clone());

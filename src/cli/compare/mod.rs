@@ -45,9 +45,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = args.logs.iter().map(|l| l.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.a.as_path(), args.b.as_path()]).collect();

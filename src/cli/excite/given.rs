@@ -16,8 +16,7 @@ use cft_ident_stages::identify::{IdentifyError, Log, LoggedRobot};
 /// Share of a joint's usual torque that its noise is taken for, where the robot file does not say.
 const NOISE_SHARE: f64 = 0.01;
 
-/// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque, or 1 where no torque is
-/// foreseen.
+/// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque, or 1 where no torque is foreseen.
 pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut ForeseenRobot) {
     let known = machine.source.known();
     let names = machine.model.robot.joint_names();

@@ -215,9 +215,6 @@ struct Bench<'a> {
 }
 
 /// Designs or checks.
-///
-/// # Errors
-/// Every [`CliError`]; a search that is stopped writes the best motion that it has first.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all = Names::of(args);
     let mut read: Vec<&Path> = args.robot.iter().map(PathBuf::as_path).collect();

@@ -65,9 +65,6 @@ fn parameters(file: &RobotFile, robot: &Robot) -> Option<Vec<f64>> {
 }
 
 /// What is to be said of torques that the weights do not go with.
-///
-/// # Errors
-/// Interruption. A log that cannot be read says nothing.
 pub(super) fn warning(
     file: &RobotFile,
     spec: &LogSpec,

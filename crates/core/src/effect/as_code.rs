@@ -17,9 +17,6 @@ pub const INERTIA: usize = 9;
 
 impl EffectsCode {
     /// Those of a model.
-    ///
-    /// # Errors
-    /// [`EffectError::NoCode`].
     pub fn of(refined: &AugmentedModel) -> Result<Self, EffectError> {
         let mut out = EffectsCode {
             lead_s: vec![0.0; refined.model.robot.joints()],

@@ -100,9 +100,6 @@ enum Input {
 
 impl Formulas {
     /// Reads the formulas of a definition.
-    ///
-    /// # Errors
-    /// [`FormulaError`].
     pub(super) fn of(definition: &Definition, robot: &Robot) -> Result<Self, FormulaError> {
         let name = &definition.name;
         let names = robot.joint_names();
@@ -277,9 +274,6 @@ impl Formulas {
 impl Formulas {
     /// The torque at joint `joint` as an expression of generated code, for the text of a signal; and whether it
     /// hangs on the time.
-    ///
-    /// # Errors
-    /// What has no text.
     pub(super) fn code(
         &self,
         joint: usize,

@@ -60,9 +60,6 @@ impl Values<'_> {
     }
 
     /// The same of a key that may be left out.
-    ///
-    /// # Errors
-    /// [`EffectError::Value`].
     pub(crate) fn get_or(&self, key: &str, absent: f64) -> Result<f64, EffectError> {
         match self.given.contains_key(key) {
             true => self.get(key),

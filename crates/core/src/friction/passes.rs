@@ -349,8 +349,7 @@ pub(super) fn refine_others(
     }
 }
 
-/// Noise levels of highest likelihood at fixed parameters; the position's never below the
-/// resolution's own.
+/// Noise levels of highest likelihood at fixed parameters; the position's never below the resolution's own.
 fn tune(
     problem: &FrictionProblem,
     p: &[f64],

@@ -92,9 +92,6 @@ pub struct CausalSample<'a> {
 
 impl CausalMotion {
     /// For logs of so many joints, by the position filter of `settings`.
-    ///
-    /// # Errors
-    /// [`MotionError::Setting`].
     pub fn new(joints: usize, settings: &FilterSettings) -> Result<Self, MotionError> {
         Ok(Self {
             joints,

@@ -182,8 +182,7 @@ impl<'a> Document<'a> {
         Some(text.trim())
     }
 
-    /// Goes along `path` as far as it exists; `seen` gets the spans of each key (of the value, in an
-    /// array) and value.
+    /// Goes along `path` as far as it exists; `seen` gets the spans of each key (of the value, in an array) and value.
     fn follow(&self, path: &[&str], mut seen: impl FnMut(Range<usize>, Range<usize>)) {
         let Ok(root) = DeTable::parse(self.text) else {
             return;

@@ -50,10 +50,6 @@ impl RobotSection {
     }
 
     /// The serial robot that the section describes.
-    ///
-    /// # Errors
-    /// What is wrong, the index of the link or coupling and the key where one can be named, and
-    /// what to do.
     pub(super) fn serial(&self) -> Result<Robot, Misfit> {
         let names = Names {
             links: self.link_names(),
@@ -124,9 +120,6 @@ impl RobotSection {
     }
 
     /// The robot of a section that was checked.
-    ///
-    /// # Panics
-    /// Where it was not: [`super::check`] lets no such file through.
     pub(super) fn checked_serial(&self) -> Robot {
         self.serial().expect("the robot section was checked")
     }

@@ -10,8 +10,7 @@ use crate::log::{
     Block, Bridge, DeclaredChannels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
 };
 
-/// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven
-/// clock closes none.
+/// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven clock closes none.
 const WIDER: f64 = 1.1;
 /// Readings at most that look for what was hidden by what an earlier one found.
 const ROUNDS: usize = 4;

@@ -42,8 +42,7 @@ impl Word {
     }
 }
 
-/// Whether a capital with what follows it begins a word of its own: `Pos` in `AIPos`, `In` in `qIn`; not `Nm`
-/// in `mNm`.
+/// Whether a capital with what follows it begins a word of its own: `Pos` in `AIPos`, `In` in `qIn`; not `Nm` in `mNm`.
 fn begins_word(rest: &str) -> bool {
     let mut letters = rest.chars();
     let first = letters.next().is_some_and(char::is_uppercase);

@@ -203,9 +203,6 @@ pub fn sha256_of_bytes(bytes: &[u8]) -> String {
 }
 
 /// Bytes of a whole file.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, LogError> {
     let mut all = Vec::new();
     let read = open(path)?.read_to_end(&mut all);

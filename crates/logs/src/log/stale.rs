@@ -65,8 +65,7 @@ impl Stale {
         self.keep = keep;
     }
 
-    /// Rows for which each sample was held, where at least every other row of the motion is one that
-    /// was held.
+    /// Rows for which each sample was held, where at least every other row of the motion is one that was held.
     pub(super) fn hold(&self) -> Option<usize> {
         let held = self.moving >= SAMPLES && 2 * self.held >= self.moving;
         let rows = 1.0 + self.held as f64 / self.moving.max(1) as f64;

@@ -130,8 +130,7 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
     out
 }
 
-/// Place of the first position, number of joints and distance between positions, where velocities show
-/// them.
+/// Place of the first position, number of joints and distance between positions, where velocities show them.
 fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, usize, usize)> {
     let m = columns.len();
     let is_rate = |q: usize, dq: usize| likeness(columns[q], columns[dq]) > VELOCITY_CORRELATION;

@@ -223,8 +223,7 @@ fn in_a_row(sorted: &[u32]) -> bool {
     sorted.windows(2).all(next)
 }
 
-/// The places of `count` joints whose names differ in a number alone, in the order of the numbers, which
-/// are in a row.
+/// The places of `count` joints whose names differ in a number alone, in the order of the numbers, which are in a row.
 fn numbered_alike(joints: &[&str], count: usize) -> Option<Vec<usize>> {
     let mut groups: BTreeMap<String, Vec<(u32, usize)>> = BTreeMap::new();
     for (k, joint) in joints.iter().enumerate() {

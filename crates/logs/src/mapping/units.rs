@@ -61,8 +61,7 @@ const TORQUES: [(&str, &[&str]); 10] = [
     ("A", &["amp", "amps", "ampere", "amperes"]),
     ("V", &["volt", "volts"]),
 ];
-/// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of
-/// axes.
+/// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of axes.
 const SHORT_UNITS: [(&str, &str); 5] =
     [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
 

@@ -149,9 +149,6 @@ pub fn design_ladder(
 }
 
 /// What a log of a one-joint move says about the joint's friction law.
-///
-/// # Errors
-/// As [`design_ladder`].
 pub fn foresee_ladder(
     machine: &ForeseenRobot,
     task: &LadderTask,

@@ -178,9 +178,6 @@ pub fn spectrum(series: &Series) -> Vec<Vec<f64>> {
 
 /// Frequency \[Hz\] below which a share of the torque's power along the period lies, per joint; the
 /// constant part is left out. What lies above a log's filter is lost to the fit.
-///
-/// # Errors
-/// [`ExciteError::Robot`] where the machine cannot follow.
 pub(crate) fn torque_band(
     machine: &ForeseenRobot,
     series: &Series,

@@ -330,9 +330,6 @@ impl<'a> Objective<'a> {
     }
 
     /// Moves the multipliers to what the violations at z ask for, and the weight up.
-    ///
-    /// # Errors
-    /// As [`Self::evaluate`].
     pub fn update(
         &self,
         z: &[f64],

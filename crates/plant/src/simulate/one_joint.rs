@@ -15,8 +15,7 @@ const SPEED_SHARE: f64 = 0.95;
 const MARGIN: f64 = 0.05;
 /// Ratio of the fastest to the slowest plateau, where nothing is known of the speeds that matter.
 const SPEED_RATIO: f64 = 300.0;
-/// Strokes per second^2 that the acceleration stands for where nothing bounds it: a full one takes about a
-/// second.
+/// Strokes per second^2 that the acceleration stands for where nothing bounds it: a full one takes about a second.
 const STROKES: f64 = 8.0;
 
 /// What moves in a one-joint experiment.
@@ -30,9 +29,6 @@ pub enum Mover {
 
 impl Mover {
     /// The joint or motor's coordinate of that name.
-    ///
-    /// # Errors
-    /// [`SimulateError::UnknownJoint`].
     pub fn named(robot: &Robot, name: &str) -> Result<Self, SimulateError> {
         let mut known = robot.joint_names().to_vec();
         let joints = known.len();
@@ -100,9 +96,6 @@ impl OneJointMove {
     }
 
     /// The ladder of a file.
-    ///
-    /// # Errors
-    /// [`SimulateError::UnknownJoint`].
     pub fn of(
         file: &SingleJointMove,
         robot: &Robot,

@@ -74,8 +74,7 @@ pub trait Rows {
         ControlFlow::Continue(())
     }
 
-    /// Takes the next rows, one after the other, each with a number for every name of the header; whether to
-    /// go on.
+    /// Takes the next rows, one after the other, each with a number for every name of the header; whether to go on.
     fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()>;
 }
 
@@ -118,9 +117,6 @@ pub fn simulate(order: &Order) -> Result<SimulatedLog, SimulateError> {
 }
 
 /// Simulates what is ordered, from initial conditions where they are given.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn simulate_from(
     order: &Order,
     initial: Option<&InitialConditions>,
@@ -153,9 +149,6 @@ pub fn simulate_from(
 
 /// Simulates what is ordered and hands the rows on block by block, so that memory does not grow with the log;
 /// only a log with a fault of the data is simulated as a whole first.
-///
-/// # Errors
-/// As [`simulate`], and [`SimulateError::Stopped`] where the rows are wanted no more.
 pub fn simulate_rows(
     order: &Order,
     initial: Option<&InitialConditions>,

@@ -21,9 +21,6 @@ const MOVES: f64 = 4.0;
 const ROOM_S: f64 = 0.1;
 
 /// Stretches of these logs in which something pushes the robot, one sentence each.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub(super) fn contacts(
     machine: &LoggedRobot,
     logs: &[Log],
@@ -41,9 +38,6 @@ pub(super) fn contacts(
 
 impl Passes<'_> {
     /// The stretches that the first reading found, one sentence each.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub(super) fn contacts(&self) -> Result<Vec<String>, IdentifyError> {
         let shown = |(log, jump): &(usize, Jump)| {
             let log = &self.logs[*log];
@@ -79,9 +73,6 @@ fn sentence(machine: &LoggedRobot, log: &Log, jump: &Jump, first: f64) -> String
 }
 
 /// What a fit says with the rows that were bridged as they were logged, where that is another thing.
-///
-/// # Errors
-/// Logs that cannot be read.
 pub(super) fn hangs_on_bridged(
     machine: &LoggedRobot,
     logs: &[Log],

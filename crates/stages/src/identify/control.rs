@@ -50,9 +50,6 @@ impl Control {
     }
 
     /// [`Control::stopped`] as an error.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Interrupted`].
     pub fn check(&self) -> Result<(), IdentifyError> {
         match self.stopped() {
             true => Err(IdentifyError::Interrupted),

@@ -146,9 +146,6 @@ type Found = (Fit, BlockFactors, Solver);
 
 /// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
 /// (18), which is then refined.
-///
-/// # Errors
-/// Every [`IdentifyError`] of logs that are read, and of a fit.
 pub fn estimate(
     passes: &mut Passes,
     columns: RegressorColumns,

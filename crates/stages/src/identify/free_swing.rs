@@ -33,9 +33,6 @@ struct JointRows {
 }
 
 /// Whether the joints move, where their torques are `off` (joint, from, to \[s\]), as they do without.
-///
-/// # Errors
-/// Those of the log; a log without a stretch that can be filtered is an answer: no.
 pub(super) fn moves_freely(
     robot: &Robot,
     settings: &FilterSettings,

@@ -71,9 +71,6 @@ impl Pieces {
 
 /// Sets blocks of the logs that a model was fitted to aside, one after the other. `inputs` are those logs, and `machine`
 /// has the position cut-offs of the fit: the model without a block is then fitted as the model was.
-///
-/// # Errors
-/// Logs that are too short for it, and interruption.
 pub(super) fn hold_out(
     machine: &LoggedRobot,
     (file, model): (&ModelFile, &AugmentedModel),
@@ -84,9 +81,6 @@ pub(super) fn hold_out(
 }
 
 /// The same of logs that the model has nothing from.
-///
-/// # Errors
-/// Those of [`hold_out`].
 pub(super) fn on_other_logs(
     machine: &LoggedRobot,
     (file, model): (&ModelFile, &AugmentedModel),
@@ -106,9 +100,6 @@ pub(super) fn on_other_logs(
 }
 
 /// Logs smoothed by these settings; of long ones pieces all along them.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub(super) fn read_pieces(
     machine: &LoggedRobot,
     settings: &FilterSettings,

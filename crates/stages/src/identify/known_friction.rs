@@ -257,9 +257,6 @@ fn refined_by(mut priors: Vec<FrictionPrior>, inputs: &[Provenance]) -> Vec<Fric
 
 /// The model as it was before a diagnosis of the logs `given`: with the friction that is known without them. With it what
 /// a refined model keeps of that.
-///
-/// # Errors
-/// A model without a joint's friction.
 pub(super) fn before_these(
     (name, file): (&str, &ModelFile),
     given: &[Provenance],

@@ -21,9 +21,6 @@ pub fn refined(file: &ModelFile, name: &str) -> Result<AugmentedModel, IdentifyE
 }
 
 /// The same of a file that may hold friction alone, with inertias of 0 then: for what asks for no torque.
-///
-/// # Errors
-/// Those of [`refined`].
 pub fn refined_or_friction(file: &ModelFile, name: &str) -> Result<AugmentedModel, IdentifyError> {
     with_effects(file, name, file.model_or_friction(name)?)
 }
@@ -54,9 +51,6 @@ fn with_effects(
 }
 
 /// The laws of a user's own effects on a robot.
-///
-/// # Errors
-/// [`IdentifyError::Formula`] for a formula that is none on this robot.
 pub(super) fn own_laws(
     candidates: &[CandidateSection],
     robot: &Robot,

@@ -27,9 +27,6 @@ pub struct OpenLog<'a> {
 
 impl OpenLog<'_> {
     /// The next block, without the rows that are marked bad; false at the end.
-    ///
-    /// # Errors
-    /// [`ReadError`].
     pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
         loop {
             if self.control.stopped() {

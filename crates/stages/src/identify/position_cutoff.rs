@@ -171,9 +171,6 @@ type Open<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
 impl LoggedRobot {
     /// The same robot with the position cut-offs that its logs call for. `laws` is the friction of each joint, none
     /// where it is not known.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn with_position_cutoffs(
         &self,
         logs: &[Log],
@@ -187,9 +184,6 @@ impl LoggedRobot {
     /// The processing of each log by the position cut-offs that it calls for itself: a slow log must not narrow those
     /// of a quick one. A joint that rests in it gets the cut-off of all logs, which are those of `together`: the
     /// widest would let the rounding of its encoder through.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn settings_of_each(
         &self,
         logs: &[Log],
@@ -214,9 +208,6 @@ impl LoggedRobot {
 
     /// The same for logs that `open` opens, in which each joint rests up to its `rest_speed`; nothing is read where
     /// cut-offs are declared.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn with_cutoffs_along(
         &self,
         logs: &[Log],
@@ -231,9 +222,6 @@ impl LoggedRobot {
     }
 
     /// What each log calls for. `laws` is the friction of each joint, none where it is not known.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn own_settings(
         &self,
         logs: &[Log],

@@ -75,9 +75,6 @@ impl LoggedRobot {
 
     /// Puts the temperatures of a log beside its stretches. A column that it lacks is reported alone: whether anything
     /// takes it is for [`Self::check_temperatures`].
-    ///
-    /// # Errors
-    /// A temperature that is no number, or a log that cannot be read.
     pub(super) fn put_temperatures(
         &self,
         log: &Log,
@@ -99,9 +96,6 @@ impl LoggedRobot {
     }
 
     /// Refuses logs, read as these stretches, without the temperatures that the effects of a model take.
-    ///
-    /// # Errors
-    /// [`IdentifyError::NoTemperature`].
     pub fn check_temperatures(
         &self,
         model: &AugmentedModel,
@@ -128,9 +122,6 @@ impl LoggedRobot {
     }
 
     /// The temperatures of a log for a model that takes some, without its rows.
-    ///
-    /// # Errors
-    /// [`IdentifyError::NoTemperature`], and those of [`Self::temperatures`].
     pub(super) fn temperatures_for(
         &self,
         model: &AugmentedModel,

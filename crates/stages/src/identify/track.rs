@@ -119,9 +119,6 @@ pub struct FleetDifference {
 }
 
 /// Follows the parameters of robots.
-///
-/// # Errors
-/// Sources that cannot be ordered or belong to other robots, and interruption.
 pub fn track(robots: &[RobotSources], control: &Control) -> Result<Tracked, IdentifyError> {
     if robots.iter().all(|r| r.sources.is_empty()) {
         return Err(TrackError::Empty.into());

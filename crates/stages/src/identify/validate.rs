@@ -94,9 +94,6 @@ pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
 ///
 /// Band and rows are of positions that came through the filter by which the band was found: where these logs call for
 /// another, they are read again.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub fn validate(
     machine: &LoggedRobot,
     (refined, file): (&AugmentedModel, Option<&ModelFile>),
@@ -281,9 +278,6 @@ pub fn not_a_validation(errors: &TorqueErrors) -> Option<String> {
 }
 
 /// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
-///
-/// # Errors
-/// [`ReducedError::NeedsLog`] with the joint and both cut-offs.
 fn smoothed_alike(machine: &LoggedRobot, logs: &[Log]) -> Result<(), IdentifyError> {
     let parts: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
     let Some(first) = parts.first().filter(|_| machine.finds_cutoffs()) else {

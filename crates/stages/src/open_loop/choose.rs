@@ -96,9 +96,6 @@ pub struct AxisFit {
 
 /// Fits a model of one axis to its motion, in windows of `window` seconds or of a length that blocks set aside choose.
 /// `offset` says whether the constant torque is fitted; `stop` is asked now and then.
-///
-/// # Errors
-/// [`AxisError`].
 pub fn fit_axis(
     start: &AugmentedModel,
     stretches: &[Stretch],

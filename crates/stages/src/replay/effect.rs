@@ -25,9 +25,6 @@ pub struct EffectRows {
 }
 
 /// The rows of an effect along some logs.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub(super) fn effect(
     replay: &Replay,
     model: &AugmentedModel,

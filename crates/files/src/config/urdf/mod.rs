@@ -127,9 +127,6 @@ impl UrdfChain {
     }
 
     /// Reads a URDF file.
-    ///
-    /// # Errors
-    /// Those of [`Self::parse`]; [`ConfigError::Read`] where the file cannot be read.
     pub fn load(path: &Path, tip: Option<&str>) -> Result<Self, ConfigError> {
         Self::load_with(path, tip, Angles::Meant)
     }

@@ -9,8 +9,7 @@ use super::histogram::Histogram;
 use crate::inspect::fault::Episodes;
 use cft_ident_core::math::rank;
 
-/// Time over which a speed is formed [s]: long against the steps of an encoder, short against the
-/// motion of a robot.
+/// Time over which a speed is formed [s]: long against the steps of an encoder, short against the motion of a robot.
 const SPACING_S: f64 = 0.02;
 /// Rows at most that it spans.
 const LONGEST: usize = 4096;

@@ -11,8 +11,7 @@ const ORDER: usize = 8;
 /// The factor by which it makes white noise larger: sqrt(binomial(16, 8)).
 const GAIN: f64 = 113.446;
 
-/// The step of a channel's numbers, where they have one: all differences from row to row are
-/// multiples of it.
+/// The step of a channel's numbers, where they have one: all differences from row to row are multiples of it.
 pub(in crate::inspect) fn step<'w>(
     windows: impl Iterator<Item = &'w Window> + Clone,
     channel: usize,

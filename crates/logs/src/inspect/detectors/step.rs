@@ -14,8 +14,7 @@ const AROUND: usize = 25;
 const OWN: usize = 4;
 /// Rows to each side by which it is seen that the new level stays.
 const LEVEL: usize = 5;
-/// Share of a leap's height that the rows next to it tell, and those beyond three rows, where the motion
-/// may have bent.
+/// Share of a leap's height that the rows next to it tell, and those beyond three rows, where the motion may have bent.
 const NEXT: [f64; 2] = [0.5, 1.5];
 const BEYOND: [f64; 2] = [0.25, 2.0];
 /// Rows that are remembered.

@@ -81,17 +81,11 @@ pub(in crate::log) fn of_topics(layout: &Layout) -> bool {
 
 impl JoinedTopics {
     /// The channels of a robot, `/topic:path` each.
-    ///
-    /// # Errors
-    /// A file that cannot be read; a channel without a topic, or whose topic is not there.
     pub(in crate::log) fn of_robot(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
         Self::of_channels(paths, layout, false)
     }
 
     /// The same where each joint may come in messages of its own, though of one topic.
-    ///
-    /// # Errors
-    /// Those of [`Self::of_robot`].
     pub(super) fn of_parts(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
         Self::of_channels(paths, layout, true)
     }
@@ -148,9 +142,6 @@ impl JoinedTopics {
     }
 
     /// Every number of a topic: of the one that is named, of the first that holds a whole state, else of all.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or without a number.
     pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
         let mut recording = MessageFiles::open(paths, Wanted::default())?;
         let mut found: Vec<(String, Vec<(String, String)>)> = Vec::new();

@@ -192,9 +192,6 @@ impl MessageFiles {
     }
 
     /// The next message; `None` at the end.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or that is damaged.
     pub(super) fn next(&mut self) -> Result<Option<Message<'_>>, LogError> {
         let current = self.current.take();
         if let Some(part) = current.and_then(|index| self.parts.get_mut(index)) {

@@ -45,9 +45,6 @@ pub(super) struct Publishers {
 
 impl Publishers {
     /// Whether a message is used. Once a second publisher appears, the whole topic is gone through.
-    ///
-    /// # Errors
-    /// A file that can no longer be read.
     pub(super) fn take(
         &mut self,
         publisher: Publisher,

@@ -213,8 +213,6 @@ fn probes() -> Vec<Vec<FieldPath>> {
 }
 
 impl FoundTopic {
-    /// # Errors
-    /// What is wrong with the message.
     fn look(&mut self, head: &MessageHead, data: &[u8]) -> Result<(), String> {
         let mut values = [Value::Absent; 8];
         self.probe.read(data, &mut values)?;

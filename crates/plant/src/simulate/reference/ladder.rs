@@ -80,9 +80,6 @@ impl LadderPlan {
 
     /// Ladder of ten speeds in equal ratios from `top` (as far as the range lets it) to `lowest`, or of as
     /// many as the time suffices for.
-    ///
-    /// # Errors
-    /// As [`LadderPlan::build`], when the time does not suffice for two speeds.
     pub fn usual(
         range: (f64, f64),
         (lowest, top): (f64, f64),
@@ -111,9 +108,6 @@ impl LadderPlan {
     }
 
     /// [`LadderPlan::build`] with the chance of a seed, or without.
-    ///
-    /// # Errors
-    /// As there.
     pub(crate) fn build_seeded(&self, seed: Option<u64>) -> Result<LadderReference, SimulateError> {
         let mut chance = seed.map(|seed| stream(seed, Purpose::Reference));
         self.build(chance.as_mut())
@@ -170,9 +164,6 @@ impl LadderPlan {
     }
 
     /// Refuses a motion whose reversals are so slow that they take it out of the range.
-    ///
-    /// # Errors
-    /// [`SimulateError::Reference`].
     pub(crate) fn within_range(
         &self,
         ladder: LadderReference,

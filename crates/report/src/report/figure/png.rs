@@ -11,8 +11,7 @@ use resvg::usvg::{Options, Tree};
 const REGULAR_FONT: &[u8] = include_bytes!("font/DejaVuSans.ttf");
 const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
 
-/// Pixels of the picture for one px of the figure: 300 dots an inch where a figure of 760 px is
-/// printed 19 cm wide.
+/// Pixels of the picture for one px of the figure: 300 dots an inch where a figure of 760 px is printed 19 cm wide.
 const SCALE: f32 = 3.0;
 
 /// Why there is no picture.

@@ -88,9 +88,6 @@ struct Found {
 
 impl Types {
     /// Finds message type `name` in a descriptor set.
-    ///
-    /// # Errors
-    /// What is wrong with the set, or that it lacks the type.
     pub(super) fn parse(name: &str, set: &[u8]) -> Result<Self, String> {
         let damaged = |_: Broken| "its descriptor set is damaged".to_owned();
         let mut found = Found::default();
@@ -208,8 +205,7 @@ impl Presence {
     }
 }
 
-/// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9,
-/// proto3_optional 17.
+/// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9, proto3_optional 17.
 fn field_type(field: &[u8], mut presence: Presence) -> Result<Unresolved, Broken> {
     let (mut name, mut type_name) = (String::new(), None);
     let (mut number, mut label, mut kind, mut chosen) = (0, 1, 0, false);

@@ -163,9 +163,6 @@ impl Definition {
     /// Parses the definition of message `name` (`package/msg/Type`) and resolves every type in it.
     ///
     /// `text` may be empty where the type is one that is known here.
-    ///
-    /// # Errors
-    /// [`DefinitionError`]: a line that is no field, a type that is not defined, an endless nesting.
     pub(super) fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
         if text.len() > LONGEST {
             return Err(DefinitionError::Long { bytes: text.len() });

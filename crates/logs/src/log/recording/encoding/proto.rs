@@ -75,9 +75,6 @@ enum Place<'m> {
 
 impl ProtoReader {
     /// A reader for message type `name` of the descriptor set that a recording carries.
-    ///
-    /// # Errors
-    /// What is wrong with the set, or that it lacks the type.
     pub(super) fn new(name: &str, set: &[u8]) -> Result<Self, String> {
         let types = Types::parse(name, set)?;
         Ok(Self {
@@ -87,9 +84,6 @@ impl ProtoReader {
     }
 
     /// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
-    ///
-    /// # Errors
-    /// Bytes that are no message.
     pub(super) fn read(
         &self,
         data: &[u8],
