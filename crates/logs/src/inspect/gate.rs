@@ -11,7 +11,7 @@ use crate::log::{
 };
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven clock closes none.
-const WIDER: f64 = 1.1;
+const CUT_GAP_FACTOR: f64 = 1.1;
 /// Readings at most that look for what was hidden by what an earlier one found.
 const ROUNDS: usize = 4;
 
@@ -188,7 +188,7 @@ impl Gate {
     /// Takes rows out of the log so that a step is left that parts it: one longer than `longest` has it for the
     /// median step \[s\].
     pub fn cutter(&self, longest: &dyn Fn(f64) -> f64) -> Cutter {
-        let gap = WIDER * longest(self.dt);
+        let gap = CUT_GAP_FACTOR * longest(self.dt);
         let widened = self.cuts.iter().map(|[from, to]| {
             let more = (0.5 * (gap - (to - from))).max(0.6 * self.dt);
             [from - more, to + more]

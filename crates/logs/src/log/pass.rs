@@ -20,7 +20,7 @@ use super::{LogError, LogSpec, Span};
 /// Rows by whose times a unit is recognised.
 const LOOKED_AT: usize = 1024;
 /// Usual steps from a time of 0 to the next one where the clock began at 0.
-const FROM_ZERO: f64 = 10.0;
+const MAX_STEPS_FROM_ZERO: f64 = 10.0;
 
 /// A log that is being gone through.
 #[derive(Debug)]
@@ -258,7 +258,7 @@ impl LogPass {
                     let step = stamp.seconds(&mut origin) - first;
                     if step > 0.0 {
                         let leap = stamp.instant().seconds() - step;
-                        let far = zeros > 1 && leap > FROM_ZERO * step;
+                        let far = zeros > 1 && leap > MAX_STEPS_FROM_ZERO * step;
                         return Ok(if far { zeros } else { 0 });
                     }
                 }

@@ -10,13 +10,13 @@
 /// Rows in succession that may be stale; a longer standstill is one.
 const LONGEST: usize = 20;
 /// Steps of a joint's resolution that a motion takes from row to row, at least.
-const STEPS: f64 = 4.0;
+const MIN_STEPS_IN_MOTION: f64 = 4.0;
 /// Stale rows from which a log is known to have them.
 const KNOWN: u64 = 10;
 /// Steps of a motion from which it is known whether samples were held.
 const SAMPLES: u64 = 50;
 /// Speeds before and after are the same motion where neither is more than this many times the other.
-const ALIKE: f64 = 3.0;
+const MAX_SPEED_RATIO: f64 = 3.0;
 
 /// The motion right before the current row.
 #[derive(Debug)]
@@ -121,12 +121,12 @@ impl Stale {
         (0..q.len()).any(|joint| {
             let after = q[joint] - self.q[joint];
             let before = self.step[joint];
-            let enough = STEPS * self.resolution[joint];
+            let enough = MIN_STEPS_IN_MOTION * self.resolution[joint];
             if before.abs() < enough || after.abs() < enough || (before > 0.0) != (after > 0.0) {
                 return false;
             }
             let ratio = (after / duration) / (before / self.duration);
-            (1.0 / ALIKE..=ALIKE).contains(&ratio)
+            (1.0 / MAX_SPEED_RATIO..=MAX_SPEED_RATIO).contains(&ratio)
         })
     }
 

@@ -25,7 +25,7 @@ use super::motion::differentiated;
 use super::series::MAX_COORDINATES;
 
 /// Samples per second at which information is gathered: a bend is passed in tens of milliseconds.
-const RATE: f64 = 250.0;
+const SAMPLES_PER_SECOND: f64 = 250.0;
 /// Numbers of speeds that are tried.
 const COUNTS: [usize; 4] = [4, 6, 8, 10];
 /// Evaluations of each.
@@ -358,7 +358,7 @@ fn expected(
     let model = &machine.model;
     let law = &model.friction[joint];
     let (mut g, used) = information(machine, task.seconds, joint, along)?;
-    g *= task.rate_hz / RATE / (machine.noise[joint] * machine.noise[joint]);
+    g *= task.rate_hz / SAMPLES_PER_SECOND / (machine.noise[joint] * machine.noise[joint]);
     let (names, values): (&[&str], Vec<f64>) = match law {
         JointFriction::DoubleTanh(law) => (&DoubleTanh::NAMES, law.parameters().to_vec()),
         JointFriction::ViscousCoulomb(law) => {
@@ -393,8 +393,8 @@ fn information(
     let mut used = (0.0_f64, 0);
     let drives = machine.channels.iter();
     let drives: Vec<_> = drives.filter(|c| c.quantity == Quantity::Drive).collect();
-    for m in 0..(seconds * RATE).ceil() as usize {
-        let k = differentiated(along, (m as f64 + 0.5) / RATE);
+    for m in 0..(seconds * SAMPLES_PER_SECOND).ceil() as usize {
+        let k = differentiated(along, (m as f64 + 0.5) / SAMPLES_PER_SECOND);
         let (q, v, a) = (&k.x[..n], &k.xd[..n], &k.xdd[..n]);
         model.robot.regressor(q, v, a, &mut y);
         row[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);

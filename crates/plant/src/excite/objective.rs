@@ -21,7 +21,7 @@ use super::usage::along_period;
 use super::variables::Variables;
 
 /// Step in a position, as a share of half its span.
-const STEP: f64 = 2e-3;
+const STEP_SHARE_OF_SPAN: f64 = 2e-3;
 
 /// Samples of a limit for each of the regressor.
 const FINER: usize = 4;
@@ -442,7 +442,7 @@ impl Local<'_> {
         for (i, by) in by.iter_mut().enumerate().take(n) {
             let mut k = state.k;
             if !self.objective.machine.is_uniform(i) {
-                let h = STEP * variables.span[i].1;
+                let h = STEP_SHARE_OF_SPAN * variables.span[i].1;
                 let x = k.x[i];
                 let mut shifted = |steps: f64| {
                     k.x[i] = x + steps * h;

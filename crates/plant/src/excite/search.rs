@@ -79,7 +79,7 @@ const SECOND: [Round; 8] = [
 /// Rounds after torques and volts have been looked at between the samples.
 const LAST: [Round; 3] = [round(128.0, 80), round(192.0, 80), round(256.0, 80)];
 /// Excess between samples, as a share of the limit, that is left to the repair.
-const EXCESS: f64 = 2e-3;
+const MAX_EXCESS_SHARE: f64 = 2e-3;
 /// One start in so many gets the second part.
 const FINALISTS: usize = 4;
 /// Samples of the period per harmonic in the search.
@@ -176,7 +176,7 @@ pub fn design(
             };
             effort.step(&objective, search, &SECOND);
             keep_better(search);
-            if let Some(tightened) = objective.tightened(&search.z, EXCESS) {
+            if let Some(tightened) = objective.tightened(&search.z, MAX_EXCESS_SHARE) {
                 effort.step(&tightened, search, &LAST);
                 keep_better(search);
             }

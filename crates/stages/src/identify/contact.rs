@@ -16,7 +16,7 @@ use cft_ident_logs::log::{RowFault, escape};
 
 /// A parameter moves with rows when it does so by so many standard deviations; twice as many leave out a
 /// doubtful fit, half as many tell of chance.
-const MOVES: f64 = 4.0;
+const MOVED_DEVIATIONS: f64 = 4.0;
 /// Room on both sides of a stretch that is to be left out \[s\]: the filters carry it so far.
 const ROOM_S: f64 = 0.1;
 
@@ -96,7 +96,7 @@ pub(super) fn hangs_on_bridged(
         let (a, b) = (now.theta.get(i)?, other.theta.get(i)?);
         let both = std(&now).hypot(std(&other));
         let known = now.determined[i] && other.determined[i];
-        (known && (a - b).abs() > MOVES * both).then(|| {
+        (known && (a - b).abs() > MOVED_DEVIATIONS * both).then(|| {
             let value = |x: f64, std: f64| {
                 format!(
                     "{} +- {}",

@@ -26,7 +26,7 @@ const PIECES: f64 = 12.0;
 /// Errors of each joint that quantiles are formed from.
 const MOST_ERRORS: usize = 40_000;
 /// Time before a block from which its observer runs, in periods of the cut-off.
-const LEAD: f64 = 12.0;
+const LEAD_PERIODS: f64 = 12.0;
 
 /// What is kept of it in a model file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -356,7 +356,7 @@ impl Watched {
             observer: Observer::new(model.clone(), settings)?,
             uncertain: uncertain.clone(),
             every: 1.0 / (KEPT * settings.cutoff_hz),
-            lead: LEAD / settings.cutoff_hz,
+            lead: LEAD_PERIODS / settings.cutoff_hz,
             next: f64::NEG_INFINITY,
             begins: true,
             done: false,

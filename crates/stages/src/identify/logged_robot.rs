@@ -25,7 +25,7 @@ use cft_ident_logs::inspect::{Gate, LogFault};
 use cft_ident_logs::log::{Block, Layout, LogError, Reader, RowFault, escape};
 
 /// Share of a period of the cut-off for which rows may be missing: interpolation is at the noise there.
-const BRIDGED: f64 = 0.125;
+const BRIDGED_PERIODS: f64 = 0.125;
 
 /// The same processing with a narrower position filter.
 pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
@@ -428,7 +428,7 @@ impl LoggedRobot {
             // a factor that is declared is meant
             bridge_s: match f.gap_factor {
                 Some(_) => 0.0,
-                None => BRIDGED / f.cutoff_hz.unwrap_or(plain.cutoff_hz),
+                None => BRIDGED_PERIODS / f.cutoff_hz.unwrap_or(plain.cutoff_hz),
             },
             q_trim_s: f.position_trim_s,
             trim_s: f.trim_s,

@@ -27,9 +27,9 @@ use cft_ident_logs::log::Block;
 const MOST_ROWS: usize = 120_000;
 const LEAST_ROWS: usize = 20_000;
 /// A declared cut-off is reported as wrong where it costs more than this many times the best one ..
-const WRONG: f64 = 1.3;
+const WRONG_CUTOFF_COST_RATIO: f64 = 1.3;
 /// .. and more than this part of the residual.
-const TOLD: f64 = 0.5;
+const MIN_COST_SHARE_OF_RESIDUAL: f64 = 0.5;
 
 /// Position cut-off of one joint, and what its friction loses by it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -122,7 +122,10 @@ impl PositionCutoff {
     /// `residual` \[unit\].
     fn wrong(&self, best: f64, residual: f64) -> Option<String> {
         let total = self.smear.hypot(self.noise);
-        if !self.declared || total <= TOLD * residual || total <= WRONG * best {
+        if !self.declared
+            || total <= MIN_COST_SHARE_OF_RESIDUAL * residual
+            || total <= WRONG_CUTOFF_COST_RATIO * best
+        {
             return None;
         }
         let hz = |x: f64| format!("{} Hz", number::significant(x, 3));

@@ -29,7 +29,7 @@ pub(super) const POSITIONS: usize = 50;
 /// Most steps that are tried.
 const MAX_STEPS: usize = 40;
 /// Share of the cost below which a step brings nothing.
-const SETTLED: f64 = 1e-4;
+const MIN_COST_DECREASE: f64 = 1e-4;
 const DAMPING: StepControl = StepControl::damping(6.0, 4.0, [1e-6, 1e8]);
 
 /// A span of a stretch: its number, first sample and the one after the last.
@@ -223,7 +223,7 @@ pub(super) fn fit(
         if gain.is_nan() || gain <= 0.0 {
             return Ok(Trial::Rejected);
         }
-        if gain < SETTLED * before {
+        if gain < MIN_COST_DECREASE * before {
             // nearly those of the point before, and nothing moves by them any more
             let slopes = at.slopes.clone();
             return Ok(Trial::Last(At { x, errors, slopes }));

@@ -9,7 +9,7 @@ use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::JointFriction;
 
 /// A difference of a number makes this share of the torque's rms.
-const SHARE: f64 = 1e-3;
+const STEP_TORQUE_SHARE: f64 = 1e-3;
 /// Samples along which columns of torque are looked at.
 const ROWS: usize = 4000;
 
@@ -93,7 +93,7 @@ pub(super) fn columns(model: &AugmentedModel, stretches: &[Stretch], held: &[boo
         let column: Vec<f64> = column.map(|(b, a)| (b - a) / difference).collect();
         let own: f64 = column.iter().map(|c| c * c).sum();
         if own > 0.0 && !held[i] {
-            steps[i] = SHARE * (power / own).sqrt();
+            steps[i] = STEP_TORQUE_SHARE * (power / own).sqrt();
             table.column_mut(i).copy_from_slice(&column);
         }
     }

@@ -15,9 +15,9 @@ const MAX_RUNS: usize = 1 << 18;
 /// Long runs that are kept.
 const LONG_RUNS: usize = 4096;
 /// Usual smallest steps that a joint goes from row to row where it moves.
-const MOVES: f64 = 3.0;
+const MIN_STEPS_IN_MOTION: f64 = 3.0;
 /// An edge is abrupt where its step is so many times the usual bends of the channel.
-const ABRUPT: f64 = 6.0;
+const ABRUPT_BENDS: f64 = 6.0;
 
 /// Rows that repeat the positions of the row before them.
 #[derive(Debug, Clone)]
@@ -174,8 +174,8 @@ impl Repeats {
                 let largest = largest.fold(0.0, |most, step| f64::from(step.abs()).max(most));
                 let step = flat.steps.quantile_not_zero(0.05);
                 let bend = flat.bends.quantile_not_zero(0.99);
-                let moves = step > 0.0 && largest > MOVES * step;
-                moves && (alive || largest > ABRUPT * bend)
+                let moves = step > 0.0 && largest > MIN_STEPS_IN_MOTION * step;
+                moves && (alive || largest > ABRUPT_BENDS * bend)
             })
         };
         let mut episodes = Episodes::default();

@@ -24,7 +24,7 @@ const MIN_ROWS_AT_REST: usize = 6;
 /// Leaps that are kept, the highest.
 const MAX_LEAPS: usize = 4096;
 /// Largest heights that may be leaps, over those of 99 % of the rows.
-const SUSPECT: f64 = 3.0;
+const SUSPECT_FACTOR: f64 = 3.0;
 
 /// A leap of a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,7 +123,7 @@ impl Leaps {
 
     /// Brings the suspicion up to date with what was seen so far.
     pub(in crate::inspect) fn settle(&mut self) {
-        self.suspect = SUSPECT * self.heights_seen.quantile(0.99);
+        self.suspect = SUSPECT_FACTOR * self.heights_seen.quantile(0.99);
     }
 
     #[inline]

@@ -18,12 +18,12 @@ const COLUMNS: usize = 7;
 /// Of them the first ones, that only take power.
 const PASSIVE: usize = 4;
 /// Share of the torque that the motion must explain.
-const EXPLAINED: f64 = 0.5;
+const MIN_EXPLAINED_SHARE: f64 = 0.5;
 /// Least share of each direction in the squared speed: one way at one speed, a torque that depends
 /// on position cannot be distinguished from any delay.
-const BOTH_WAYS: f64 = 0.1;
+const MIN_SHARE_EACH_WAY: f64 = 0.1;
 /// Share of the gain over no delay that another minimum may reach.
-const SECOND_BEST: f64 = 0.5;
+const MAX_GAIN_OF_SECOND_BEST: f64 = 0.5;
 /// Stretches of the jackknife: the most, and the least that give a deviation.
 const STRETCHES: std::ops::RangeInclusive<usize> = 3..=8;
 
@@ -187,7 +187,10 @@ impl DelayEstimator {
             .flat_map(|m| &m[1])
             .map(|v| v.min(0.0).powi(2));
         let back = back.sum::<f64>() / (v_rms * v_rms * rows as f64);
-        if v_rms == 0.0 || a_rms == 0.0 || !(BOTH_WAYS..=1.0 - BOTH_WAYS).contains(&back) {
+        if v_rms == 0.0
+            || a_rms == 0.0
+            || !(MIN_SHARE_EACH_WAY..=1.0 - MIN_SHARE_EACH_WAY).contains(&back)
+        {
             return None;
         }
         let sums = motions.iter().map(|[q, v, a, tau]| {
@@ -310,7 +313,7 @@ fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
         }
         let Some(left) = sums.left() else { continue };
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        if least > 1.0 - EXPLAINED {
+        if least > 1.0 - MIN_EXPLAINED_SHARE {
             continue;
         }
         any = true;
@@ -331,7 +334,7 @@ fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
         higher(residuals[..*trial].last()) && higher(residuals.get(trial + 1))
     };
     let mut others = (0..residuals.len()).filter(|trial| *trial != least && minimum(trial));
-    if others.any(|other| gain(other) > SECOND_BEST * gain(least)) {
+    if others.any(|other| gain(other) > MAX_GAIN_OF_SECOND_BEST * gain(least)) {
         return None;
     }
     let [before, middle, after] = [residuals[least - 1], residuals[least], residuals[least + 1]];

@@ -26,7 +26,7 @@ const COLUMNS: usize = 1024;
 /// Rows that wait for messages of other topics at most.
 const WAITING: usize = 1 << 14;
 /// A step longer than this many usual ones is a dropout.
-const DROPOUT: f64 = 2.5;
+const DROPOUT_STEPS: f64 = 2.5;
 
 /// The numbers of one topic.
 struct Source {
@@ -365,7 +365,7 @@ impl Source {
         };
         let step = after.since(*before);
         let usual = self.steps.0 / f64::from(self.steps.1.max(1));
-        if step > DROPOUT * usual {
+        if step > DROPOUT_STEPS * usual {
             return false;
         }
         let share = t.since(*before) / step;

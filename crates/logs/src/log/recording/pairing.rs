@@ -18,7 +18,7 @@ const KEPT: usize = 1 << 12;
 /// Steps of the torques' clock from which its pace is known.
 const PACE: usize = 31;
 /// A step longer than this many usual ones is a dropout.
-const DROPOUT: f64 = 2.5;
+const DROPOUT_STEPS: f64 = 2.5;
 
 /// What one message, or one row, holds: as logged, not scaled.
 #[derive(Debug, Clone)]
@@ -197,7 +197,7 @@ impl Pairing {
         }
         let mut steps = self.steps;
         let (_, usual, _) = steps[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
-        step > DROPOUT * *usual
+        step > DROPOUT_STEPS * *usual
     }
 
     /// What the user should know, topics named.

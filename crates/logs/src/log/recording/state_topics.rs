@@ -27,7 +27,7 @@ pub(super) const COLUMNS: &str = "columns";
 /// Topic of times that are no whole nanoseconds.
 pub(super) const TIMES: &str = "/t";
 /// Part of the instants of one topic that another one has too, where one machine wrote both.
-const SHARED: f64 = 0.8;
+const MIN_SHARED_INSTANTS: f64 = 0.8;
 
 /// The arrays of a message, in the order of the columns.
 pub(super) const ARRAYS: [(&str, &str); 3] =
@@ -265,7 +265,7 @@ impl FoundTopic {
         let within = |of: &Self| of.instants.iter().filter(|t| both.contains(*t)).count();
         let shared = self.instants.intersection(&other.instants).count();
         let fewer = within(self).min(within(other));
-        fewer > 0 && shared as f64 >= SHARED * fewer as f64
+        fewer > 0 && shared as f64 >= MIN_SHARED_INSTANTS * fewer as f64
     }
 }
 
