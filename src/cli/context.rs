@@ -37,7 +37,7 @@ pub struct Context {
     /// The error that ends the command once its results are written.
     ending: Arc<Mutex<Option<CliError>>>,
     /// Warnings that stand before those of the command's own result.
-    told: Arc<Mutex<Vec<String>>>,
+    warnings: Arc<Mutex<Vec<String>>>,
 }
 
 impl Context {
@@ -68,7 +68,7 @@ impl Context {
             page: Arc::default(),
             prints: false,
             ending: Arc::default(),
-            told: Arc::default(),
+            warnings: Arc::default(),
         }
     }
 
@@ -195,15 +195,15 @@ impl Context {
 
     /// A warning about what was given, for the document and for standard error; once, however often it is found.
     pub(crate) fn warn(&self, text: &str) {
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if !told.iter().any(|known| known == text) {
-            told.push(text.to_owned());
+        let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        if !warnings.iter().any(|known| known == text) {
+            warnings.push(text.to_owned());
         }
     }
 
     /// The warnings so far.
     pub(super) fn warnings(&self) -> Vec<String> {
-        self.told
+        self.warnings
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .clone()

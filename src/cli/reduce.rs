@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(short, long, value_name = "FRICTION.toml")]
     pub model: Option<PathBuf>,
     /// File of reduced logs to write
-    #[arg(short, long, value_name = "PART.cfi", value_parser = arguments::reduced_file)]
+    #[arg(short, long, value_name = "PART.cfi", value_parser = arguments::ends_in(["cfi"]))]
     pub output: PathBuf,
     #[command(flatten)]
     pub setup: setup::SetupArgs,

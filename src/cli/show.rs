@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(value_name = "MODEL.toml")]
     pub model: PathBuf,
     /// Write the same as a page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 

@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(short, long, value_name = "OUT.csv")]
     pub output: Option<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 

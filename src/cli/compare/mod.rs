@@ -37,10 +37,10 @@ pub struct Args {
     #[arg(value_name = "LOG")]
     pub logs: Vec<LogSpec>,
     /// Draw the friction curves over each other; may be given more than once
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 

@@ -125,10 +125,10 @@ pub struct Args {
     #[arg(hide_short_help = true, long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
     pub samples: Option<PathBuf>,
     /// Write the motion for ROS 2, as trajectory_msgs/msg/JointTrajectory
-    #[arg(hide_short_help = true, long, value_name = "FILE.yaml|.mcap", value_parser = arguments::message_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.yaml|.mcap", value_parser = arguments::ends_in(["yaml", "mcap"]))]
     pub trajectory_message: Option<PathBuf>,
     /// Write the motion as a program for a controller of Universal Robots
-    #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::script_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::ends_in(["script"]))]
     pub urscript: Option<PathBuf>,
     /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
     /// [control], else 1000]
@@ -138,10 +138,10 @@ pub struct Args {
     #[arg(hide_short_help = true, long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Option<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 

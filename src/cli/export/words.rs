@@ -47,9 +47,9 @@ pub(super) fn about_effects(program: &Program, left_out: &[String]) -> Vec<Strin
     }
     let mut lines = vec!["Nothing of the model is left out.".to_owned()];
     let effects = &program.effects;
-    if !effects.told.is_empty() {
-        let told: Vec<String> = effects.told.iter().map(|name| escape(name)).collect();
-        lines.push(format!("Effects: {}.", told.join(", ")));
+    if !effects.titles.is_empty() {
+        let titles: Vec<String> = effects.titles.iter().map(|name| escape(name)).collect();
+        lines.push(format!("Effects: {}.", titles.join(", ")));
     }
     if effects.remember_anything() {
         lines.push("Some remember the motion: init, then step once a sample.".to_owned());

@@ -46,7 +46,7 @@ impl EffectsCode {
             if !written {
                 return Err(EffectError::NoCode { effect: title });
             }
-            out.told.push(title);
+            out.titles.push(title);
         }
         Ok(out)
     }

@@ -29,7 +29,7 @@
 //! | `rest` | what rows weigh where a joint stands or turns |
 //! | `full_rate` | smooth q, v, a at every sample of one short record |
 //! | `stretch` | whole stretches in memory, for searches |
-//! | `added_noise` | a stretch smoothed twice, or with noise of its own level added (SIMEX) |
+//! | `added_noise` | what noise of positions becomes, and how rough a signal is |
 
 mod added_noise;
 mod causal;

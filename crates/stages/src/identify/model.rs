@@ -83,14 +83,14 @@ pub(super) fn own_laws(
 pub(super) fn in_file(
     effect: &Added,
     machine: &LoggedRobot,
-    told: &[EffectNumber],
+    numbers: &[EffectNumber],
 ) -> EffectSection {
     EffectSection {
         name: effect.name().to_owned(),
         joint: effect.place.name(&machine.robot),
         shrinkage: None,
         accepted_by_user: false,
-        parameters: told
+        parameters: numbers
             .iter()
             .map(|t| {
                 let parameter = EffectParameter {

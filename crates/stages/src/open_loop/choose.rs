@@ -245,13 +245,19 @@ impl Trial<'_> {
         model: &AugmentedModel,
         columns: &Columns,
         (spans, length): (&[RunSpan], f64),
-        told: bool,
+        with_covariance: bool,
     ) -> Result<Option<Fitted>, AxisError> {
         if (self.stop)() {
             return Err(AxisError::Stopped);
         }
         let windows = windows(self.stretches, spans, length);
-        Ok(fit(model, self.stretches, &windows, columns, told))
+        Ok(fit(
+            model,
+            self.stretches,
+            &windows,
+            columns,
+            with_covariance,
+        ))
     }
 
     /// Error on each block of a fit to the others, and the model of a fit to all that began at `near`; none where a motion

@@ -176,7 +176,7 @@ pub(super) fn fit(
     stretches: &[Stretch],
     windows: &[RunSpan],
     columns: &Columns,
-    told: bool,
+    with_covariance: bool,
 ) -> Option<Fitted> {
     let along = |x: &[f64]| errors(&with_numbers(start, x), stretches, windows, POSITIONS);
     let free = &columns.free;
@@ -232,10 +232,10 @@ pub(super) fn fit(
     });
     let Ok((mut at, ending, steps)) = found;
     // differences to both sides where deviations hang on them
-    if told {
+    if with_covariance {
         at.slopes = slopes(&at.x, &at.errors, true)?;
     }
-    let covariance = match told {
+    let covariance = match with_covariance {
         true => covariance(&at, stretches, windows, free),
         false => DMatrix::zeros(0, 0),
     };
