@@ -13,7 +13,7 @@ use crate::log::{
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven clock closes none.
 const CUT_GAP_FACTOR: f64 = 1.1;
 /// Readings at most that look for what was hidden by what an earlier one found.
-const ROUNDS: usize = 4;
+const MAX_READINGS: usize = 4;
 
 /// What the first look at a log found.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -85,7 +85,7 @@ impl Gate {
         }
         // what is mended may have hidden more of its kind, and what goes along takes no number of it
         let (mut bridges, mut failed, mut mended) = (Vec::new(), Vec::new(), Vec::new());
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_READINGS {
             if found.bridges.is_empty() && found.failed.is_empty() {
                 break;
             }

@@ -8,13 +8,13 @@
 //! there the torque was read a moment later.
 
 /// Rows in succession that may be stale; a longer standstill is one.
-const LONGEST: usize = 20;
+const MAX_STALE_ROWS: usize = 20;
 /// Steps of a joint's resolution that a motion takes from row to row, at least.
 const MIN_STEPS_IN_MOTION: f64 = 4.0;
 /// Stale rows from which a log is known to have them.
 const KNOWN: u64 = 10;
 /// Steps of a motion from which it is known whether samples were held.
-const SAMPLES: u64 = 50;
+const MIN_MOTION_STEPS: u64 = 50;
 /// Speeds before and after are the same motion where neither is more than this many times the other.
 const MAX_SPEED_RATIO: f64 = 3.0;
 
@@ -67,7 +67,7 @@ impl Stale {
 
     /// Rows for which each sample was held, where at least every other row of the motion is one that was held.
     pub(super) fn hold(&self) -> Option<usize> {
-        let held = self.moving >= SAMPLES && 2 * self.held >= self.moving;
+        let held = self.moving >= MIN_MOTION_STEPS && 2 * self.held >= self.moving;
         let rows = 1.0 + self.held as f64 / self.moving.max(1) as f64;
         held.then(|| rows.round() as usize)
     }
@@ -95,7 +95,7 @@ impl Stale {
 
     #[inline]
     fn moved(&mut self, duration: f64, q: &[f64]) -> usize {
-        let goes_on = self.run <= LONGEST && self.goes_on(duration, q);
+        let goes_on = self.run <= MAX_STALE_ROWS && self.goes_on(duration, q);
         if goes_on {
             self.moving += 1;
             self.held += if self.whole { self.run as u64 } else { 0 };
@@ -132,7 +132,7 @@ impl Stale {
 
     /// Rows at the end of which it is not known yet whether they are stale.
     pub(super) fn undecided(&self) -> usize {
-        match self.run <= LONGEST {
+        match self.run <= MAX_STALE_ROWS {
             true => self.run,
             false => 0,
         }
@@ -174,7 +174,7 @@ mod tests {
         assert!(dropped(&[0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 4.0, 4.0, 6.0]).is_empty());
         assert!(dropped(&[0.0, 1.0, 9.0, 17.0, 17.0, 9.0, 0.0]).is_empty());
         let mut rest = vec![0.0, 1.0, 9.0, 17.0];
-        rest.extend([17.0; LONGEST + 1]);
+        rest.extend([17.0; MAX_STALE_ROWS + 1]);
         rest.extend([25.0, 33.0]);
         assert!(dropped(&rest).is_empty());
     }

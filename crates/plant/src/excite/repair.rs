@@ -6,7 +6,7 @@ use super::series::Series;
 use super::usage::{along_period, closely_along_period, roughly_along_period, worst};
 
 /// Steps towards the common factor, and how near to it they end.
-const STEPS: usize = 40;
+const MAX_STEPS: usize = 40;
 const FACTOR_TOLERANCE: f64 = 2e-5;
 /// How near a rough look brings a thorough one to it.
 const ROUGH_TOLERANCE: f64 = 2e-3;
@@ -113,7 +113,7 @@ fn narrowed(
     mut broken: (f64, f64),
     near: f64,
 ) -> (f64, f64) {
-    for step in 0..STEPS {
+    for step in 0..MAX_STEPS {
         if broken.0 - kept.0 < near || kept.1 > 1.0 - near {
             break;
         }

@@ -83,7 +83,7 @@ const MAX_EXCESS_SHARE: f64 = 2e-3;
 /// One start in so many gets the second part.
 const FINALISTS: usize = 4;
 /// Samples of the period per harmonic in the search.
-const SAMPLES: usize = 12;
+const SAMPLES_PER_HARMONIC: usize = 12;
 
 impl Task {
     /// Evaluations that the search will take at most.
@@ -124,7 +124,7 @@ pub fn design(
         task.harmonics,
         task.offsets.clone(),
     );
-    let samples = (SAMPLES * task.harmonics).max(25);
+    let samples = (SAMPLES_PER_HARMONIC * task.harmonics).max(25);
     let objective = Objective::new(
         machine,
         &task.criterion,

@@ -9,7 +9,7 @@ use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::robot_file::CoordinateLimits;
 
 /// Half a travel where no limits are known \[m or rad\].
-const REACH: f64 = 1.0;
+const HALF_TRAVEL: f64 = 1.0;
 
 /// A robot of n joints that n motors drive, in vectors with room for J >= n. What is beyond n is 0 in every
 /// vector, and without limits.
@@ -96,7 +96,7 @@ impl<const J: usize> Mechanism<J> {
         if low.is_finite() && high.is_finite() {
             (low, high)
         } else {
-            (-REACH, REACH)
+            (-HALF_TRAVEL, HALF_TRAVEL)
         }
     }
 

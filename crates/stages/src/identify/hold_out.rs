@@ -22,7 +22,7 @@ const MOST_ROWS: u64 = 150_000;
 /// Rows along which external torques are observed: rare excesses take more.
 const MOST_OBSERVED: u64 = 1_500_000;
 /// Pieces of a log that is longer.
-const PIECES: f64 = 12.0;
+const PIECES_OF_LONG_LOG: f64 = 12.0;
 /// Errors of each joint that quantiles are formed from.
 const MOST_ERRORS: usize = 40_000;
 /// Time before a block from which its observer runs, in periods of the cut-off.
@@ -54,7 +54,7 @@ impl Pieces {
     fn of_each(most: u64, logs: &[Provenance]) -> Vec<Self> {
         let rows: u64 = logs.iter().map(|log| log.samples).sum();
         let share = (most as f64 / rows.max(1) as f64).min(1.0);
-        let length = |log: &Provenance| log.duration_s / PIECES;
+        let length = |log: &Provenance| log.duration_s / PIECES_OF_LONG_LOG;
         let each = logs.iter().map(|log| Self {
             length_s: length(log),
             share,

@@ -12,7 +12,7 @@ use cft_ident_core::math::rank;
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against the motion of a robot.
 const SPACING_S: f64 = 0.02;
 /// Rows at most that it spans.
-const LONGEST: usize = 4096;
+const MAX_SPAN_ROWS: usize = 4096;
 /// A joint moves where its speed is above this share of the largest.
 const MOVING_SPEED_SHARE: f64 = 0.02;
 
@@ -81,7 +81,7 @@ impl Excitation {
     /// For rows `dt` apart [s] of a joint that may be so fast.
     pub(in crate::inspect) fn new(dt: f64, limit: Option<f64>) -> Self {
         let spacing = if dt > 0.0 {
-            ((SPACING_S / dt).round() as usize).clamp(1, LONGEST)
+            ((SPACING_S / dt).round() as usize).clamp(1, MAX_SPAN_ROWS)
         } else {
             1
         };

@@ -7,7 +7,7 @@ use super::flat::Flat;
 use crate::inspect::fault::Episodes;
 
 /// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
-const LONGEST: usize = 20;
+const MAX_RUN_ROWS: usize = 20;
 /// Rows in motion that repeat, from which samples may have been held.
 const MIN_HELD_ROWS: u64 = 50;
 /// Runs that are kept.
@@ -115,7 +115,7 @@ impl Repeats {
 
     /// The next row belongs to another stretch.
     pub(in crate::inspect) fn part(&mut self) {
-        if self.rows > LONGEST {
+        if self.rows > MAX_RUN_ROWS {
             self.end(&vec![f64::NAN; self.joints]);
         }
         self.previous.fill(f64::NAN);
@@ -125,7 +125,7 @@ impl Repeats {
 
     #[cold]
     fn end(&mut self, next: &[f64]) {
-        let long = self.rows > LONGEST;
+        let long = self.rows > MAX_RUN_ROWS;
         let full = match long {
             true => self.frozen.len() == LONG_RUNS || !self.identical,
             false => self.runs.len() == MAX_RUNS,

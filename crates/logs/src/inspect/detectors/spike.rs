@@ -12,10 +12,10 @@
 use super::histogram::Histogram;
 
 /// Rows of the median.
-const WIDTH: usize = 7;
-const HALF_WIDTH: usize = WIDTH / 2;
+const MEDIAN_ROWS: usize = 7;
+const HALF_WIDTH: usize = MEDIAN_ROWS / 2;
 /// Rows to each side that are remembered of a spike.
-const REACH: usize = 5;
+const REACH_ROWS: usize = 5;
 /// Rows to each side in which a spike must stand alone.
 const AROUND: usize = 25;
 /// Differences that are remembered.
@@ -48,7 +48,7 @@ pub(in crate::inspect) struct Spike {
     /// Difference from the median of its neighbours.
     pub(in crate::inspect) height: f64,
     /// Times and numbers of the rows about, itself in the middle.
-    around: [[f64; 2]; 2 * REACH + 1],
+    around: [[f64; 2]; 2 * REACH_ROWS + 1],
 }
 
 impl Spike {
@@ -56,8 +56,8 @@ impl Spike {
     /// where there are none.
     pub(in crate::inspect) fn bridge(&self, bad: &dyn Fn(f64) -> bool) -> Option<f64> {
         let good = |row: &&[f64; 2]| !bad(row[0]);
-        let before = self.around[..REACH].iter().rev().filter(good).take(2);
-        let after = self.around[REACH + 1..].iter().filter(good).take(2);
+        let before = self.around[..REACH_ROWS].iter().rev().filter(good).take(2);
+        let after = self.around[REACH_ROWS + 1..].iter().filter(good).take(2);
         let nodes: Vec<[f64; 2]> = before.chain(after).copied().collect();
         cubic(&nodes, self.t)
     }
@@ -130,7 +130,7 @@ impl Spikes {
         self.times[k % RING] = t;
         self.positions[k % RING] = position;
         self.count += 1;
-        if self.count < WIDTH {
+        if self.count < MEDIAN_ROWS {
             return;
         }
         let [before, last] = [k - 2, k - 1].map(|k| self.values[k % RING]);
@@ -159,7 +159,7 @@ impl Spikes {
 
     /// The next row belongs to another stretch.
     pub(in crate::inspect) fn part(&mut self) {
-        if self.count >= WIDTH {
+        if self.count >= MEDIAN_ROWS {
             let last = self.count - 1 - HALF_WIDTH;
             for row in self.judged.max(HALF_WIDTH)..=last {
                 self.judge(row, last);
@@ -273,7 +273,7 @@ impl Spikes {
         }
         // as far as the cubic reaches, there are rows
         let around = std::array::from_fn(|i| {
-            let at = (row + i - REACH) % RING;
+            let at = (row + i - REACH_ROWS) % RING;
             [self.times[at], self.values[at]]
         });
         self.found.push(Spike {
@@ -287,8 +287,8 @@ impl Spikes {
     /// where it is as good as on it, or rows are missing.
     fn off_cubic(&self, row: usize, height: f64) -> Option<f64> {
         let quiet = |k: &usize| self.differences[k % RING].abs() <= 0.25 * height.abs();
-        let before = (row.saturating_sub(AROUND)..(row + 1).saturating_sub(REACH - 1)).rev();
-        let after = row + REACH - 1..self.count.min(row + AROUND);
+        let before = (row.saturating_sub(AROUND)..(row + 1).saturating_sub(REACH_ROWS - 1)).rev();
+        let after = row + REACH_ROWS - 1..self.count.min(row + AROUND);
         let nodes = before
             .filter(quiet)
             .take(2)
@@ -309,7 +309,7 @@ impl Spikes {
 
 /// Median of seven numbers.
 #[inline]
-fn median(mut x: [f64; WIDTH]) -> f64 {
+fn median(mut x: [f64; MEDIAN_ROWS]) -> f64 {
     // Exchanges that leave the middle one in its place (Devillard 1998).
     const EXCHANGES: [(usize, usize); 13] = [
         (0, 5),

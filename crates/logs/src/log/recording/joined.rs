@@ -18,13 +18,13 @@ use crate::log::{Block, LogError, escape, list, source};
 use cft_ident_core::number::{beyond, is_usable};
 
 /// Messages at the beginning in which topics are looked for.
-const LOOKED_AT: u64 = 4000;
+const SEARCHED_MESSAGES: u64 = 4000;
 /// Numbers from which a message is the state of a machine by itself.
 const STATE: usize = 4;
 /// Columns that are read without a robot file.
 const COLUMNS: usize = 1024;
 /// Rows that wait for messages of other topics at most.
-const WAITING: usize = 1 << 14;
+const MAX_WAITING_ROWS: usize = 1 << 14;
 /// A step longer than this many usual ones is a dropout.
 const DROPOUT_STEPS: f64 = 2.5;
 
@@ -146,7 +146,7 @@ impl JoinedTopics {
         let mut recording = MessageFiles::open(paths, Wanted::default())?;
         let mut found: Vec<(String, Vec<(String, String)>)> = Vec::new();
         let (mut looked, mut unread) = (0, None);
-        while looked < LOOKED_AT
+        while looked < SEARCHED_MESSAGES
             && let Some(message) = recording.next()?
         {
             looked += 1;
@@ -295,7 +295,7 @@ impl JoinedTopics {
             let numbers: Vec<f64> = numbers.map(|v| v.number().unwrap_or(f64::NAN)).collect();
             if at == 0 {
                 self.waiting.push_back((t, numbers, head.number));
-                if self.waiting.len() > WAITING {
+                if self.waiting.len() > MAX_WAITING_ROWS {
                     self.waiting.pop_front();
                     lost = true;
                 }

@@ -13,7 +13,7 @@ use super::value::Value;
 use crate::log::{LogError, escape};
 
 /// Messages that are looked at for topics and their names.
-const LOOKED_AT: u64 = 20_000;
+const SEARCHED_MESSAGES: u64 = 20_000;
 /// Messages of one topic that are looked at for its names.
 const OF_TOPIC: u32 = 200;
 /// Names of one topic that become columns, the first ones.
@@ -77,7 +77,7 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
     let mut times = None;
     let mut messages = 0;
     let mut unreadable: Option<(String, String)> = None;
-    while messages < LOOKED_AT
+    while messages < SEARCHED_MESSAGES
         && let Some(message) = recording.next()?
     {
         messages += 1;

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use super::wire::{Broken, Fields, Item};
 
 /// Messages inside messages inside ..., deepest.
-const DEEPEST: usize = 64;
+const MAX_DEPTH: usize = 64;
 
 /// The types of one set.
 #[derive(Debug, Clone)]
@@ -141,7 +141,7 @@ impl Found {
         let messages = |scope: &str, data, tag, depth, to: &mut Vec<_>| -> Result<(), Broken> {
             for field in Fields::new(data) {
                 match field? {
-                    (number, Item::Bytes(message)) if number == tag && depth < DEEPEST => {
+                    (number, Item::Bytes(message)) if number == tag && depth < MAX_DEPTH => {
                         to.push((scope.to_owned(), message, depth));
                     }
                     _ => {}
