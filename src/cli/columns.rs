@@ -1,7 +1,7 @@
 //! Which columns of a log are which channels: by the robot file, or by their names.
 
 use super::CliError;
-use cft_ident_core::problem::{Explain, Problem};
+use cft_ident_core::explain::{Explain, Explanation};
 use cft_ident_logs::inspect::{
     ChannelColumn, ChannelRole, ColumnPlan, FaultKind, InspectedChannel, LogFault, Severity,
     is_time,
@@ -74,7 +74,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, V
         held: None,
         band_hz: Some(machine.settings().cutoff_hz),
     };
-    let refused = log.refused().map(|error| refusal(error.problem()));
+    let refused = log.refused().map(|error| refusal(error.explanation()));
     (plan, refused.into_iter().chain(missing).collect())
 }
 
@@ -236,7 +236,7 @@ fn limits(
 }
 
 /// What keeps the strict reader from a log, as a fault.
-fn refusal(problem: Problem) -> LogFault {
+fn refusal(problem: Explanation) -> LogFault {
     let remedy = problem.remedies.join("; ");
     LogFault::whole(
         Severity::Error,

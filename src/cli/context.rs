@@ -1,7 +1,7 @@
 //! What every command is given beside its own arguments: where messages go, whether the user has
 //! asked to stop, and the progress bar.
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -189,7 +189,7 @@ impl Context {
             return self.write_text(path, svg);
         }
         let picture =
-            figure::png(svg).map_err(|e| CliError::output(e.problem().of(path.display())))?;
+            figure::png(svg).map_err(|e| CliError::output(e.explanation().of(path.display())))?;
         Ok(self.files.write(path, &picture)?)
     }
 

@@ -7,7 +7,7 @@ use std::fmt;
 use std::io::{IsTerminal, Write};
 
 use super::exit::Exit;
-use cft_ident_core::problem::{Explain, Problem};
+use cft_ident_core::explain::{Explain, Explanation};
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::log::{LogError, is_hidden};
 use cft_ident_logs::mapping::MappingError;
@@ -21,33 +21,33 @@ use cft_ident_stages::identify::{ErrorKind, IdentifyError};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CliError {
     exit: Exit,
-    problem: Problem,
+    problem: Explanation,
 }
 
 impl CliError {
     /// Any error by its exit status.
-    pub(super) fn new(exit: Exit, problem: impl Into<Problem>) -> Self {
+    pub(super) fn new(exit: Exit, problem: impl Into<Explanation>) -> Self {
         let problem = problem.into();
         Self { exit, problem }
     }
 
     /// The arguments contradict each other in a way that the parser cannot see (exit 2).
-    pub fn usage(problem: impl Into<Problem>) -> Self {
+    pub fn usage(problem: impl Into<Explanation>) -> Self {
         Self::new(Exit::Usage, problem)
     }
 
     /// A file or value that was given cannot be used (exit 3).
-    pub fn input(problem: impl Into<Problem>) -> Self {
+    pub fn input(problem: impl Into<Explanation>) -> Self {
         Self::new(Exit::BadInput, problem)
     }
 
     /// The data determine nothing that was asked (exit 4).
-    pub fn undetermined(problem: impl Into<Problem>) -> Self {
+    pub fn undetermined(problem: impl Into<Explanation>) -> Self {
         Self::new(Exit::Undetermined, problem)
     }
 
     /// A result cannot be written (exit 5).
-    pub fn output(problem: impl Into<Problem>) -> Self {
+    pub fn output(problem: impl Into<Explanation>) -> Self {
         Self::new(Exit::OutputFailed, problem)
     }
 
@@ -129,7 +129,7 @@ impl From<&IdentifyError> for CliError {
             ErrorKind::Undetermined => Exit::Undetermined,
             ErrorKind::Interrupted => return Self::interrupted(),
         };
-        Self::new(exit, error.problem())
+        Self::new(exit, error.explanation())
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod words;
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -283,7 +283,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         false => (identify::refined(&given.value, &given.name)?, Vec::new()),
     };
     let model = &refined.model;
-    let failed = |error: ExportError| CliError::input(error.problem().of(&given.name));
+    let failed = |error: ExportError| CliError::input(error.explanation().of(&given.name));
     let mut program = Program::with_effects(&refined).map_err(failed)?;
     program.rest_by(&given.value.robot);
     if let Some(rate_hz) = args.observer {

@@ -9,42 +9,42 @@ use std::path::Path;
 
 /// Rooms in pipeline order, each with the rooms that it may import. A new room gets a line here.
 const ROOMS: &[(&str, &str)] = &[
-    ("problem", ""),
-    ("math", "problem"),
+    ("explain", ""),
+    ("math", "explain"),
     ("block", ""),
     ("verdict", ""),
     ("number", ""),
-    ("robot", "problem math"),
-    ("log", "problem math number robot block"),
-    ("config", "problem number robot log verdict"),
-    ("output", "problem log"),
-    ("motion", "problem math robot block"),
-    ("effect", "problem math number robot motion"),
-    ("export", "problem number robot config motion effect"),
+    ("robot", "explain math"),
+    ("log", "explain math number robot block"),
+    ("config", "explain number robot log verdict"),
+    ("output", "explain log"),
+    ("motion", "explain math robot block"),
+    ("effect", "explain math number robot motion"),
+    ("export", "explain number robot config motion effect"),
     ("band", "math number robot config motion effect"),
     (
         "observe",
         "math robot block log config motion effect band export",
     ),
-    ("open_loop", "problem math number robot motion effect"),
-    ("friction", "problem math robot block motion verdict"),
-    ("inertia", "problem math robot block motion verdict"),
+    ("open_loop", "explain math number robot motion effect"),
+    ("friction", "explain math robot block motion verdict"),
+    ("inertia", "explain math robot block motion verdict"),
     ("judge", ""),
-    ("diagnose", "problem math robot block motion effect judge"),
+    ("diagnose", "explain math robot block motion effect judge"),
     ("validate", "math robot block motion verdict"),
     ("inspect", "math number block log"),
-    ("setup", "problem math robot motion inertia judge"),
-    ("mapping", "problem robot log inspect"),
-    ("simulate", "problem math number robot log config effect"),
+    ("setup", "math robot motion inertia judge"),
+    ("mapping", "explain robot log inspect"),
+    ("simulate", "explain math number robot log config effect"),
     (
         "excite",
-        "problem math number verdict robot log config inertia simulate",
+        "explain math number verdict robot log config inertia simulate",
     ),
-    ("compare", "problem math robot config motion effect verdict"),
+    ("compare", "explain math robot config motion effect verdict"),
     ("track", ""),
     (
         "identify",
-        "problem math block verdict number robot log config motion effect friction inertia judge diagnose \
+        "explain math block verdict number robot log config motion effect friction inertia judge diagnose \
          validate inspect setup compare band observe open_loop track export",
     ),
     (
@@ -53,12 +53,12 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     (
         "report",
-        "problem math verdict number robot log config motion effect friction inertia diagnose validate \
+        "explain math verdict number robot log config motion effect friction inertia diagnose validate \
          inspect setup excite compare identify band observe open_loop track replay",
     ),
     (
         "cli",
-        "problem math block verdict number robot log config output motion effect friction inertia diagnose \
+        "explain math block verdict number robot log config output motion effect friction inertia diagnose \
          validate inspect mapping setup simulate excite compare identify report export band \
          observe open_loop track replay",
     ),

@@ -37,9 +37,9 @@
 extern crate self as cft_ident_core;
 
 pub mod block;
+pub mod explain;
 pub mod math;
 pub mod number;
-pub mod problem;
 pub mod robot;
 pub mod verdict;
 

@@ -1,9 +1,9 @@
-//! `#[derive(Explain)]` for error types: `#[problem("what is wrong", "what to do", ..)]` at a struct or at each variant
-//! of an enum makes `Explain::problem` and the `Display` that shows it in one line.
+//! `#[derive(Explain)]` for error types: `#[explain("what is wrong", "what to do", ..)]` at a struct or at each variant
+//! of an enum makes `Explain::explanation` and the `Display` that shows it in one line.
 //!
 //! A text may name fields in braces, those of a tuple as `{_0}`. In place of a text may stand an expression: a
-//! `Problem`, a `String` or, for what to do, whatever has a `Display`. The derive is used through
-//! `cft_ident_core::problem::Explain`, which shows an example.
+//! `Explanation`, a `String` or, for what to do, whatever has a `Display`. The derive is used through
+//! `cft_ident_core::explain::Explain`, which shows an example.
 
 use proc_macro::TokenStream;
 use quote::{format_ident, quote};
@@ -11,7 +11,7 @@ use syn::punctuated::Punctuated;
 use syn::{Attribute, Data, DeriveInput, Error, Expr, Fields, Token, parse_macro_input};
 
 /// Derives `Explain` and `Display`.
-#[proc_macro_derive(Explain, attributes(problem))]
+#[proc_macro_derive(Explain, attributes(explain))]
 pub fn explain(input: TokenStream) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
     implementation(&input)
@@ -29,17 +29,17 @@ fn implementation(input: &DeriveInput) -> Result<proc_macro2::TokenStream, Error
     };
     let name = &input.ident;
     Ok(quote! {
-        impl ::cft_ident_core::problem::Explain for #name {
+        impl ::cft_ident_core::explain::Explain for #name {
             #[allow(unused_variables)]
-            fn problem(&self) -> ::cft_ident_core::problem::Problem {
-                use ::cft_ident_core::problem::{Explain as _, Problem};
+            fn explanation(&self) -> ::cft_ident_core::explain::Explanation {
+                use ::cft_ident_core::explain::{Explain as _, Explanation};
                 match self { #(#arms)* }
             }
         }
 
         impl ::std::fmt::Display for #name {
             fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
-                ::std::fmt::Display::fmt(&::cft_ident_core::problem::Explain::problem(self), f)
+                ::std::fmt::Display::fmt(&::cft_ident_core::explain::Explain::explanation(self), f)
             }
         }
     })
@@ -64,14 +64,14 @@ fn arm(
         }
         Fields::Unit => quote!(Self #of),
     };
-    let attribute = attributes.iter().find(|a| a.path().is_ident("problem"));
-    let missing = || Error::new_spanned(name, "say what is wrong: #[problem(\"..\", \"..\")]");
+    let attribute = attributes.iter().find(|a| a.path().is_ident("explain"));
+    let missing = || Error::new_spanned(name, "say what is wrong: #[explain(\"..\", \"..\")]");
     let texts = attribute.ok_or_else(missing)?;
     let texts = texts.parse_args_with(Punctuated::<Expr, Token![,]>::parse_terminated)?;
     let mut texts = texts.iter();
     let what = match texts.next().ok_or_else(missing)? {
-        Expr::Lit(text) => quote!(Problem::new(format_args!(#text))),
-        problem => quote!(Problem::from(#problem)),
+        Expr::Lit(text) => quote!(Explanation::new(format_args!(#text))),
+        explanation => quote!(Explanation::from(#explanation)),
     };
     let remedies = texts.map(|remedy| match remedy {
         Expr::Lit(text) => quote!(.remedy(format_args!(#text))),

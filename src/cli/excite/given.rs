@@ -1,6 +1,6 @@
 //! Noise levels, and what is used together with a design: logs and other trajectories.
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use std::path::Path;
 
 use super::Bench;
@@ -51,9 +51,9 @@ pub(super) fn add(
         given.add_motion(&information, rows);
         return Ok(());
     }
-    let spec: LogSpec = name
-        .parse()
-        .map_err(|error: LogError| CliError::usage(error.problem().of(format!("--with {name}"))))?;
+    let spec: LogSpec = name.parse().map_err(|error: LogError| {
+        CliError::usage(error.explanation().of(format!("--with {name}")))
+    })?;
     let logs = LoggedRobot::new(name, bench.file.clone());
     let mut log = logs.open_positions(&Log::from(&spec), bench.context.control())?;
     let (sums, summary) = accumulate(

@@ -1,31 +1,31 @@
 //! Why no diagnosis comes out.
 
 use crate::effect::formula::FormulaError;
+use crate::explain::{Explain, Explanation};
 use crate::motion::MotionError;
-use crate::problem::{Explain, Problem};
 
 /// Why no diagnosis came out.
 #[derive(Debug, Explain, thiserror::Error)]
 pub enum DiagnoseError {
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Motion(#[from] MotionError),
-    #[problem(
+    #[explain(
         "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} unknowns",
         "give a longer log, or logs of their own by --holdout"
     )]
     TooFewRows { rows: usize, unknowns: usize },
-    #[problem(
+    #[explain(
         "these logs determine none of the {unknowns} unknowns of the model",
         "log a motion of every joint"
     )]
     NothingDetermined { unknowns: usize },
-    #[problem("the torque of joint {joint} is zero throughout", "check its channel")]
+    #[explain("the torque of joint {joint} is zero throughout", "check its channel")]
     NoTorque { joint: String },
-    #[problem(why.clone().of(format!("no effect {name} can be accepted")))]
-    Accept { name: String, why: Problem },
-    #[problem(_0.problem())]
+    #[explain(why.clone().of(format!("no effect {name} can be accepted")))]
+    Accept { name: String, why: Explanation },
+    #[explain(_0.explanation())]
     Formula(Box<FormulaError>),
-    #[problem("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
 }
 

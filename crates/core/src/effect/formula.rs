@@ -4,8 +4,8 @@ use super::formula_state::FormulaState;
 use super::law_text::exact;
 use super::place::Place;
 use super::scene::Scene;
+use crate::explain::Explain;
 use crate::math::formula::{Formula, MOST_NAMES};
-use crate::problem::Explain;
 use crate::robot::{FormulaSignal, Robot};
 
 /// What a formula effect is made of, by name.
@@ -35,9 +35,9 @@ pub struct Shape {
 /// Why a formula cannot be used.
 #[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum FormulaError {
-    #[problem("candidate `{name}` has the name of an effect that is known: give it another")]
+    #[explain("candidate `{name}` has the name of an effect that is known: give it another")]
     Known { name: String },
-    #[problem(
+    #[explain(
         "candidate `{name}`: this robot has no joint `{joint}`",
         "it has {known}"
     )]
@@ -46,14 +46,14 @@ pub enum FormulaError {
         joint: String,
         known: String,
     },
-    #[problem("candidate `{name}`, `{coefficient}`: `{formula}` is no formula: {why}")]
+    #[explain("candidate `{name}`, `{coefficient}`: `{formula}` is no formula: {why}")]
     Syntax {
         name: String,
         coefficient: String,
         formula: String,
         why: String,
     },
-    #[problem(
+    #[explain(
         "candidate `{name}`, `{coefficient}`: `{variable}` is not known",
         "known are q, v, a, load, direction, temperature, since_reversal, play and dahl of the joint, the same of others (q_{joint}), t{shapes}"
     )]
@@ -64,7 +64,7 @@ pub enum FormulaError {
         joint: String,
         shapes: String,
     },
-    #[problem(
+    #[explain(
         "candidate `{name}`, `{coefficient}`: `{variable}` needs its scale in m or rad: give it in `shapes` as `{scale}`"
     )]
     Scale {

@@ -1,30 +1,30 @@
 //! Numbers of an effect by their keys, as a model file has them, and why they cannot be used.
 
-use crate::problem::Explain;
+use crate::explain::Explain;
 use std::collections::BTreeMap;
 
 /// Why an effect of a model file cannot be used.
 #[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum EffectError {
-    #[problem("effect `{name}` is not known", "known are {known}")]
+    #[explain("effect `{name}` is not known", "known are {known}")]
     Unknown { name: String, known: String },
-    #[problem("effect `{name}`: this robot has no joint `{joint}`", "it has {known}")]
+    #[explain("effect `{name}`: this robot has no joint `{joint}`", "it has {known}")]
     Joint {
         name: String,
         joint: String,
         known: String,
     },
-    #[problem("no code is known for the effect {effect}")]
+    #[explain("no code is known for the effect {effect}")]
     NoCode { effect: String },
-    #[problem("effect `{name}` cannot sit there on this robot")]
+    #[explain("effect `{name}` cannot sit there on this robot")]
     Place { name: String },
-    #[problem("effect `{name}` lacks its parameter `{key}`", "it takes {known}")]
+    #[explain("effect `{name}` lacks its parameter `{key}`", "it takes {known}")]
     Key {
         name: String,
         key: String,
         known: String,
     },
-    #[problem("effect `{name}`: `{key}` = {value} is not a usable number")]
+    #[explain("effect `{name}`: `{key}` = {value} is not a usable number")]
     Value {
         name: String,
         key: String,

@@ -1,6 +1,6 @@
 //! Which joint a log moves, and whether its motion can show friction at all.
 
-use crate::problem::Explain;
+use crate::explain::Explain;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -9,12 +9,12 @@ use super::prepare::{SmoothedMotion, rms};
 /// Why a log cannot give a joint's friction. Each message says what motion is missing.
 #[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum FrictionError {
-    #[problem(
+    #[explain(
         "no joint moves in this log: the largest travel is {travel:.3e} of a joint's range",
         "log an experiment in which one joint runs back and forth"
     )]
     NothingMoves { travel: f64 },
-    #[problem(
+    #[explain(
         "joints {first} and {second} both move ({first_share:.0} % and {second_share:.0} % of their ranges), so it is open which joint this log is about",
         "name it with --joint, or log one joint at a time"
     )]
@@ -24,12 +24,12 @@ pub enum FrictionError {
         first_share: f64,
         second_share: f64,
     },
-    #[problem(
+    #[explain(
         "joint {joint} does not move in this log, or its torque is zero throughout",
         "log it moving back and forth"
     )]
     StandsStill { joint: String },
-    #[problem(
+    #[explain(
         "joint {joint} never reverses (speeds from {least:.4} to {most:.4}): Coulomb friction cannot be separated from a constant torque",
         "log it in both directions"
     )]
@@ -38,7 +38,7 @@ pub enum FrictionError {
         least: f64,
         most: f64,
     },
-    #[problem(
+    #[explain(
         "the log of joint {joint} holds {samples} samples in which it moves, too few for {unknowns} unknowns",
         "log longer"
     )]
@@ -47,7 +47,7 @@ pub enum FrictionError {
         samples: usize,
         unknowns: usize,
     },
-    #[problem(
+    #[explain(
         "the filter found no finite estimate for joint {joint} from any start",
         "inspect the log's torque and position channels"
     )]

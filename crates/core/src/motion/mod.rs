@@ -55,7 +55,7 @@ pub(crate) use stretch::alike;
 pub use stretch::{Parallel, ParallelFilters, Stretch, stretches};
 pub use zero_order_hold::ZeroOrderHold;
 
-use crate::problem::Explain;
+use crate::explain::Explain;
 use thiserror::Error;
 
 use crate::math::MathError;
@@ -104,18 +104,18 @@ pub struct FilteredRow<'a> {
 #[derive(Debug, Clone, PartialEq, Explain, Error)]
 pub enum MotionError {
     /// A filter cannot be designed or run.
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Math(#[from] MathError),
 
     /// Fewer samples than a sampling step needs.
-    #[problem("the log holds {samples} samples: two are the least that has a sampling step")]
+    #[explain("the log holds {samples} samples: two are the least that has a sampling step")]
     TooFewSamples {
         /// Samples of the log.
         samples: u64,
     },
 
     /// A block of another width than the robot.
-    #[problem(
+    #[explain(
         "{channel} has {values} values in {rows} rows, but the robot has {joints} joints: check the columns of the log"
     )]
     Shape {
@@ -130,7 +130,7 @@ pub enum MotionError {
     },
 
     /// Time stands still or runs backwards.
-    #[problem("time goes from {before} s to {after} s: sort the log and remove repeated rows")]
+    #[explain("time goes from {before} s to {after} s: sort the log and remove repeated rows")]
     Time {
         /// Time of a row (s).
         before: f64,
@@ -139,7 +139,7 @@ pub enum MotionError {
     },
 
     /// A setting out of its range.
-    #[problem("{name} = {value} is not possible: {remedy}")]
+    #[explain("{name} = {value} is not possible: {remedy}")]
     Setting {
         /// Name of the setting.
         name: &'static str,
@@ -150,7 +150,7 @@ pub enum MotionError {
     },
 
     /// Every stretch without a gap is too short to filter.
-    #[problem(
+    #[explain(
         "no stretch of the log is long enough to filter: {segments} stretches between gaps, the longest of {longest} samples, {needed} are needed",
         "bridge gaps that are short beside the motion by `gap_factor = 8` in [filter], raise `cutoff_hz`, or record longer"
     )]
@@ -164,7 +164,7 @@ pub enum MotionError {
     },
 
     /// A record that must be of one piece has a gap.
-    #[problem("no row between {from} s and {to} s: smooth the stretches before and after it apart")]
+    #[explain("no row between {from} s and {to} s: smooth the stretches before and after it apart")]
     Gap {
         /// Last time before the gap (s).
         from: f64,
@@ -173,7 +173,7 @@ pub enum MotionError {
     },
 
     /// A computed channel is NaN or infinite.
-    #[problem(
+    #[explain(
         "channel {channel} is {value} at t = {t} s: the position there is outside of what the model covers"
     )]
     NotFinite {

@@ -9,7 +9,7 @@ use super::robot_file::RobotSection;
 use super::serial_section::{
     BASE, CouplingSection, FollowsSection, LinkSection, MOST_LINKS, SineSection,
 };
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use cft_ident_core::robot::tree::space::{Rotation, Vector};
 use cft_ident_core::robot::tree::{
     Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError,
@@ -276,7 +276,7 @@ impl Misfit {
     }
 
     fn of_tree(error: &TreeError) -> Self {
-        let problem = error.problem();
+        let problem = error.explanation();
         let remedy = problem.remedies.first().map(String::as_str);
         Self::of_robot(
             &format!("is \"serial\", but {}", problem.what),

@@ -1,6 +1,6 @@
 //! What keeps a log from being described.
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use thiserror::Error;
 
 use crate::log::LogError;
@@ -9,10 +9,10 @@ use crate::log::LogError;
 #[derive(Debug, Explain, Error)]
 pub enum MappingError {
     /// A log that cannot be read.
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Log(#[from] LogError),
     /// No column is a time.
-    #[problem(
+    #[explain(
         "{log}: no column is a time: {columns}",
         "give the rate at which it was recorded: --rate HZ",
         "or add a column of times"
@@ -24,7 +24,7 @@ pub enum MappingError {
         columns: String,
     },
     /// Several machines in one recording.
-    #[problem(
+    #[explain(
         "{log}: holds several machines: {topics}",
         "name the topic of the one that was measured: --topic NAME"
     )]
@@ -35,6 +35,6 @@ pub enum MappingError {
         topics: String,
     },
     /// The user stopped it.
-    #[problem("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
 }

@@ -17,7 +17,7 @@ pub use log::{LogForm, LogWriter};
 pub use together::Together;
 pub use trajectory::JointTrajectory;
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -32,7 +32,7 @@ use crate::log::shown;
 
 /// An output that cannot be written.
 #[derive(Debug, Explain, Error)]
-#[problem("{file}: cannot be written: {source}", remedy)]
+#[explain("{file}: cannot be written: {source}", remedy)]
 pub struct OutputError {
     /// File as the user named it.
     pub file: String,

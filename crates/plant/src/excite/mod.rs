@@ -48,23 +48,23 @@ pub use objective::{NoValue, PriorInformation};
 pub use start::{usual_motion, usual_torque};
 
 use crate::simulate::SimulateError;
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use cft_ident_files::config::{ConfigError, did_you_mean};
 
 /// Why no motion came out. Each message says what to change.
 #[derive(Debug, Explain, thiserror::Error)]
 pub enum ExciteError {
-    #[problem(
+    #[explain(
         "the travel of {coordinate} is not known",
         "write `[limits.{coordinate}] position = [low, high]` into the robot file"
     )]
     NoTravel { coordinate: String },
-    #[problem(
+    #[explain(
         "nothing bounds the speed of {coordinate}",
         "write `[limits.{coordinate}] speed = ...` (or acceleration; or torque, and give a model with -m) into the robot file"
     )]
     NoSpeed { coordinate: String },
-    #[problem(
+    #[explain(
         "the offset {offset} of {coordinate} lies outside [{lower}, {upper}], its limits less the reserve",
         "choose another offset or let the design choose it"
     )]
@@ -74,7 +74,7 @@ pub enum ExciteError {
         lower: f64,
         upper: f64,
     },
-    #[problem(
+    #[explain(
         "{quantity} of {channel} would be {value} at rest already, outside [{lower}, {upper}]",
         "widen that limit or check the model"
     )]
@@ -85,12 +85,12 @@ pub enum ExciteError {
         lower: f64,
         upper: f64,
     },
-    #[problem(
+    #[explain(
         "none of {starts} starts excites all {unknowns} unknowns within the limits",
         "give more harmonics, wider limits or fewer parameters"
     )]
     NothingExcited { unknowns: usize, starts: usize },
-    #[problem(
+    #[explain(
         format!(
             "rest at the ends needs blends longer than {seconds:.1} s: with those a limit is still used to {:.1} %",
             100.0 * share
@@ -98,32 +98,32 @@ pub enum ExciteError {
         "keep more in reserve (--margin)"
     )]
     NoBlend { seconds: f64, share: f64 },
-    #[problem(
+    #[explain(
         "the pose of --from breaks a limit itself: the {what} is {value:.4}",
         "give the pose in which the robot stands"
     )]
     BrokenPose { what: String, value: f64 },
-    #[problem(
+    #[explain(
         "no straight way leads from the given pose into the motion within the limits: one of them breaks that on the {what} after {percent} % of the way",
         "give another pose with --from, or move the robot by hand and leave --from out"
     )]
     NoWay { what: String, percent: f64 },
-    #[problem(
+    #[explain(
         "`[limits.{joint}] volts` cannot be kept: the motors of this robot act on x_c1..x_c4",
         "write the limit there, or limit the torque of {joint}"
     )]
     VoltsOfJoint { joint: String },
-    #[problem(
+    #[explain(
         "the series is written in other coordinates than the design's",
         "write it in {wanted}"
     )]
     OtherCoordinates { wanted: String },
-    #[problem(
+    #[explain(
         "the machine has no coordinate {name}",
         format!("{}its coordinates are {known}", did_you_mean(name, known))
     )]
     UnknownCoordinate { name: String, known: String },
-    #[problem(
+    #[explain(
         "a blend of {blend_s:?} s is {periods:.3e} periods of {fundamental_hz:?} Hz, and at most {most} are judged",
         "give a lower `fundamental_hz` or a shorter `blend_s`"
     )]
@@ -133,12 +133,12 @@ pub enum ExciteError {
         periods: f64,
         most: f64,
     },
-    #[problem(
+    #[explain(
         "the motion lasts {seconds:?} s, and at most {most:.0} s are judged",
         "give a shorter one"
     )]
     LongMotion { seconds: f64, most: f64 },
-    #[problem(
+    #[explain(
         format!(
             "a ladder of {joint} alone, the other joints in the middle of their positions, takes {:.0} % of the limit of {drive} however short its strokes, and {:.0} % are left free",
             100.0 * used,
@@ -152,19 +152,19 @@ pub enum ExciteError {
         used: f64,
         free: f64,
     },
-    #[problem(
+    #[explain(
         "joint {joint} has no friction in the model",
         "give one with -m that has"
     )]
     NoLaw { joint: String },
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Config(#[from] ConfigError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Reference(#[from] SimulateError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     NoValue(#[from] NoValue),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Robot(#[from] cft_ident_core::robot::RobotError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Math(#[from] cft_ident_core::math::MathError),
 }

@@ -7,7 +7,7 @@
 //! sample, 2 (F S) . F + sum kappa c, with S and kappa fixed: the chain rule through the singular
 //! vectors and the multipliers.
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use nalgebra::DMatrix;
 
 use cft_ident_core::math::MathError;
@@ -29,9 +29,9 @@ const FINER: usize = 4;
 /// Why a point has no value.
 #[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum NoValue {
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Robot(#[from] RobotError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Math(#[from] MathError),
 }
 

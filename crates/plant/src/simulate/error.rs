@@ -1,6 +1,6 @@
 //! What keeps a simulation from starting or ending.
 
-use cft_ident_core::problem::{Explain, Problem};
+use cft_ident_core::explain::{Explain, Explanation};
 use cft_ident_core::robot::RobotError;
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::log::did_you_mean;
@@ -9,25 +9,25 @@ use cft_ident_logs::log::did_you_mean;
 #[derive(Debug, Explain, thiserror::Error)]
 pub enum SimulateError {
     /// The state is no longer finite, or no step is short enough.
-    #[problem(
+    #[explain(
         "the simulated motion diverges at t = {t:.6} s",
         "check gains, parameters and initial speeds, or lower the slopes of the friction law"
     )]
     Diverged { t: f64 },
     /// A pose that the mechanism cannot take.
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Robot(#[from] RobotError),
     /// A model that does not hold what the plant needs.
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Config(#[from] ConfigError),
     /// A robot that the simulator cannot build.
-    #[problem(what.clone().of("this robot cannot be simulated"))]
-    Unsupported { what: Problem },
+    #[explain(what.clone().of("this robot cannot be simulated"))]
+    Unsupported { what: Explanation },
     /// More joints than the simulator is compiled for.
-    #[problem("this robot has {joints} joints and the simulator has room for {most}")]
+    #[explain("this robot has {joints} joints and the simulator has room for {most}")]
     TooManyJoints { joints: usize, most: usize },
     /// A start outside the limits.
-    #[problem(
+    #[explain(
         "{coordinate} = {value:.5} at the start lies outside its limits [{lower}, {upper}]",
         "begin inside them (the set-ups TUeDACS and dSPACE differ in x_c4)"
     )]
@@ -38,38 +38,38 @@ pub enum SimulateError {
         upper: f64,
     },
     /// A reference that cannot be followed as it is written.
-    #[problem(what.clone().of("the reference cannot be used"))]
-    Reference { what: Problem },
+    #[explain(what.clone().of("the reference cannot be used"))]
+    Reference { what: Explanation },
     /// A number that a plant, controller or sensor cannot have.
-    #[problem("{name} is {value}, but {rule}")]
+    #[explain("{name} is {value}, but {rule}")]
     Parameter {
         name: &'static str,
         value: f64,
         rule: &'static str,
     },
     /// Parameters of no physical robot.
-    #[problem(
+    #[explain(
         "the inertia matrix is not positive definite at the pose {x:.4?}",
         "no physical robot has these inertial parameters, so take others: a fit with --unconstrained can be so, a fit without it is not"
     )]
     NotPositiveDefinite { x: Vec<f64> },
     /// Volts to play back that are no series.
-    #[problem(what.clone().of("the volts cannot be played back"))]
-    Volts { what: Problem },
+    #[explain(what.clone().of("the volts cannot be played back"))]
+    Volts { what: Explanation },
     /// An effect that cannot be read.
-    #[problem(
+    #[explain(
         "effect `{text}`: cannot read `{part}`",
         "write NAME, NAME:JOINT or NAME:JOINT:key=value,key=value"
     )]
     EffectSyntax { text: String, part: String },
     /// An effect that is not known.
-    #[problem(
+    #[explain(
         "there is no effect `{name}` in the simulator",
         format!("{}it has {known}", did_you_mean(name, known))
     )]
     UnknownEffect { name: String, known: String },
     /// A key that the effect does not have.
-    #[problem(
+    #[explain(
         "effect `{effect}` has no key `{key}`",
         format!("{}its keys are {known}", did_you_mean(key, known))
     )]
@@ -79,29 +79,29 @@ pub enum SimulateError {
         known: String,
     },
     /// An effect of the user's own without one of its numbers.
-    #[problem(
+    #[explain(
         "effect `{effect}`: `{key}` has no number",
         "give each by `--effect {effect}:JOINT:{key}=..`"
     )]
     MissingKey { effect: String, key: String },
     /// An effect of the user's own that is none on this robot.
-    #[problem("candidate `{name}`: {what}", "correct its [[candidate]] table")]
+    #[explain("candidate `{name}`: {what}", "correct its [[candidate]] table")]
     Candidate { name: String, what: String },
     /// A joint that the robot does not have.
-    #[problem(
+    #[explain(
         "the robot has no joint `{name}`",
         format!("{}its joints are {known}", did_you_mean(name, known))
     )]
     UnknownJoint { name: String, known: String },
     /// An effect that has nothing to sit on.
-    #[problem(why.clone().of(format!("effect `{effect}` has no place at {place}")))]
+    #[explain(why.clone().of(format!("effect `{effect}` has no place at {place}")))]
     EffectPlace {
         effect: String,
         place: String,
-        why: Problem,
+        why: Explanation,
     },
     /// A number that the effect cannot have.
-    #[problem("effect `{effect}`: {key} is {value}, but {rule}")]
+    #[explain("effect `{effect}`: {key} is {value}, but {rule}")]
     EffectNumber {
         effect: String,
         key: String,
@@ -109,8 +109,8 @@ pub enum SimulateError {
         rule: String,
     },
     /// An effect of a model file that cannot be run.
-    #[problem(
-        source.problem().of(format!("{file}, [[effect]] {number} (`{name}`)")),
+    #[explain(
+        source.explanation().of(format!("{file}, [[effect]] {number} (`{name}`)")),
         "correct that table, or leave it out to simulate without it"
     )]
     ModelEffect {
@@ -121,7 +121,7 @@ pub enum SimulateError {
         source: Box<SimulateError>,
     },
     /// A log that is too long, for memory where all of it is wanted at once.
-    #[problem(
+    #[explain(
         "{seconds:?} s at {rate_hz:?} Hz are more than the {most} rows that are simulated at once",
         "give at most --seconds {most_s:.0}, and several runs with seeds of their own for more"
     )]
@@ -132,16 +132,16 @@ pub enum SimulateError {
         most_s: f64,
     },
     /// Rows that wait for their noise need a temporary file.
-    #[problem(
+    #[explain(
         "the rows of a long run cannot wait in the system's temporary folder: {_0}",
         "make room there, or name another folder in TMPDIR"
     )]
     Waiting(#[from] std::io::Error),
     /// Whoever takes the rows wants no more of them.
-    #[problem("the simulation was stopped")]
+    #[explain("the simulation was stopped")]
     Stopped,
     /// More extra states than the integrator is compiled for.
-    #[problem(
+    #[explain(
         "the effects need {states} states of their own and at most {most} are possible",
         "use fewer effects"
     )]

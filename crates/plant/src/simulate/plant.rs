@@ -6,7 +6,7 @@
 use super::SimulateError;
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
-use cft_ident_core::problem::Problem;
+use cft_ident_core::explain::Explanation;
 use cft_ident_core::robot::dynamics::Dynamics;
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::JointFriction;
@@ -92,7 +92,7 @@ impl<const J: usize> Plant<J> {
                     _ => "a serial robot",
                 };
                 return Err(SimulateError::Unsupported {
-                    what: Problem::new(format!("{what} has no parameters of its own"))
+                    what: Explanation::new(format!("{what} has no parameters of its own"))
                         .remedy("give a model with -m"),
                 });
             }

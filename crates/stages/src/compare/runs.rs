@@ -1,7 +1,7 @@
 //! Two runs of one command side by side, by the JSON documents that they wrote: parameters in standard
 //! deviations of their difference, errors, and the verdicts that changed.
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
@@ -17,16 +17,16 @@ const COMMANDS: [&str; 5] = ["friction", "lsq", "validate", "diagnose", "identif
 #[derive(Debug, Explain, Error, PartialEq, Eq)]
 pub enum DiffError {
     /// No document of this tool.
-    #[problem("{file} is no JSON document of a run", "write one with --json FILE")]
+    #[explain("{file} is no JSON document of a run", "write one with --json FILE")]
     NoDocument { file: String },
     /// A command without parameters, errors and verdicts.
-    #[problem(
+    #[explain(
         "{file} is a document of `{command}`, which estimates nothing",
         format!("give two of {}", COMMANDS.join(", "))
     )]
     NothingEstimated { file: String, command: String },
     /// Two commands.
-    #[problem(
+    #[explain(
         "the documents are those of `{a}` and of `{b}`",
         "give two of one command"
     )]

@@ -8,10 +8,10 @@ use crate::open_loop::AxisError;
 use cft_ident_core::diagnose::DiagnoseError;
 use cft_ident_core::effect::EffectError;
 use cft_ident_core::effect::formula::FormulaError;
+use cft_ident_core::explain::{Explain, Explanation};
 use cft_ident_core::friction::excitation::FrictionError;
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::motion::{MotionError, RunError};
-use cft_ident_core::problem::{Explain, Problem};
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::inspect::LogFault;
 use cft_ident_logs::log::{LogError, did_you_mean, escape};
@@ -19,22 +19,22 @@ use cft_ident_logs::log::{LogError, did_you_mean, escape};
 /// An error of a stage. Its text reads `what is wrong; what to do`.
 #[derive(Debug, Explain, thiserror::Error)]
 pub enum IdentifyError {
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Log(#[from] LogError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Config(#[from] ConfigError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Fit(#[from] FitError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Reduced(#[from] ReducedError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Track(#[from] TrackError),
-    #[problem("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
-    #[problem("no log is given")]
+    #[explain("no log is given")]
     NoLog,
     /// Rows that would count twice, or be fitted and held out.
-    #[problem(
+    #[explain(
         "{second} ({second_role}) holds rows that {first} ({first_role}) holds: deviations come out too small, or what was fitted is no holdout",
         "give each row once, spans as in LOG@0..70% and LOG@70..100%"
     )]
@@ -45,7 +45,7 @@ pub enum IdentifyError {
         second_role: &'static str,
     },
     /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
-    #[problem(
+    #[explain(
         format!(
             "{log}: column `{}` {}",
             fault.channel.as_deref().map(escape).unwrap_or_default(),
@@ -55,13 +55,13 @@ pub enum IdentifyError {
     )]
     Refused { log: String, fault: Box<LogFault> },
     /// A robot whose last link has no place for a body.
-    #[problem(
+    #[explain(
         "{model}: a body on this robot shows in too few numbers to be told by itself",
         "look for it with `cft-ident diagnose --keep`"
     )]
     NoPayload { model: String },
     /// Positions where a joint of the robot cannot stand.
-    #[problem(
+    #[explain(
         "positions of {joint} run over {positions} {unit}, and its limits are {limits}: this is a log of another robot, or in another unit or with another zero",
         "give the log of this robot, or correct [log.joint] or [limits] of its file"
     )]
@@ -72,20 +72,20 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// The motion of a log, or the processing that a robot file asks for.
-    #[problem(left_out.iter().fold(error.problem().of(of), Problem::remedy))]
+    #[explain(left_out.iter().fold(error.explanation().of(of), Explanation::remedy))]
     Motion {
         of: String,
         error: MotionError,
         /// What was left out of the log before, and why.
         left_out: Option<Box<str>>,
     },
-    #[problem(
+    #[explain(
         "{log}: more than {most} rows",
         "the friction filter passes over a one-joint log many times and holds it in memory",
         "give a span of it, such as FILE@0..600s: minutes are enough for friction"
     )]
     TooManyRows { log: String, most: usize },
-    #[problem(
+    #[explain(
         "{log}: {samples} samples are more than the {most} that are held in memory",
         "choose spans of the logs, as in LOG@0..20%"
     )]
@@ -94,25 +94,25 @@ pub enum IdentifyError {
         samples: usize,
         most: usize,
     },
-    #[problem(
+    #[explain(
         "the robot has no joint `{joint}`",
         format!("{}its joints are {known}", did_you_mean(joint, known))
     )]
     NoJoint { joint: String, known: String },
-    #[problem(error.problem().of(logs))]
+    #[explain(error.explanation().of(logs))]
     Friction { logs: String, error: FrictionError },
-    #[problem(
+    #[explain(
         "{estimator} is linear, and the double-tanh law of friction is not",
         "take `--estimator oe`, which refines the law with the inertias",
         "or give the friction with -m, or set `law = \"viscous-coulomb\"`"
     )]
     LawIsNotLinear { estimator: &'static str },
-    #[problem(
+    #[explain(
         "these data determine none of the parameters",
         "excite every joint with more speed and acceleration"
     )]
     NothingDetermined,
-    #[problem(
+    #[explain(
         format!(
             "these data determine nothing: the noise is as large as the torque, {} of which is left at every joint",
             cft_ident_core::number::percent(*left)
@@ -120,17 +120,17 @@ pub enum IdentifyError {
         "move faster, or filter more by a lower `cutoff_hz` in [filter]"
     )]
     OnlyNoise { left: f64 },
-    #[problem(
+    #[explain(
         "{model}: its data determine none of its parameters, so that nothing can be said of effects beside it",
         "fit it to data that determine it"
     )]
     NothingIdentified { model: String },
-    #[problem(
+    #[explain(
         "{log}: rows are poses and no motion: {rate_hz:.3} Hz, and positions leap from row to row",
         "this tool needs a log in time: record the way from pose to pose too, at 100 Hz or more"
     )]
     Poses { log: String, rate_hz: f64 },
-    #[problem(
+    #[explain(
         "{joint}: the model makes a torque of {torque:.4} {unit} at {t:.3} s of {log}, where no more than {measured:.4} {unit} was measured anywhere: it does not hold there",
         "see what its parameters were fitted to, and the clock and units of this log"
     )]
@@ -143,7 +143,7 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// Channels of several joints in a unit that is no torque.
-    #[problem(
+    #[explain(
         "{robot}: the torques of {joints} are logged in {unit}, and nothing says what torque that is at each joint: gains differ from joint to joint, and masses and inertias need them",
         "give `torque_scale` (N or Nm per {unit} at the joint: torque constant times gear ratio) in [log.joint.NAME]",
         "or let `lsq` find them from a log with a known payload, `--fit-gains LOG:mass=KG`",
@@ -155,47 +155,47 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// No axis that is fitted to its motion.
-    #[problem(
+    #[explain(
         "--open-loop fits single axes whose robot file says `law = \"viscous-coulomb\"` and `fitted_with_inertias = true` in [friction]",
         "fit this robot without it"
     )]
     NotByMotion,
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     ByMotion(#[from] AxisError),
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Gains(#[from] GainError),
-    #[problem(
-        error.problem().of(model),
+    #[explain(
+        error.explanation().of(model),
         format!("{}correct the [[effect]] table, or take it out", near(error))
     )]
     Effect { model: String, error: EffectError },
     /// A formula of the user's own that is none on this robot.
-    #[problem(_0.problem(), "correct the [[candidate]] table")]
+    #[explain(_0.explanation(), "correct the [[candidate]] table")]
     Formula(FormulaError),
     /// A log without a temperature that a formula takes.
-    #[problem(why.clone().of(format!("{log}: `{effect}` takes the temperature of {joint}, and none is known")))]
+    #[explain(why.clone().of(format!("{log}: `{effect}` takes the temperature of {joint}, and none is known")))]
     NoTemperature {
         log: String,
         effect: String,
         joint: String,
-        why: Box<Problem>,
+        why: Box<Explanation>,
     },
     /// A candidate whose name the given model has for something else.
-    #[problem(
+    #[explain(
         "candidate `{name}`: {model} has an effect of that name with another [[candidate]] table",
         "give the candidate another name, or leave it as it is there"
     )]
     CandidateOfModel { name: String, model: String },
     /// A model that nothing was set aside for.
-    #[problem(
+    #[explain(
         "{model}: holds no [[held_out]] and [excesses], so that it is not known how large external torques are where nothing touches the robot",
         "fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside",
         "or give a log of the robot moving freely by `--unloaded LOG`"
     )]
     NothingHeldOut { model: String },
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Diagnose(DiagnoseError),
-    #[problem(
+    #[explain(
         "{first} and {second} are models of different robots: the joints are {ours} in the first and {theirs} in the second",
         "give two models that were identified on one robot"
     )]
@@ -280,9 +280,9 @@ impl IdentifyError {
 /// What stops the reading of a log.
 #[derive(Debug, Explain, thiserror::Error)]
 pub enum ReadError {
-    #[problem(_0.problem())]
+    #[explain(_0.explanation())]
     Log(#[from] LogError),
-    #[problem("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
 }
 

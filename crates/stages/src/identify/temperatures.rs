@@ -4,8 +4,8 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::effect::{AugmentedModel, Law};
+use cft_ident_core::explain::{Explain, Explanation};
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::problem::{Explain, Problem};
 use cft_ident_logs::log::{Instant, LogError, Temperatures};
 
 /// A temperature that an effect takes.
@@ -52,7 +52,7 @@ pub(super) fn none_on(stream: &str, model: &AugmentedModel) -> IdentifyError {
         effect,
         joint: model.model.robot.joint_names()[joint].clone(),
         why: Box::new(
-            Problem::new("rows that arrive on a stream carry none")
+            Explanation::new("rows that arrive on a stream carry none")
                 .remedy("watch the log as a file"),
         ),
     }
@@ -142,7 +142,7 @@ impl LoggedRobot {
     fn no_temperature(&self, log: &Log, effect: &str, joint: usize) -> IdentifyError {
         let name = &self.robot.joint_names()[joint];
         let why = match (self.temperatures(log, Instant::default()), log) {
-            (Err(error), _) => error.problem(),
+            (Err(error), _) => error.explanation(),
             (Ok(_), Log::Arrays(_)) => "give it with the log's other arrays".into(),
             (Ok(_), _) => format!(
                 "name its column, `[log.joint.{name}] temperature = \"COLUMN\"` in the robot or model file, or leave {name} \

@@ -1,7 +1,7 @@
 //! What a fit to the motion of one axis has: how long its windows are, and which friction it adds, both by blocks of
 //! the logs that are set aside one after the other and simulated from begin to end.
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -31,7 +31,7 @@ const ALL: usize = usize::MAX;
 #[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum AxisError {
     /// Blocks that are set aside hold no window.
-    #[problem(
+    #[explain(
         format!(
             "windows of {window_s} s do not fit into a quarter of the logs, which is set aside to check the fit ({} s): give longer logs, or --open-loop=SECONDS with fewer seconds",
             number::significant(*block_s, 3)
@@ -39,12 +39,12 @@ pub enum AxisError {
     )]
     TooShort { window_s: f64, block_s: f64 },
     /// The motion that the model of the torques makes is none.
-    #[problem(
+    #[explain(
         "the motion simulated from the torques goes astray with the numbers that least squares finds: look at mass and viscous friction, which must be above 0, with `lsq` without --open-loop"
     )]
     Astray,
     /// Somebody stopped it.
-    #[problem("interrupted")]
+    #[explain("interrupted")]
     Stopped,
 }
 

@@ -3,7 +3,7 @@
 //! The reader keeps its nodes in one table, so that no nesting exhausts the stack. It refuses
 //! entities other than the five of XML, and document types, which could define some.
 
-use cft_ident_core::problem::Problem;
+use cft_ident_core::explain::Explanation;
 use std::borrow::Cow;
 
 use roxmltree::{Document, Error, Node, ParsingOptions};
@@ -11,7 +11,7 @@ use roxmltree::{Document, Error, Node, ParsingOptions};
 use cft_ident_logs::log::escape;
 
 /// Deepest nesting of elements. A URDF needs about ten levels.
-const DEEPEST: usize = 64;
+const MAX_DEPTH: usize = 64;
 /// Most elements. The largest robots with all their meshes have some thousands.
 const MOST_ELEMENTS: usize = 200_000;
 /// Most elements and texts between them.
@@ -49,7 +49,7 @@ pub(super) fn without_comments(text: &str) -> Cow<'_, str> {
 #[derive(Debug)]
 pub(super) struct Malformed {
     pub line: usize,
-    pub problem: Problem,
+    pub problem: Explanation,
 }
 
 /// A text that was read.
@@ -70,19 +70,19 @@ impl<'t> Tree<'t> {
     /// Reads a text [`without_comments`].
     pub(super) fn parse(text: &'t str) -> Result<Self, Malformed> {
         let last = 1 + text.matches('\n').count();
-        let refused = |problem: Problem| Malformed {
+        let refused = |problem: Explanation| Malformed {
             line: last,
             problem,
         };
         let long = |(start, _)| tag_end(text, start) - start > LONGEST_TAG;
         if text.match_indices('<').any(long) {
             return Err(refused(
-                Problem::new("a tag of more than 64 kB").remedy("no robot needs that"),
+                Explanation::new("a tag of more than 64 kB").remedy("no robot needs that"),
             ));
         }
         if text.matches("xmlns").count() > MOST_NAMESPACES {
             return Err(refused(
-                Problem::new("more than 1000 namespaces").remedy("delete what is not used"),
+                Explanation::new("more than 1000 namespaces").remedy("delete what is not used"),
             ));
         }
         let options = ParsingOptions {
@@ -109,11 +109,11 @@ impl<'t> Tree<'t> {
             }
             open.push(node);
             elements += 1;
-            let problem = if open.len() > DEEPEST {
-                Problem::new(format!("elements are nested more than {DEEPEST} deep"))
+            let problem = if open.len() > MAX_DEPTH {
+                Explanation::new(format!("elements are nested more than {MAX_DEPTH} deep"))
                     .remedy("no robot needs that")
             } else if elements > MOST_ELEMENTS {
-                Problem::new(format!("more than {MOST_ELEMENTS} elements"))
+                Explanation::new(format!("more than {MOST_ELEMENTS} elements"))
                     .remedy("leave out what is no link and no joint")
             } else {
                 continue;
@@ -237,7 +237,7 @@ fn malformed(text: &str, last: usize, error: &Error) -> Malformed {
             (row, what, "correct it, or export it anew")
         }
     };
-    let problem = Problem::new(what).remedy(remedy);
+    let problem = Explanation::new(what).remedy(remedy);
     Malformed { line, problem }
 }
 

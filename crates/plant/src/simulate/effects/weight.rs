@@ -1,8 +1,8 @@
 //! `weight`: the moment of a point mass on a lever.
 
-use cft_ident_core::problem::Problem;
 use super::{Built, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::weight::ENTRY;
+use cft_ident_core::explain::Explanation;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
@@ -11,7 +11,8 @@ pub static LAW: PlantLaw = PlantLaw {
         if !site.turns {
             return Err(site.refuse(
                 ENTRY.name,
-                Problem::new("its lever turns about an axis, and this joint slides").remedy("use `torque-offset`"),
+                Explanation::new("its lever turns about an axis, and this joint slides")
+                    .remedy("use `torque-offset`"),
             ));
         }
         Built::plant(Weight {

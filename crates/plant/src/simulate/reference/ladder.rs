@@ -6,7 +6,7 @@
 //! range (there gravity and inertia show their dependence on position); slow strokes are inserted in
 //! pairs behind them and take the time that is left.
 
-use cft_ident_core::problem::Problem;
+use cft_ident_core::explain::Explanation;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -41,7 +41,7 @@ pub struct LadderReference {
 /// A sweep must have at least this share of the range at its plateau speed.
 const PLATEAU_SHARE: f64 = 0.25;
 /// Share of the range by which a motion may pass its ends: half of what usual ranges leave to the limits.
-const BEYOND: f64 = 0.02;
+const BEYOND_RANGE_SHARE: f64 = 0.02;
 /// Speeds of the usual ladder.
 const SPEEDS: usize = 10;
 /// Time from zero speed to a slow plateau of the usual ladder \[s\].
@@ -142,7 +142,7 @@ impl LadderPlan {
         let shortest = self.lay_out(&order, 0.0, mirrored);
         if shortest.end > self.seconds {
             return Err(SimulateError::Reference {
-                what: Problem::new(format!(
+                what: Explanation::new(format!(
                     "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s",
                     speeds.len(),
                     shortest.end / passes as f64,
@@ -170,7 +170,7 @@ impl LadderPlan {
     ) -> Result<LadderReference, SimulateError> {
         let (low, high) = self.range;
         // pairs of slow strokes between sweeps of two speeds do not end just where they began
-        let hardly = BEYOND * (high - low);
+        let hardly = BEYOND_RANGE_SHARE * (high - low);
         let leaves = |stroke: &&Stroke| {
             let to = stroke.from + stroke.direction * stroke.length();
             !(low - hardly..=high + hardly).contains(&to)
@@ -179,12 +179,12 @@ impl LadderPlan {
             return Ok(ladder);
         };
         Err(SimulateError::Reference {
-            what: Problem::new(format!("the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]", stroke.speed, self.turn, stroke.length())).remedy("give a shorter turn, a lower speed or a wider range"),
+            what: Explanation::new(format!("the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]", stroke.speed, self.turn, stroke.length())).remedy("give a shorter turn, a lower speed or a wider range"),
         })
     }
 
     fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: Problem| Err(SimulateError::Reference { what });
+        let reject = |what: Explanation| Err(SimulateError::Reference { what });
         let (low, high) = self.range;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(low.is_finite() && high.is_finite() && high > low) {
@@ -200,7 +200,9 @@ impl LadderPlan {
             );
         }
         if self.speeds.is_empty() {
-            return reject(Problem::new("the ladder has no speeds").remedy("give at least one"));
+            return reject(
+                Explanation::new("the ladder has no speeds").remedy("give at least one"),
+            );
         }
         let fastest = top_speed(self.range, self.acceleration);
         for &speed in &self.speeds {

@@ -1,7 +1,7 @@
 //! A figure as PNG: the SVG drawn in pixels, with the fonts that come with the crate, so that it looks
 //! the same on every machine.
 
-use cft_ident_core::problem::Explain;
+use cft_ident_core::explain::Explain;
 use std::sync::{Arc, OnceLock};
 
 use resvg::tiny_skia::{Pixmap, Transform};
@@ -17,14 +17,14 @@ const SCALE: f32 = 3.0;
 /// Why there is no picture.
 #[derive(Debug, Explain, thiserror::Error)]
 pub enum PngError {
-    #[problem("the figure cannot be read back: {_0}", "write it as .svg")]
+    #[explain("the figure cannot be read back: {_0}", "write it as .svg")]
     Figure(#[from] resvg::usvg::Error),
-    #[problem(
+    #[explain(
         "a picture of {width} x {height} px does not fit into memory",
         "write it as .svg"
     )]
     Size { width: u32, height: u32 },
-    #[problem("the picture cannot be encoded: {_0}", "write it as .svg")]
+    #[explain("the picture cannot be encoded: {_0}", "write it as .svg")]
     Encoding(String),
 }
 

@@ -6,14 +6,14 @@ pub use cft_ident_derive::Explain;
 
 /// What is wrong, where, and the ways out, the nearest first.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
+pub struct Explanation {
     pub what: String,
     /// `file:line`, or the name of a setting.
     pub places: Vec<String>,
     pub remedies: Vec<String>,
 }
 
-impl Problem {
+impl Explanation {
     pub fn new(what: impl fmt::Display) -> Self {
         Self {
             what: what.to_string(),
@@ -37,25 +37,25 @@ impl Problem {
     }
 }
 
-impl<E: Explain> From<E> for Problem {
+impl<E: Explain> From<E> for Explanation {
     fn from(error: E) -> Self {
-        error.problem()
+        error.explanation()
     }
 }
 
-impl From<String> for Problem {
+impl From<String> for Explanation {
     fn from(what: String) -> Self {
         Self::new(what)
     }
 }
 
-impl From<&str> for Problem {
+impl From<&str> for Explanation {
     fn from(what: &str) -> Self {
         Self::new(what)
     }
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.what)?;
         self.places
@@ -70,19 +70,19 @@ impl fmt::Display for Problem {
 /// An error that says what is wrong and what to do. The derive makes it, and its `Display`, from the texts at the type:
 ///
 /// ```
-/// use cft_ident_core::problem::Explain;
+/// use cft_ident_core::explain::Explain;
 ///
 /// #[derive(Debug, Explain, thiserror::Error)]
 /// enum LogError {
-///     #[problem("{file}: is empty", "record again")]
+///     #[explain("{file}: is empty", "record again")]
 ///     Empty { file: String },
 /// }
 ///
 /// let error = LogError::Empty { file: "my; log.csv".to_owned() };
-/// assert_eq!(error.problem().what, "my; log.csv: is empty");
-/// assert_eq!(error.problem().remedies, ["record again"]);
+/// assert_eq!(error.explanation().what, "my; log.csv: is empty");
+/// assert_eq!(error.explanation().remedies, ["record again"]);
 /// assert_eq!(error.to_string(), "my; log.csv: is empty; record again");
 /// ```
 pub trait Explain: std::error::Error {
-    fn problem(&self) -> Problem;
+    fn explanation(&self) -> Explanation;
 }
