@@ -1,7 +1,7 @@
 //! Which columns of a log are which channels: by the robot file, or by their names.
 
 use super::CliError;
-use cft_ident_core::explain::{Explain, Explanation};
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_logs::inspect::{
     ChannelColumn, ChannelRole, ColumnPlan, FaultKind, InspectedChannel, LogFault, Severity,
     is_time,
@@ -236,7 +236,7 @@ fn limits(
 }
 
 /// What keeps the strict reader from a log, as a fault.
-fn refusal(problem: Explanation) -> LogFault {
+fn refusal(problem: ErrorText) -> LogFault {
     let remedy = problem.remedies.join("; ");
     LogFault::whole(
         Severity::Error,

@@ -7,7 +7,7 @@ use std::fmt;
 use std::io::{IsTerminal, Write};
 
 use super::exit::Exit;
-use cft_ident_core::explain::{Explain, Explanation};
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::log::{LogError, is_hidden};
 use cft_ident_logs::mapping::MappingError;
@@ -21,33 +21,33 @@ use cft_ident_stages::identify::{ErrorKind, IdentifyError};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CliError {
     exit: Exit,
-    problem: Explanation,
+    problem: ErrorText,
 }
 
 impl CliError {
     /// Any error by its exit status.
-    pub(super) fn new(exit: Exit, problem: impl Into<Explanation>) -> Self {
+    pub(super) fn new(exit: Exit, problem: impl Into<ErrorText>) -> Self {
         let problem = problem.into();
         Self { exit, problem }
     }
 
     /// The arguments contradict each other in a way that the parser cannot see (exit 2).
-    pub fn usage(problem: impl Into<Explanation>) -> Self {
+    pub fn usage(problem: impl Into<ErrorText>) -> Self {
         Self::new(Exit::Usage, problem)
     }
 
     /// A file or value that was given cannot be used (exit 3).
-    pub fn input(problem: impl Into<Explanation>) -> Self {
+    pub fn input(problem: impl Into<ErrorText>) -> Self {
         Self::new(Exit::BadInput, problem)
     }
 
     /// The data determine nothing that was asked (exit 4).
-    pub fn undetermined(problem: impl Into<Explanation>) -> Self {
+    pub fn undetermined(problem: impl Into<ErrorText>) -> Self {
         Self::new(Exit::Undetermined, problem)
     }
 
     /// A result cannot be written (exit 5).
-    pub fn output(problem: impl Into<Explanation>) -> Self {
+    pub fn output(problem: impl Into<ErrorText>) -> Self {
         Self::new(Exit::OutputFailed, problem)
     }
 
@@ -164,7 +164,7 @@ impl From<JsonError> for CliError {
 
 /// Says something on standard error. A terminal gets lines that fit it; a file or a pipe gets one
 /// line for each message, as a script looks for it.
-pub(super) fn tell(stderr: &mut dyn Write, text: &str) {
+pub(super) fn to_stderr(stderr: &mut dyn Write, text: &str) {
     // A closed standard error is no reason to lose a result.
     let _ = match std::io::stderr().is_terminal() {
         true => write!(stderr, "{}", folded(text)),

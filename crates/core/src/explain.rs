@@ -6,14 +6,14 @@ pub use cft_ident_derive::Explain;
 
 /// What is wrong, where, and the ways out, the nearest first.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Explanation {
+pub struct ErrorText {
     pub what: String,
     /// `file:line`, or the name of a setting.
     pub places: Vec<String>,
     pub remedies: Vec<String>,
 }
 
-impl Explanation {
+impl ErrorText {
     pub fn new(what: impl fmt::Display) -> Self {
         Self {
             what: what.to_string(),
@@ -37,25 +37,25 @@ impl Explanation {
     }
 }
 
-impl<E: Explain> From<E> for Explanation {
+impl<E: Explain> From<E> for ErrorText {
     fn from(error: E) -> Self {
         error.explanation()
     }
 }
 
-impl From<String> for Explanation {
+impl From<String> for ErrorText {
     fn from(what: String) -> Self {
         Self::new(what)
     }
 }
 
-impl From<&str> for Explanation {
+impl From<&str> for ErrorText {
     fn from(what: &str) -> Self {
         Self::new(what)
     }
 }
 
-impl fmt::Display for Explanation {
+impl fmt::Display for ErrorText {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.what)?;
         self.places
@@ -84,5 +84,5 @@ impl fmt::Display for Explanation {
 /// assert_eq!(error.to_string(), "my; log.csv: is empty; record again");
 /// ```
 pub trait Explain: std::error::Error {
-    fn explanation(&self) -> Explanation;
+    fn explanation(&self) -> ErrorText;
 }

@@ -2,7 +2,7 @@
 //! of an enum makes `Explain::explanation` and the `Display` that shows it in one line.
 //!
 //! A text may name fields in braces, those of a tuple as `{_0}`. In place of a text may stand an expression: a
-//! `Explanation`, a `String` or, for what to do, whatever has a `Display`. The derive is used through
+//! `ErrorText`, a `String` or, for what to do, whatever has a `Display`. The derive is used through
 //! `cft_ident_core::explain::Explain`, which shows an example.
 
 use proc_macro::TokenStream;
@@ -31,8 +31,8 @@ fn implementation(input: &DeriveInput) -> Result<proc_macro2::TokenStream, Error
     Ok(quote! {
         impl ::cft_ident_core::explain::Explain for #name {
             #[allow(unused_variables)]
-            fn explanation(&self) -> ::cft_ident_core::explain::Explanation {
-                use ::cft_ident_core::explain::{Explain as _, Explanation};
+            fn explanation(&self) -> ::cft_ident_core::explain::ErrorText {
+                use ::cft_ident_core::explain::{Explain as _, ErrorText};
                 match self { #(#arms)* }
             }
         }
@@ -70,8 +70,8 @@ fn arm(
     let texts = texts.parse_args_with(Punctuated::<Expr, Token![,]>::parse_terminated)?;
     let mut texts = texts.iter();
     let what = match texts.next().ok_or_else(missing)? {
-        Expr::Lit(text) => quote!(Explanation::new(format_args!(#text))),
-        explanation => quote!(Explanation::from(#explanation)),
+        Expr::Lit(text) => quote!(ErrorText::new(format_args!(#text))),
+        explanation => quote!(ErrorText::from(#explanation)),
     };
     let remedies = texts.map(|remedy| match remedy {
         Expr::Lit(text) => quote!(.remedy(format_args!(#text))),

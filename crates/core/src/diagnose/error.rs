@@ -1,7 +1,7 @@
 //! Why no diagnosis comes out.
 
 use crate::effect::formula::FormulaError;
-use crate::explain::{Explain, Explanation};
+use crate::explain::{ErrorText, Explain};
 use crate::motion::MotionError;
 
 /// Why no diagnosis came out.
@@ -22,7 +22,7 @@ pub enum DiagnoseError {
     #[explain("the torque of joint {joint} is zero throughout", "check its channel")]
     NoTorque { joint: String },
     #[explain(why.clone().of(format!("no effect {name} can be accepted")))]
-    Accept { name: String, why: Explanation },
+    Accept { name: String, why: ErrorText },
     #[explain(_0.explanation())]
     Formula(Box<FormulaError>),
     #[explain("interrupted")]

@@ -1,6 +1,6 @@
 //! One TOML text, read with errors that name file, line and the way out.
 
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -123,7 +123,7 @@ impl<'a> Document<'a> {
                 return ConfigError::Syntax {
                     file: self.file.to_owned(),
                     line,
-                    problem: Explanation::new(format!("`{}` is no known value", escape(name)))
+                    problem: ErrorText::new(format!("`{}` is no known value", escape(name)))
                         .remedy(nearest_or_all(name, known, "known values")),
                 };
             }
@@ -140,11 +140,11 @@ impl<'a> Document<'a> {
             } else if message == "duplicate key" {
                 let name = error.span().and_then(|span| self.text.get(span));
                 let name = escape(name.unwrap_or_default().trim());
-                Explanation::new(format!("duplicate key `{name}`")).remedy("keep one of the two")
+                ErrorText::new(format!("duplicate key `{name}`")).remedy("keep one of the two")
             } else if message.starts_with("invalid type") || message.starts_with("wanted") {
-                Explanation::new(message).remedy("give a value of that kind")
+                ErrorText::new(message).remedy("give a value of that kind")
             } else {
-                Explanation::new(message).remedy("correct this line: `key = value`, text in quotes")
+                ErrorText::new(message).remedy("correct this line: `key = value`, text in quotes")
             };
         ConfigError::Syntax {
             file: self.file.to_owned(),

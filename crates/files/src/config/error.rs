@@ -1,6 +1,6 @@
 //! What can be wrong with a configuration file, and the way out.
 
-use cft_ident_core::explain::{Explain, Explanation};
+use cft_ident_core::explain::{ErrorText, Explain};
 use thiserror::Error;
 
 /// An error in a robot, model, trajectory or campaign file. Lines count from 1.
@@ -35,7 +35,7 @@ pub enum ConfigError {
         file: String,
         /// Line.
         line: usize,
-        problem: Explanation,
+        problem: ErrorText,
     },
     /// A key that the file may not have.
     #[explain("{file}:{line}: unknown key `{key}`", remedy)]

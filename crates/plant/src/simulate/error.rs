@@ -1,6 +1,6 @@
 //! What keeps a simulation from starting or ending.
 
-use cft_ident_core::explain::{Explain, Explanation};
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::robot::RobotError;
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::log::did_you_mean;
@@ -22,7 +22,7 @@ pub enum SimulateError {
     Config(#[from] ConfigError),
     /// A robot that the simulator cannot build.
     #[explain(what.clone().of("this robot cannot be simulated"))]
-    Unsupported { what: Explanation },
+    Unsupported { what: ErrorText },
     /// More joints than the simulator is compiled for.
     #[explain("this robot has {joints} joints and the simulator has room for {most}")]
     TooManyJoints { joints: usize, most: usize },
@@ -39,7 +39,7 @@ pub enum SimulateError {
     },
     /// A reference that cannot be followed as it is written.
     #[explain(what.clone().of("the reference cannot be used"))]
-    Reference { what: Explanation },
+    Reference { what: ErrorText },
     /// A number that a plant, controller or sensor cannot have.
     #[explain("{name} is {value}, but {rule}")]
     Parameter {
@@ -55,7 +55,7 @@ pub enum SimulateError {
     NotPositiveDefinite { x: Vec<f64> },
     /// Volts to play back that are no series.
     #[explain(what.clone().of("the volts cannot be played back"))]
-    Volts { what: Explanation },
+    Volts { what: ErrorText },
     /// An effect that cannot be read.
     #[explain(
         "effect `{text}`: cannot read `{part}`",
@@ -98,7 +98,7 @@ pub enum SimulateError {
     EffectPlace {
         effect: String,
         place: String,
-        why: Explanation,
+        why: ErrorText,
     },
     /// A number that the effect cannot have.
     #[explain("effect `{effect}`: {key} is {value}, but {rule}")]

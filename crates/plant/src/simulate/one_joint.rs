@@ -5,7 +5,7 @@ use super::mechanism::Mechanism;
 use super::reference::{
     LadderPlan, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
 };
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::Robot;
 use cft_ident_files::config::trajectory::SingleJointMove;
 
@@ -195,9 +195,9 @@ impl OneJointMove {
         if !(known.0.is_finite() && known.1.is_finite()) {
             let name = self.mover.name(&m.robot);
             return Err(SimulateError::Reference {
-                what: Explanation::new(format!("the travel of {name} is not known")).remedy(
-                    format!("write `[limits.{name}] position = [low, high]` into the robot file"),
-                ),
+                what: ErrorText::new(format!("the travel of {name} is not known")).remedy(format!(
+                    "write `[limits.{name}] position = [low, high]` into the robot file"
+                )),
             });
         }
         let frame = match self.mover {

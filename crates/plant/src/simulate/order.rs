@@ -1,6 +1,6 @@
 //! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
 
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use std::ops::ControlFlow;
 
 use super::SimulateError;
@@ -357,7 +357,7 @@ fn built_effects(
         Some(fault) if !joint_channels => Err(SimulateError::EffectPlace {
             effect: fault.to_owned(),
             place: "this log".to_owned(),
-            why: Explanation::new("the robot file's [log] has the motors' channels alone, and faults of the data sit in joint channels").remedy("let [log] read those"),
+            why: ErrorText::new("the robot file's [log] has the motors' channels alone, and faults of the data sit in joint channels").remedy("let [log] read those"),
         }),
         _ => Ok((effects, values)),
     }

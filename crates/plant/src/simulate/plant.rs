@@ -6,7 +6,7 @@
 use super::SimulateError;
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::dynamics::Dynamics;
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::JointFriction;
@@ -92,7 +92,7 @@ impl<const J: usize> Plant<J> {
                     _ => "a serial robot",
                 };
                 return Err(SimulateError::Unsupported {
-                    what: Explanation::new(format!("{what} has no parameters of its own"))
+                    what: ErrorText::new(format!("{what} has no parameters of its own"))
                         .remedy("give a model with -m"),
                 });
             }
@@ -120,7 +120,7 @@ impl<const J: usize> Plant<J> {
         let n = self.joints();
         let m = &self.mechanism;
         if n == 1 {
-            // the inertia of a single joint is a parameter, told by its name
+            // the inertia of a single joint is a parameter, reported by its name
             self.check_joint(0)?;
         }
         let finite = self.theta().iter().all(|x| x.is_finite());

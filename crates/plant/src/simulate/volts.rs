@@ -1,7 +1,7 @@
 //! Volts that are played back without a controller.
 
 use super::SimulateError;
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 
 /// Volts over time, each row kept until the next (zero-order hold) and the last for as long as the others on average;
 /// zero before and after.
@@ -16,10 +16,10 @@ impl<const J: usize> VoltSeries<J> {
     /// [`SimulateError::Volts`] when the series is empty, its times do not increase, its lengths differ
     /// or a number is not finite.
     pub fn new(times: Vec<f64>, volts: Vec<[f64; J]>) -> Result<Self, SimulateError> {
-        let reject = |what: Explanation| Err(SimulateError::Volts { what });
+        let reject = |what: ErrorText| Err(SimulateError::Volts { what });
         if times.len() != volts.len() || times.is_empty() {
             return reject(
-                Explanation::new(format!(
+                ErrorText::new(format!(
                     "{} times and {} rows of volts",
                     times.len(),
                     volts.len()

@@ -8,7 +8,7 @@ use crate::open_loop::AxisError;
 use cft_ident_core::diagnose::DiagnoseError;
 use cft_ident_core::effect::EffectError;
 use cft_ident_core::effect::formula::FormulaError;
-use cft_ident_core::explain::{Explain, Explanation};
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::friction::excitation::FrictionError;
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::motion::{MotionError, RunError};
@@ -72,7 +72,7 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// The motion of a log, or the processing that a robot file asks for.
-    #[explain(left_out.iter().fold(error.explanation().of(of), Explanation::remedy))]
+    #[explain(left_out.iter().fold(error.explanation().of(of), ErrorText::remedy))]
     Motion {
         of: String,
         error: MotionError,
@@ -178,7 +178,7 @@ pub enum IdentifyError {
         log: String,
         effect: String,
         joint: String,
-        why: Box<Explanation>,
+        why: Box<ErrorText>,
     },
     /// A candidate whose name the given model has for something else.
     #[explain(

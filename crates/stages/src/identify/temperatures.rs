@@ -4,7 +4,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::effect::{AugmentedModel, Law};
-use cft_ident_core::explain::{Explain, Explanation};
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::motion::Stretch;
 use cft_ident_logs::log::{Instant, LogError, Temperatures};
 
@@ -52,7 +52,7 @@ pub(super) fn none_on(stream: &str, model: &AugmentedModel) -> IdentifyError {
         effect,
         joint: model.model.robot.joint_names()[joint].clone(),
         why: Box::new(
-            Explanation::new("rows that arrive on a stream carry none")
+            ErrorText::new("rows that arrive on a stream carry none")
                 .remedy("watch the log as a file"),
         ),
     }

@@ -3,7 +3,7 @@
 //! The reader keeps its nodes in one table, so that no nesting exhausts the stack. It refuses
 //! entities other than the five of XML, and document types, which could define some.
 
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use std::borrow::Cow;
 
 use roxmltree::{Document, Error, Node, ParsingOptions};
@@ -49,7 +49,7 @@ pub(super) fn without_comments(text: &str) -> Cow<'_, str> {
 #[derive(Debug)]
 pub(super) struct Malformed {
     pub line: usize,
-    pub problem: Explanation,
+    pub problem: ErrorText,
 }
 
 /// A text that was read.
@@ -70,19 +70,19 @@ impl<'t> Tree<'t> {
     /// Reads a text [`without_comments`].
     pub(super) fn parse(text: &'t str) -> Result<Self, Malformed> {
         let last = 1 + text.matches('\n').count();
-        let refused = |problem: Explanation| Malformed {
+        let refused = |problem: ErrorText| Malformed {
             line: last,
             problem,
         };
         let long = |(start, _)| tag_end(text, start) - start > LONGEST_TAG;
         if text.match_indices('<').any(long) {
             return Err(refused(
-                Explanation::new("a tag of more than 64 kB").remedy("no robot needs that"),
+                ErrorText::new("a tag of more than 64 kB").remedy("no robot needs that"),
             ));
         }
         if text.matches("xmlns").count() > MOST_NAMESPACES {
             return Err(refused(
-                Explanation::new("more than 1000 namespaces").remedy("delete what is not used"),
+                ErrorText::new("more than 1000 namespaces").remedy("delete what is not used"),
             ));
         }
         let options = ParsingOptions {
@@ -110,10 +110,10 @@ impl<'t> Tree<'t> {
             open.push(node);
             elements += 1;
             let problem = if open.len() > MAX_DEPTH {
-                Explanation::new(format!("elements are nested more than {MAX_DEPTH} deep"))
+                ErrorText::new(format!("elements are nested more than {MAX_DEPTH} deep"))
                     .remedy("no robot needs that")
             } else if elements > MOST_ELEMENTS {
-                Explanation::new(format!("more than {MOST_ELEMENTS} elements"))
+                ErrorText::new(format!("more than {MOST_ELEMENTS} elements"))
                     .remedy("leave out what is no link and no joint")
             } else {
                 continue;
@@ -237,7 +237,7 @@ fn malformed(text: &str, last: usize, error: &Error) -> Malformed {
             (row, what, "correct it, or export it anew")
         }
     };
-    let problem = Explanation::new(what).remedy(remedy);
+    let problem = ErrorText::new(what).remedy(remedy);
     Malformed { line, problem }
 }
 

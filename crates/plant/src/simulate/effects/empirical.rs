@@ -5,7 +5,7 @@
 //! way since the last reversal it turns with the accepted steps ([`Effect::moved`]). A curve over the load would have
 //! to be solved with the balance of torques, and is refused.
 
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use nalgebra::{SMatrix, SVector};
 
 use super::{Beginning, Built, Effect, PlantLaw, PlantRobot, PlantState, Site, sign};
@@ -39,7 +39,7 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
     if signal == 4 {
         return Err(site.refuse(
             ENTRY.name,
-            Explanation::new("a curve over the load is not simulated")
+            ErrorText::new("a curve over the load is not simulated")
                 .remedy("use `load-friction` or `drive-efficiency`"),
         ));
     }

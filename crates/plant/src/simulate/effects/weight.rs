@@ -2,7 +2,7 @@
 
 use super::{Built, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::weight::ENTRY;
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
@@ -11,7 +11,7 @@ pub static LAW: PlantLaw = PlantLaw {
         if !site.turns {
             return Err(site.refuse(
                 ENTRY.name,
-                Explanation::new("its lever turns about an axis, and this joint slides")
+                ErrorText::new("its lever turns about an axis, and this joint slides")
                     .remedy("use `torque-offset`"),
             ));
         }

@@ -1,6 +1,6 @@
 //! Finite Fourier series of eq. (43), entered smoothly from rest and left to it.
 
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use std::f64::consts::TAU;
 
 use rand::RngExt;
@@ -75,10 +75,10 @@ impl<const J: usize> Fourier<J> {
     /// [`SimulateError::Reference`] when a number is not finite, the frequency not positive, or a and
     /// b differ in length.
     pub fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: Explanation| Err(SimulateError::Reference { what });
+        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
         if !(self.fundamental > 0.0 && self.fundamental.is_finite()) {
             return reject(
-                Explanation::new(format!(
+                ErrorText::new(format!(
                     "the fundamental frequency is {} rad/s",
                     self.fundamental
                 ))
@@ -96,7 +96,7 @@ impl<const J: usize> Fourier<J> {
         }
         if self.a.len() != self.b.len() {
             return reject(
-                Explanation::new(format!(
+                ErrorText::new(format!(
                     "the series has {} coefficients a and {} coefficients b",
                     self.a.len(),
                     self.b.len()

@@ -6,7 +6,7 @@
 //! range (there gravity and inertia show their dependence on position); slow strokes are inserted in
 //! pairs behind them and take the time that is left.
 
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -142,7 +142,7 @@ impl LadderPlan {
         let shortest = self.lay_out(&order, 0.0, mirrored);
         if shortest.end > self.seconds {
             return Err(SimulateError::Reference {
-                what: Explanation::new(format!(
+                what: ErrorText::new(format!(
                     "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s",
                     speeds.len(),
                     shortest.end / passes as f64,
@@ -179,12 +179,12 @@ impl LadderPlan {
             return Ok(ladder);
         };
         Err(SimulateError::Reference {
-            what: Explanation::new(format!("the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]", stroke.speed, self.turn, stroke.length())).remedy("give a shorter turn, a lower speed or a wider range"),
+            what: ErrorText::new(format!("the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]", stroke.speed, self.turn, stroke.length())).remedy("give a shorter turn, a lower speed or a wider range"),
         })
     }
 
     fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: Explanation| Err(SimulateError::Reference { what });
+        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
         let (low, high) = self.range;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(low.is_finite() && high.is_finite() && high > low) {
@@ -200,9 +200,7 @@ impl LadderPlan {
             );
         }
         if self.speeds.is_empty() {
-            return reject(
-                Explanation::new("the ladder has no speeds").remedy("give at least one"),
-            );
+            return reject(ErrorText::new("the ladder has no speeds").remedy("give at least one"));
         }
         let fastest = top_speed(self.range, self.acceleration);
         for &speed in &self.speeds {

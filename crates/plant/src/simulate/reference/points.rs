@@ -2,7 +2,7 @@
 
 use super::Target;
 use crate::simulate::SimulateError;
-use cft_ident_core::explain::Explanation;
+use cft_ident_core::explain::ErrorText;
 
 /// Cubic spline through poses at given times, twice continuously differentiable, at rest at both ends.
 ///
@@ -22,10 +22,10 @@ impl<const J: usize> Points<J> {
     /// [`SimulateError::Reference`] for fewer than two points, times that do not increase, and numbers
     /// that are not finite.
     pub fn new(points: &[(f64, [f64; J])]) -> Result<Self, SimulateError> {
-        let reject = |what: Explanation| Err(SimulateError::Reference { what });
+        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
         if points.len() < 2 {
             return reject(
-                Explanation::new(format!("the point list has {} points", points.len()))
+                ErrorText::new(format!("the point list has {} points", points.len()))
                     .remedy("it needs at least two"),
             );
         }
