@@ -13,7 +13,7 @@ use indicatif::{
     HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle,
 };
 
-use super::error::{CliError, indented, tell};
+use super::error::{CliError, indented, to_stderr};
 use super::{outputs, typed};
 use cft_ident_logs::output::Together;
 use cft_ident_report::report::{Detail, figure};
@@ -52,7 +52,7 @@ impl Context {
         let running = Mutex::new(Vec::new());
         let control = Control::default()
             .stopped_by(move || flag.load(Ordering::Relaxed))
-            .told_to(move |progress| {
+            .reporting_to(move |progress| {
                 let mut running = running.lock().unwrap_or_else(PoisonError::into_inner);
                 show(progress, &mut running, bars, quiet);
             });
@@ -226,7 +226,7 @@ static BARS: LazyLock<MultiProgress> =
 
 /// A line on standard error, above the bars.
 pub(super) fn above_bars(text: &str) {
-    BARS.suspend(|| tell(&mut std::io::stderr(), text));
+    BARS.suspend(|| to_stderr(&mut std::io::stderr(), text));
 }
 
 /// A line on standard error, unless that is to be quiet.

@@ -233,7 +233,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
         Ok(cli) => cli,
         Err(answer) => {
             if let Some(error) = removed(&answer) {
-                error::tell(&mut std::io::stderr(), &error.to_string());
+                error::to_stderr(&mut std::io::stderr(), &error.to_string());
                 return error.exit();
             }
             // Help and version are answers on standard output, the rest are errors.
@@ -241,7 +241,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
             let long = |line: &str| line.chars().count() > WIDTH;
             match answer.use_stderr() && text.lines().any(long) {
                 // a long list of values, which the parser leaves in one line
-                true => error::tell(&mut std::io::stderr(), folded(&text).trim_end()),
+                true => error::to_stderr(&mut std::io::stderr(), folded(&text).trim_end()),
                 false => drop(answer.print()),
             }
             return match answer.use_stderr() {
@@ -253,7 +253,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
     match execute(&cli, &arguments, interrupted) {
         Ok(exit) => exit,
         Err(error) => {
-            error::tell(&mut std::io::stderr(), &error.to_string());
+            error::to_stderr(&mut std::io::stderr(), &error.to_string());
             error.exit()
         }
     }
@@ -313,7 +313,7 @@ fn execute(
         _ => Detail::Usual,
     })
     .printing(matches!(json, Some(Destination::Stdout)));
-    // Told before the long run, also by a command that has no other output.
+    // Said before the long run, also by a command that has no other output.
     context.check_outputs(&[], &[])?;
     let mut outcome = cli.command.run(&context)?;
     outcome.document.warn_first(context.warnings());

@@ -144,7 +144,7 @@ impl<'a> Taken<'a> {
         if begins {
             (self.stretch, self.count, self.began) = (Some(stretch), 0, t);
         } else if self.count == 1 {
-            // rows come at full rate: two of them tell the step
+            // rows come at full rate: two of them give the step
             self.every = self.settings.decimation_at(t - self.began);
         }
         let keeps = self.count.is_multiple_of(self.every) || begins;

@@ -17,7 +17,7 @@ fn drop(maximum: &Maximum, value: f64) -> f64 {
 }
 
 /// Whether the slope with index `i` (3 or 4) may be as steep as any that is tried, the other
-/// parameters fitted anew. A standard deviation cannot tell: it knows the curvature at the maximum
+/// parameters fitted anew. A standard deviation does not say so: it knows the curvature at the maximum
 /// alone, and a likelihood that rises to a plateau is curved at its edge.
 pub(crate) fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> bool {
     let mut p = maximum.parameters.clone();

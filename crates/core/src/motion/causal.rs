@@ -115,7 +115,7 @@ impl CausalMotion {
         self.chain.as_ref().map(|chain| chain.delay_s)
     }
 
-    /// Takes rows and hands out the sampling step \[s\] and the samples that they determine; none before the first 256 rows have told the
+    /// Takes rows and hands out the sampling step \[s\] and the samples that they determine; none before the first 256 rows have given the
     /// sampling step. With `last`, all that is left.
     ///
     /// # Errors

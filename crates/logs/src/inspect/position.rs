@@ -52,8 +52,7 @@ fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
     (found.collect(), least(clock.dt))
 }
 
-/// Tells the leaps of a position, where it is not `told` of already, and parts the log there; they are
-/// told then, `reach` about each [s].
+/// Reports the leaps of a position that are not reported yet, `reach` about each [s], and parts the log there.
 pub(super) fn leaps(
     judge: &LogJudge,
     place: usize,
@@ -123,7 +122,7 @@ pub(super) fn leaps(
     draft.cut(FaultKind::PositionStep, name, &episodes);
 }
 
-/// Tells a position that leaps to and fro in so many rows that none of them is a spike among others: what nearly all
+/// Reports a position that leaps to and fro in so many rows that none of them is a spike among others: what nearly all
 /// rows differ from their neighbours is more than a spike must have, and the steps between rows are noise and no motion.
 pub(super) fn erratic(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     let grain = track.flat.steps.quantile_not_zero(0.0);
@@ -168,7 +167,7 @@ fn with_it(judge: &LogJudge, place: usize, t: f64, clock: &ClockFacts) -> Vec<St
         .collect()
 }
 
-/// Tells a position that begins anew, and whether it does.
+/// Reports a position that begins anew, and whether it does.
 pub(super) fn wrapped(judge: &LogJudge, place: usize, draft: &mut FaultList) -> bool {
     let track = &judge.tracks[place];
     if track.channel.role != ChannelRole::Position {

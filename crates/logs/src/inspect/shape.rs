@@ -54,7 +54,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     flat.tops.retain(|run| !stalled(run));
     flat.stuck.retain(|run| !stalled(run));
     flat.off(place, draft);
-    flat.tell(track, draft);
+    flat.report(track, draft);
     // Where a channel leaps out of a flat stretch it is reported already.
     let reach = 5.5 * clock.dt;
     let mut shown: Vec<[f64; 2]> = (flat.tops.iter().chain(&flat.stuck))
@@ -274,7 +274,7 @@ impl<'a> Flatness<'a> {
         draft.stretches(FaultKind::MotorOff, Info, name, &episodes, &effect, remedy);
     }
 
-    fn tell(&self, track: &Track, draft: &mut FaultList) {
+    fn report(&self, track: &Track, draft: &mut FaultList) {
         let name = Some(track.channel.name.as_str());
         let role = track.channel.role;
         let used = matches!(role, ChannelRole::Position | ChannelRole::Torque);
@@ -322,7 +322,7 @@ impl<'a> Flatness<'a> {
         };
         let severity = if used { Warning } else { Info };
         let of_tops = if applied { Info } else { severity };
-        // Told as reaching the limit of the robot file where that is known.
+        // Reported as reaching the limit of the robot file where that is known.
         if track.at_limit.is_empty() {
             draft.stretches(kind, of_tops, name, &tops, &effect, remedy);
         }

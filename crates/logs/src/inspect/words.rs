@@ -215,7 +215,7 @@ pub fn role(words: &[Word]) -> Option<ChannelRole> {
     }
 }
 
-/// Words that tell no joint from another: how it was measured, in which unit.
+/// Words that distinguish no joint from another: how it was measured, in which unit.
 const NOISE: &str = "\
     act actual meas measured msr state states deg degs degree degrees rad rads nm mnm knm ncm kn \
     n mm cm m per s percent pct feedback fbk fb current the of value data sensor ist in out \

@@ -2,7 +2,7 @@
 //! reversals, that leave the least expected error of its slopes w1 and w2.
 //!
 //! Where a law bends, at speeds of about 1/w1 and 1/w2, is not known to the usual ladder, whose
-//! speeds stand in equal ratios and whose reversals take the same time everywhere. What a log of either will tell is the information of the law's five
+//! speeds stand in equal ratios and whose reversals take the same time everywhere. The value of a log of either is the information of the law's five
 //! derivatives, less what inertia, gravity and a constant torque could take their place with.
 
 use nalgebra::DMatrix;

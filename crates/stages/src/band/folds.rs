@@ -8,7 +8,7 @@ use cft_ident_core::robot::model::{JointFriction, Model};
 
 /// Samples that are looked at together.
 const PIECE: usize = 16_384;
-/// Share of what all blocks tell that holds a model to itself: no direction is left without it that one
+/// Share of the information of all blocks that holds a model to itself: no direction is left without it that one
 /// block alone determines.
 const HOLD_SHARE: f64 = 0.01;
 

@@ -206,7 +206,7 @@ pub fn diagnose(
     )?;
     let work = control.begin("search for effects", None);
     let tell = |heard: Heard| {
-        control.tell(match heard {
+        control.report(match heard {
             Heard::Begin(part, steps) => Progress::Begin(part, Some(steps)),
             Heard::Step => Progress::Advance(1),
             Heard::End => Progress::End,

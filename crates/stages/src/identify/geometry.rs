@@ -85,7 +85,7 @@ fn parameters<'n>(file: &RobotFile, plain: impl Iterator<Item = &'n Nearly>) -> 
     file.robot().parameters().len()
 }
 
-/// What of the geometry makes a parameter that the rows cannot tell, where the condition number is that of such a one.
+/// What of the geometry makes a parameter that the rows do not show, where the condition number is that of such a one.
 pub(super) fn geometry(
     machine: &LoggedRobot,
     condition: Option<f64>,

@@ -169,7 +169,7 @@ struct At {
     slopes: DMatrix<f64>,
 }
 
-/// Fits the free numbers, from those that the model has; none where the first motion goes astray. `told` says that
+/// Fits the free numbers, from those that the model has; none where the first motion goes astray. `with_covariance` says that
 /// the covariance is wanted for itself.
 pub(super) fn fit(
     start: &AugmentedModel,

@@ -6,7 +6,7 @@ const LONG_STEP_SHARE: f64 = 0.5;
 const MAX_LONG_STEPS: usize = 1024;
 /// Usual steps that a range is longer than.
 const MIN_STEPS_PER_RANGE: f64 = 16.0;
-/// By how much the ranges that several steps tell may differ, as a share.
+/// By how much the ranges by several steps may differ, as a share.
 const RANGE_AGREEMENT: f64 = 0.02;
 /// By how much a range may be off one that is usual, as a share.
 const USUAL_RANGE_TOLERANCE: f64 = 0.02;

@@ -31,7 +31,7 @@ struct OpenFile {
     /// Memory that is used again.
     spare: Vec<Vec<u8>>,
     ended: bool,
-    /// What ended it, told once the messages before it are handed out.
+    /// What ended it, reported once the messages before it are handed out.
     failed: Option<LogError>,
     head: Option<MessageHead>,
     data: Vec<u8>,

@@ -1,4 +1,4 @@
-//! What the first bytes of a file tell: its format, comment sign, delimiter and header.
+//! What the first bytes of a file show: its format, comment sign, delimiter and header.
 
 use std::path::Path;
 

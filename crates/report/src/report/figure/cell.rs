@@ -27,7 +27,7 @@ pub struct Cells {
     pub words: Vec<String>,
 }
 
-/// One picture with a panel of a height [px]; `title` and `told` are what a screen reader says, `draw` is given
+/// One picture with a panel of a height [px]; `title` and `description` are what a screen reader says, `draw` is given
 /// the panel's frame: left, top, width, height [px].
 pub(super) fn cell(
     title: &str,
