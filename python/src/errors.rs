@@ -33,11 +33,7 @@ pyo3::create_exception!(
 /// An error of a stage.
 pub fn of_stage(error: impl Into<IdentifyError>) -> PyErr {
     let error = error.into();
-    let mut text = error.to_string();
-    if let Some(remedy) = error.remedy() {
-        text += "; ";
-        text += remedy;
-    }
+    let text = error.to_string();
     match error.kind() {
         ErrorKind::Interrupted => PyKeyboardInterrupt::new_err(()),
         ErrorKind::Usage => UsageError::new_err(text),

@@ -119,73 +119,17 @@ pub(super) fn log_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// A message to be written: the ending chooses the format.
-pub(super) fn message_file(text: &str) -> Result<PathBuf, String> {
-    let known = with_ending(text, "yaml").or_else(|_| with_ending(text, "mcap"));
-    known.map_err(|_| "must end in .yaml or .mcap".into())
-}
-
-/// A program in URScript to be written.
-pub(super) fn script_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "script")
-}
-
-/// A picture to be written: the ending chooses the format.
-pub(super) fn picture_file(text: &str) -> Result<PathBuf, String> {
-    let known = with_ending(text, "svg").or_else(|_| with_ending(text, "png"));
-    known.map_err(|_| "must end in .svg or .png".into())
-}
-
-/// A page to be written.
-pub(super) fn html_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "html")
-}
-
-/// A file of reduced logs to be written.
-pub(super) fn reduced_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "cfi")
-}
-
-/// A URDF to be written.
-pub(super) fn urdf_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "urdf")
-}
-
-/// A parameter file of ROS 2 to be written.
-pub(super) fn yaml_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "yaml")
-}
-
-/// A C header to be written.
-pub(super) fn header_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "h")
-}
-
-/// An MJCF file to be written.
-pub(super) fn mjcf_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "xml")
-}
-
-/// An SDF file to be written.
-pub(super) fn sdf_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "sdf")
-}
-
-/// A USD file to be written, as text.
-pub(super) fn usd_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "usda")
-}
-
-/// A Rust module to be written.
-pub(super) fn rust_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "rs")
-}
-
-fn with_ending(text: &str, ending: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension() {
-        Some(found) if found.eq_ignore_ascii_case(ending) => Ok(path),
-        _ => Err(format!("must end in .{ending}")),
+/// A file to be written, whose name must have one of these endings.
+pub(super) fn ends_in<const N: usize>(
+    endings: [&'static str; N],
+) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
+    move |text| {
+        let path = PathBuf::from(text);
+        let found = path.extension().unwrap_or_default();
+        match endings.iter().any(|e| found.eq_ignore_ascii_case(e)) {
+            true => Ok(path),
+            false => Err(format!("must end in .{}", endings.join(" or ."))),
+        }
     }
 }
 
@@ -243,7 +187,8 @@ mod tests {
         assert!(log_file("a.mcap").is_ok() && log_file("a.csv.zst").is_ok());
         let error = log_file("a.txt").unwrap_err();
         assert!(error.starts_with("must end in .csv or .mcap"), "{error}");
-        assert!(picture_file("csv").is_err() && picture_file("a.pdf").is_err());
-        assert!(picture_file("a.svg").is_ok() && picture_file("a.PNG").is_ok());
+        let picture = ends_in(["svg", "png"]);
+        assert!(picture("csv").is_err() && picture("a.pdf").is_err());
+        assert!(picture("a.svg").is_ok() && picture("a.PNG").is_ok());
     }
 }

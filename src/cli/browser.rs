@@ -6,9 +6,6 @@ use std::process::{Command, Stdio};
 use super::CliError;
 
 /// Opens a page with the program that $BROWSER names, else with the system's own; does not wait for it.
-///
-/// # Errors
-/// No such program.
 pub(super) fn open(page: &Path) -> Result<(), CliError> {
     let mut command = match std::env::var_os("BROWSER").filter(|name| !name.is_empty()) {
         Some(name) => Command::new(name),

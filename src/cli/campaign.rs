@@ -25,9 +25,6 @@ const UNSEEN_S: f64 = 20.0;
 
 /// Simulates the campaign into `folder` and writes its campaign file; returns the names of the files
 /// and the warnings of the simulations.
-///
-/// # Errors
-/// Where the folder cannot be written to, or the user interrupts.
 pub(super) fn simulate(
     folder: &Path,
     seed: u64,

@@ -1,6 +1,7 @@
 //! Which columns of a log are which channels: by the robot file, or by their names.
 
 use super::CliError;
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_logs::inspect::{
     ChannelColumn, ChannelRole, ColumnPlan, FaultKind, InspectedChannel, LogFault, Severity,
     is_time,
@@ -9,9 +10,6 @@ use cft_ident_logs::log::{self, DeclaredChannels, Layout, RawReader};
 use cft_ident_stages::identify::LoggedRobot;
 
 /// Channels by their names alone.
-///
-/// # Errors
-/// Where no column is a time.
 pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>), CliError> {
     let time = match log.is_timed() && !log.is_recording() {
         true => None,
@@ -31,18 +29,12 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>)
 }
 
 /// Place of the time, and seconds per unit of it.
-///
-/// # Errors
-/// Where no column is a time.
 pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError> {
     let names = log.names();
     let time = names.iter().position(|name| is_time(name));
     let time = time.or(log.split_clock()).ok_or_else(|| {
-        CliError::input(format!(
-            "{}: no column is a time; the header has {}",
-            log.log_name(),
-            log::list(names.iter().map(String::as_str))
-        ))
+        CliError::input(format!("{}: no column is a time", log.log_name()))
+        .hint(format!("the header has {}", log::list(names.iter().map(String::as_str))))
         .hint("name the time column, `time = ..`, or say the rate, `rate_hz = ..`, in [log] of a robot file and give it with -r")
         .hint("`cft-ident new NAME --log LOG --rate HZ` writes such a file")
     })?;
@@ -55,8 +47,7 @@ pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError>
     }
 }
 
-/// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
-/// reading the log.
+/// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from reading the log.
 pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Vec<LogFault>) {
     let layout = log.layout();
     let names = log.names();
@@ -83,7 +74,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, V
         held: None,
         band_hz: Some(machine.settings().cutoff_hz),
     };
-    let refused = log.refused().map(|error| refusal(error.to_string()));
+    let refused = log.refused().map(|error| refusal(error.explanation()));
     (plan, refused.into_iter().chain(missing).collect())
 }
 
@@ -245,15 +236,13 @@ fn limits(
 }
 
 /// What keeps the strict reader from a log, as a fault.
-fn refusal(text: String) -> LogFault {
-    let (effect, remedy) = text
-        .rsplit_once("; ")
-        .unwrap_or((&text, "correct the file"));
+fn refusal(problem: ErrorText) -> LogFault {
+    let remedy = problem.remedies.join("; ");
     LogFault::whole(
         Severity::Error,
         FaultKind::MissingChannel,
         0.0,
-        effect.to_owned(),
-        remedy,
+        problem.what,
+        &remedy,
     )
 }

@@ -1,6 +1,7 @@
 //! What every command is given beside its own arguments: where messages go, whether the user has
 //! asked to stop, and the progress bar.
 
+use cft_ident_core::explain::Explain;
 use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use indicatif::{
     HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle,
 };
 
-use super::error::{CliError, indented, tell};
+use super::error::{CliError, indented, to_stderr};
 use super::{outputs, typed};
 use cft_ident_logs::output::Together;
 use cft_ident_report::report::{Detail, figure};
@@ -36,7 +37,7 @@ pub struct Context {
     /// The error that ends the command once its results are written.
     ending: Arc<Mutex<Option<CliError>>>,
     /// Warnings that stand before those of the command's own result.
-    told: Arc<Mutex<Vec<String>>>,
+    warnings: Arc<Mutex<Vec<String>>>,
 }
 
 impl Context {
@@ -51,7 +52,7 @@ impl Context {
         let running = Mutex::new(Vec::new());
         let control = Control::default()
             .stopped_by(move || flag.load(Ordering::Relaxed))
-            .told_to(move |progress| {
+            .reporting_to(move |progress| {
                 let mut running = running.lock().unwrap_or_else(PoisonError::into_inner);
                 show(progress, &mut running, bars, quiet);
             });
@@ -67,7 +68,7 @@ impl Context {
             page: Arc::default(),
             prints: false,
             ending: Arc::default(),
-            told: Arc::default(),
+            warnings: Arc::default(),
         }
     }
 
@@ -118,8 +119,7 @@ impl Context {
         ending.take()
     }
 
-    /// The command as it was typed, without folders from the root on and without what does not
-    /// change a result.
+    /// The command as it was typed, without folders from the root on and without what does not change a result.
     pub fn command(&self) -> &str {
         &self.command
     }
@@ -150,10 +150,6 @@ impl Context {
 
     /// Looks at the outputs of a command, the JSON document's file among them, before the long run.
     /// A file that is renewed in place is not given in `inputs`.
-    ///
-    /// # Errors
-    /// Usage, when two outputs are one file, or an output would overwrite one of `inputs`; output,
-    /// when a folder is missing or cannot be written.
     pub(crate) fn check_outputs(
         &self,
         inputs: &[&Path],
@@ -193,22 +189,21 @@ impl Context {
             return self.write_text(path, svg);
         }
         let picture =
-            figure::png(svg).map_err(|e| CliError::output(format!("{}: {e}", path.display())))?;
+            figure::png(svg).map_err(|e| CliError::output(e.explanation().of(path.display())))?;
         Ok(self.files.write(path, &picture)?)
     }
 
-    /// A warning about what was given, for the document and for standard error; once, however often it is
-    /// found.
+    /// A warning about what was given, for the document and for standard error; once, however often it is found.
     pub(crate) fn warn(&self, text: &str) {
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if !told.iter().any(|known| known == text) {
-            told.push(text.to_owned());
+        let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        if !warnings.iter().any(|known| known == text) {
+            warnings.push(text.to_owned());
         }
     }
 
     /// The warnings so far.
     pub(super) fn warnings(&self) -> Vec<String> {
-        self.told
+        self.warnings
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .clone()
@@ -231,7 +226,7 @@ static BARS: LazyLock<MultiProgress> =
 
 /// A line on standard error, above the bars.
 pub(super) fn above_bars(text: &str) {
-    BARS.suspend(|| tell(&mut std::io::stderr(), text));
+    BARS.suspend(|| to_stderr(&mut std::io::stderr(), text));
 }
 
 /// A line on standard error, unless that is to be quiet.

@@ -1,6 +1,7 @@
 //! What the file of a controller takes from a model and its robot file.
 
 use super::CliError;
+use cft_ident_core::explain::Explain;
 use cft_ident_core::robot::model::Model;
 use cft_ident_export::export::ros2_control::{ControlledJoint, parameters};
 use cft_ident_files::config::ModelFile;
@@ -49,5 +50,5 @@ pub(super) fn ros2_control(
             .to_owned(),
     );
     parameters(model, &joints, bandwidth_hz, &head)
-        .map_err(|error| CliError::input(format!("{name}: {error}")))
+        .map_err(|error| CliError::input(error.explanation().of(name)))
 }

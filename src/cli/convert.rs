@@ -244,9 +244,6 @@ fn of_robot(
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
     context.check_outputs(&inputs, &[args.output.as_path()])?;

@@ -67,17 +67,14 @@ pub struct Args {
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
     /// Draw the residual before and after; may be given more than once
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
     let inputs: Vec<&Path> = logs

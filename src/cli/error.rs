@@ -1,14 +1,13 @@
-//! What ends a command early, decorated for the terminal: the message of a room, the place in the
-//! file, and the way out.
+//! What ends a command early, decorated for the terminal: what is wrong, the place in the file, and the ways out.
 //!
-//! Rooms have an error enum each; here they become a [`CliError`] through `From`, which chooses the
-//! exit status and moves place and remedy to lines of their own.
+//! Errors of the crates become a [`CliError`] through `From`, which chooses the exit status.
 
 use std::error::Error;
 use std::fmt;
 use std::io::{IsTerminal, Write};
 
 use super::exit::Exit;
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::log::{LogError, is_hidden};
 use cft_ident_logs::mapping::MappingError;
@@ -22,41 +21,34 @@ use cft_ident_stages::identify::{ErrorKind, IdentifyError};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CliError {
     exit: Exit,
-    message: String,
-    places: Vec<String>,
-    hints: Vec<String>,
+    problem: ErrorText,
 }
 
 impl CliError {
-    /// Texts read `what is wrong; what to do; what else helps`: all but the first part become hints.
-    fn new(exit: Exit, text: impl fmt::Display) -> Self {
-        let mut parts = parts(&text.to_string()).into_iter();
-        CliError {
-            exit,
-            message: parts.next().unwrap_or_default(),
-            places: Vec::new(),
-            hints: parts.collect(),
-        }
+    /// Any error by its exit status.
+    pub(super) fn new(exit: Exit, problem: impl Into<ErrorText>) -> Self {
+        let problem = problem.into();
+        Self { exit, problem }
     }
 
     /// The arguments contradict each other in a way that the parser cannot see (exit 2).
-    pub fn usage(message: impl fmt::Display) -> Self {
-        Self::new(Exit::Usage, message)
+    pub fn usage(problem: impl Into<ErrorText>) -> Self {
+        Self::new(Exit::Usage, problem)
     }
 
     /// A file or value that was given cannot be used (exit 3).
-    pub fn input(message: impl fmt::Display) -> Self {
-        Self::new(Exit::BadInput, message)
+    pub fn input(problem: impl Into<ErrorText>) -> Self {
+        Self::new(Exit::BadInput, problem)
     }
 
     /// The data determine nothing that was asked (exit 4).
-    pub fn undetermined(message: impl fmt::Display) -> Self {
-        Self::new(Exit::Undetermined, message)
+    pub fn undetermined(problem: impl Into<ErrorText>) -> Self {
+        Self::new(Exit::Undetermined, problem)
     }
 
     /// A result cannot be written (exit 5).
-    pub fn output(message: impl fmt::Display) -> Self {
-        Self::new(Exit::OutputFailed, message)
+    pub fn output(problem: impl Into<ErrorText>) -> Self {
+        Self::new(Exit::OutputFailed, problem)
     }
 
     /// The run was asked to stop (exit 130).
@@ -64,26 +56,21 @@ impl CliError {
         Self::new(Exit::Interrupted, "interrupted: no half file is left")
     }
 
-    /// The error of a room, with those that it stems from.
-    pub(crate) fn from_room(exit: Exit, error: &(dyn Error + 'static)) -> Self {
-        Self::new(exit, with_sources(error))
-    }
-
     /// Adds a place: `file:line`, or the name of a setting.
     pub fn at(mut self, place: impl fmt::Display) -> Self {
-        self.places.push(place.to_string());
+        self.problem.places.push(place.to_string());
         self
     }
 
     /// Adds a way out.
     pub fn hint(mut self, hint: impl fmt::Display) -> Self {
-        self.hints.push(hint.to_string());
+        self.problem = self.problem.remedy(hint);
         self
     }
 
     /// What is wrong, without place and way out.
     pub fn message(&self) -> &str {
-        &self.message
+        &self.problem.what
     }
 
     /// The status that this error ends the process with.
@@ -94,11 +81,11 @@ impl CliError {
 
 impl fmt::Display for CliError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error: {}", indented(&self.message))?;
-        for place in &self.places {
+        write!(f, "error: {}", indented(&self.problem.what))?;
+        for place in &self.problem.places {
             write!(f, "\n  --> {}", indented(place))?;
         }
-        for hint in &self.hints {
+        for hint in &self.problem.remedies {
             write!(f, "\nhint: {}", indented(hint))?;
         }
         Ok(())
@@ -109,13 +96,13 @@ impl Error for CliError {}
 
 impl From<LogError> for CliError {
     fn from(error: LogError) -> Self {
-        Self::from_room(Exit::BadInput, &error)
+        Self::new(Exit::BadInput, error)
     }
 }
 
 impl From<ConfigError> for CliError {
     fn from(error: ConfigError) -> Self {
-        Self::from_room(Exit::BadInput, &error)
+        Self::new(Exit::BadInput, error)
     }
 }
 
@@ -123,7 +110,7 @@ impl From<MappingError> for CliError {
     fn from(error: MappingError) -> Self {
         match error {
             MappingError::Interrupted => Self::interrupted(),
-            error => Self::from_room(Exit::BadInput, &error),
+            error => Self::new(Exit::BadInput, error),
         }
     }
 }
@@ -142,17 +129,13 @@ impl From<&IdentifyError> for CliError {
             ErrorKind::Undetermined => Exit::Undetermined,
             ErrorKind::Interrupted => return Self::interrupted(),
         };
-        let told = Self::from_room(exit, error);
-        match error.remedy() {
-            Some(remedy) => told.hint(remedy),
-            None => told,
-        }
+        Self::new(exit, error.explanation())
     }
 }
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {
-        Self::from_room(Exit::OutputFailed, &error)
+        Self::new(Exit::OutputFailed, error)
     }
 }
 
@@ -169,63 +152,24 @@ impl From<SimulateError> for CliError {
             | SimulateError::EffectNumber { .. } => Exit::Usage,
             _ => Exit::BadInput,
         };
-        Self::from_room(exit, &error)
+        Self::new(exit, error)
     }
 }
 
 impl From<JsonError> for CliError {
     fn from(error: JsonError) -> Self {
-        Self::from_room(Exit::OutputFailed, &error)
+        Self::output(error.to_string())
     }
-}
-
-/// The message of an error with those of its sources, `outer: inner`, each once.
-pub fn with_sources(error: &(dyn Error + 'static)) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(inner) = source {
-        let message = inner.to_string();
-        if !text.contains(&message) {
-            text.push_str(": ");
-            text.push_str(&message);
-        }
-        source = inner.source();
-    }
-    text
 }
 
 /// Says something on standard error. A terminal gets lines that fit it; a file or a pipe gets one
 /// line for each message, as a script looks for it.
-pub(super) fn tell(stderr: &mut dyn Write, text: &str) {
+pub(super) fn to_stderr(stderr: &mut dyn Write, text: &str) {
     // A closed standard error is no reason to lose a result.
     let _ = match std::io::stderr().is_terminal() {
         true => write!(stderr, "{}", folded(text)),
         false => writeln!(stderr, "{text}"),
     };
-}
-
-/// The parts of a message between `; `, but for those inside of quotes: names and lines of files stand there.
-fn parts(text: &str) -> Vec<String> {
-    let mut parts = vec![String::new()];
-    let mut rest = text;
-    while let Some(c) = rest.chars().next() {
-        // a quote that nothing closes is a sign like others
-        let closed = matches!(c, '"' | '`').then(|| rest[1..].find(c)).flatten();
-        let length = match closed {
-            Some(at) => at + 2,
-            None if rest.starts_with("; ") => {
-                parts.push(String::new());
-                rest = &rest[2..];
-                continue;
-            }
-            None => c.len_utf8(),
-        };
-        if let Some(part) = parts.last_mut() {
-            part.push_str(&rest[..length]);
-        }
-        rest = &rest[length..];
-    }
-    parts
 }
 
 /// Later lines of a message are indented, and control characters that a file's text may carry into
@@ -249,10 +193,12 @@ mod tests {
 
     #[test]
     fn a_name_that_holds_a_semicolon_stays_whole() {
-        let error = CliError::input("\"my; log.csv\": cannot be read; check the path");
+        let error = CliError::from(LogError::Empty {
+            file: "my; log.csv".to_owned(),
+        });
         assert_eq!(
             error.to_string(),
-            "error: \"my; log.csv\": cannot be read\nhint: check the path"
+            "error: my; log.csv: is empty\nhint: record again, or check that the recorder closed the file"
         );
     }
 
@@ -291,14 +237,5 @@ mod tests {
             error.to_string(),
             "error: cft.toml:12: unknown key `setpu`\nhint: did you mean `setup`?"
         );
-    }
-
-    #[test]
-    fn sources_are_told_once() {
-        #[derive(Debug, thiserror::Error)]
-        #[error("cannot read a.csv")]
-        struct Outer(#[source] std::fmt::Error);
-        let text = with_sources(&Outer(std::fmt::Error));
-        assert_eq!(text, format!("cannot read a.csv: {}", std::fmt::Error));
     }
 }

@@ -193,9 +193,6 @@ struct Written {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// A folder that cannot be made or written to, or holds other files of these names.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let text;
     let mut written = None;

@@ -2,6 +2,7 @@
 
 mod words;
 
+use cft_ident_core::explain::Explain;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -56,7 +57,7 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
     /// URDF to write, with FILE.toml beside it (serial robots and single joints)
-    #[arg(long, value_name = "FILE.urdf", group = "into", value_parser = arguments::urdf_file)]
+    #[arg(long, value_name = "FILE.urdf", group = "into", value_parser = arguments::ends_in(["urdf"]))]
     pub urdf: Option<PathBuf>,
     /// URDF of the same robot whose meshes, names and frames the one of --urdf keeps: only inertials and
     /// friction are replaced
@@ -68,22 +69,22 @@ pub struct Args {
     )]
     pub urdf_source: Option<PathBuf>,
     /// MJCF file of MuJoCo to write
-    #[arg(long, value_name = "FILE.xml", group = "into", value_parser = arguments::mjcf_file)]
+    #[arg(long, value_name = "FILE.xml", group = "into", value_parser = arguments::ends_in(["xml"]))]
     pub mjcf: Option<PathBuf>,
     /// SDF file of Gazebo to write
-    #[arg(hide_short_help = true, long, value_name = "FILE.sdf", group = "into", value_parser = arguments::sdf_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.sdf", group = "into", value_parser = arguments::ends_in(["sdf"]))]
     pub sdf: Option<PathBuf>,
     /// USD file of Isaac Sim to write, as text
-    #[arg(hide_short_help = true, long, value_name = "FILE.usda", group = "into", value_parser = arguments::usd_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.usda", group = "into", value_parser = arguments::ends_in(["usda"]))]
     pub usd: Option<PathBuf>,
     /// C99 header to write
-    #[arg(long, value_name = "FILE.h", group = "into", value_parser = arguments::header_file)]
+    #[arg(long, value_name = "FILE.h", group = "into", value_parser = arguments::ends_in(["h"]))]
     pub c: Option<PathBuf>,
     /// Rust module to write
-    #[arg(long, value_name = "FILE.rs", group = "into", value_parser = arguments::rust_file)]
+    #[arg(long, value_name = "FILE.rs", group = "into", value_parser = arguments::ends_in(["rs"]))]
     pub rust: Option<PathBuf>,
     /// Parameter file of ros2_control's joint_trajectory_controller to write, for joints that take efforts
-    #[arg(hide_short_help = true, long, value_name = "FILE.yaml", group = "into", value_parser = arguments::yaml_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.yaml", group = "into", value_parser = arguments::ends_in(["yaml"]))]
     pub ros2_control: Option<PathBuf>,
     /// Bandwidth of its gains [Hz]
     #[arg(hide_short_help = true, long, value_name = "HZ", default_value_t = BANDWIDTH_HZ, requires = "ros2_control", value_parser = arguments::positive)]
@@ -247,9 +248,6 @@ fn without(file: &ModelFile, effects: bool) -> ModelFile {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; a file that cannot be made keeps none from being written that was.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let side = args.urdf.as_ref().map(|path| path.with_extension("toml"));
     let formats = formats(args);
@@ -285,7 +283,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         false => (identify::refined(&given.value, &given.name)?, Vec::new()),
     };
     let model = &refined.model;
-    let failed = |error: ExportError| CliError::input(format!("{}: {error}", given.name));
+    let failed = |error: ExportError| CliError::input(error.explanation().of(&given.name));
     let mut program = Program::with_effects(&refined).map_err(failed)?;
     program.rest_by(&given.value.robot);
     if let Some(rate_hz) = args.observer {

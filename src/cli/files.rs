@@ -72,6 +72,22 @@ pub(crate) fn model_of(
     Ok(model)
 }
 
+/// The model with the friction that a fit of the inertias takes as known; refused where the robot needs one.
+pub(super) fn friction(
+    command: &str,
+    path: Option<&Path>,
+    robot: &RobotFile,
+    context: &Context,
+) -> Result<Option<ReadFile<ModelFile>>, CliError> {
+    if path.is_none() && robot.needs_friction_first() {
+        let what = format!("{command} needs the friction of every joint");
+        return Err(CliError::usage(what)
+            .hint("identify it first with `cft-ident friction`, and give its model with -m")
+            .hint("or set `fitted_with_inertias = true` in [friction] of the robot file"));
+    }
+    path.map(|path| model_of(path, robot, context)).transpose()
+}
+
 /// A file of effects of the user's own.
 pub fn candidates(path: &Path) -> Result<ReadFile<Vec<CandidateSection>>, CliError> {
     read(path, Wanted::Own, candidates::parse)

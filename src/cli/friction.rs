@@ -39,10 +39,10 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
     /// Draw the friction curves; may be given more than once
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
     #[command(flatten)]
     pub setup: setup::SetupArgs,
@@ -52,9 +52,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     let mut outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());

@@ -93,9 +93,6 @@ struct Work {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then but the logs of the built-in campaign, which it reads.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let of_robot = !args.logs.is_empty();
     let folder = args.output.clone().unwrap_or_else(|| match &args.robot {

@@ -149,9 +149,6 @@ fn inspect(
 }
 
 /// What one log holds and what is wrong with it, by the robot file.
-///
-/// # Errors
-/// A log that cannot be read at all, and interruption.
 pub(super) fn findings(
     spec: &LogSpec,
     machine: &LoggedRobot,
@@ -258,9 +255,6 @@ fn topics_text(topics: &[TopicFacts]) -> String {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// A file that cannot be read at all.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
     context.check_outputs(&inputs, &[])?;

@@ -1,5 +1,6 @@
 //! `LOG:mass=KG[+-STD]`: a log in which the arm carries a payload of known mass.
 
+use cft_ident_core::explain::Explain;
 use std::str::FromStr;
 
 use cft_ident_logs::log::{LogSpec, escape};
@@ -16,15 +17,19 @@ pub struct KnownPayload {
 }
 
 /// Why a text is no such log.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum PayloadError {
-    #[error(
-        "`{0}` is not LOG:mass=KG or LOG:mass=KG+-STD, e.g. loaded.csv:mass=2.8+-0.05; logs without a payload stand before --fit-gains"
+    #[explain(
+        "`{_0}` is not LOG:mass=KG or LOG:mass=KG+-STD, e.g. loaded.csv:mass=2.8+-0.05",
+        "logs without a payload stand before --fit-gains"
     )]
     Form(String),
-    #[error("`{0}` is no mass; give kilograms above 0, and a standard deviation from 0 on")]
+    #[explain(
+        "`{_0}` is no mass",
+        "give kilograms above 0, and a standard deviation from 0 on"
+    )]
     Mass(String),
-    #[error("{0}")]
+    #[explain("{_0}")]
     Log(String),
 }
 

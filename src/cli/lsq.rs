@@ -59,16 +59,13 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
     #[command(flatten)]
     pub setup: setup::SetupArgs,
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     inputs.extend(
@@ -84,22 +81,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
     let mut given = vec![robot.provenance];
-    let friction = match &args.model {
-        None => None,
-        Some(path) => {
-            let model = files::model_of(path, &machine.file, context)?;
-            given.push(model.provenance);
-            Some((model.name, model.value))
-        }
-    };
-    if friction.is_none() && machine.file.needs_friction_first() {
-        return Err(CliError::usage("lsq needs the friction of every joint")
-            .hint("identify it first with `cft-ident friction`, and give its model with -m")
-            .hint("or set `fitted_with_inertias = true` in [friction] of the robot file"));
-    }
-    let known = friction
-        .as_ref()
-        .map(|(name, model)| (name.as_str(), model));
+    let friction = files::friction("lsq", args.model.as_deref(), &machine.file, context)?;
+    given.extend(friction.iter().map(|model| model.provenance.clone()));
+    let known = friction.as_ref();
+    let known = known.map(|model| (model.name.as_str(), &model.value));
     let logs = logs(&args.leave_out.of(&args.logs))?;
     let fitted = match &args.fit_gains {
         None => None,

@@ -60,7 +60,7 @@ use cft_ident_stages::identify::{Log, ReducedLogs, is_reduced};
 
 pub use arguments::Destination;
 pub use context::{Context, RunningBar};
-pub use error::{CliError, with_sources};
+pub use error::CliError;
 pub use exit::Exit;
 pub use outcome::Outcome;
 
@@ -233,7 +233,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
         Ok(cli) => cli,
         Err(answer) => {
             if let Some(error) = removed(&answer) {
-                error::tell(&mut std::io::stderr(), &error.to_string());
+                error::to_stderr(&mut std::io::stderr(), &error.to_string());
                 return error.exit();
             }
             // Help and version are answers on standard output, the rest are errors.
@@ -241,7 +241,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
             let long = |line: &str| line.chars().count() > WIDTH;
             match answer.use_stderr() && text.lines().any(long) {
                 // a long list of values, which the parser leaves in one line
-                true => error::tell(&mut std::io::stderr(), folded(&text).trim_end()),
+                true => error::to_stderr(&mut std::io::stderr(), folded(&text).trim_end()),
                 false => drop(answer.print()),
             }
             return match answer.use_stderr() {
@@ -253,7 +253,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
     match execute(&cli, &arguments, interrupted) {
         Ok(exit) => exit,
         Err(error) => {
-            error::tell(&mut std::io::stderr(), &error.to_string());
+            error::to_stderr(&mut std::io::stderr(), &error.to_string());
             error.exit()
         }
     }
@@ -278,9 +278,6 @@ fn removed(answer: &clap::Error) -> Option<CliError> {
 
 /// Runs one command line, the program's name first, and gives its result instead of showing it; the files that it
 /// writes get their names.
-///
-/// # Errors
-/// Every [`CliError`]; arguments that are not understood are one of usage.
 pub fn perform(arguments: &[OsString], interrupted: Arc<AtomicBool>) -> Result<Outcome, CliError> {
     let cli = Cli::try_parse_from(arguments)
         .map_err(|answer| CliError::usage(answer.render().to_string().trim_end()))?;
@@ -316,7 +313,7 @@ fn execute(
         _ => Detail::Usual,
     })
     .printing(matches!(json, Some(Destination::Stdout)));
-    // Told before the long run, also by a command that has no other output.
+    // Said before the long run, also by a command that has no other output.
     context.check_outputs(&[], &[])?;
     let mut outcome = cli.command.run(&context)?;
     outcome.document.warn_first(context.warnings());

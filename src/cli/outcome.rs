@@ -5,7 +5,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::error::{CliError, indented, tell};
+use super::error::{CliError, indented, to_stderr};
 use super::exit::Exit;
 use super::{Destination, colour};
 use cft_ident_logs::log::is_hidden;
@@ -57,11 +57,11 @@ pub(super) fn show(
     };
     let (shown, more) = grouped(&all, detail);
     for warning in shown.iter().take(most) {
-        tell(stderr, &format!("warning: {}", indented(warning)));
+        to_stderr(stderr, &format!("warning: {}", indented(warning)));
     }
     let more = more + shown.len().saturating_sub(most);
     if more > 0 {
-        tell(
+        to_stderr(
             stderr,
             &format!("warning: {more} more; --verbose shows them, --json holds them"),
         );
@@ -76,7 +76,7 @@ pub(super) fn show(
     }
     files.commit()?;
     for limit in &outcome.missed {
-        tell(stderr, &format!("limit missed: {}", indented(limit)));
+        to_stderr(stderr, &format!("limit missed: {}", indented(limit)));
     }
     Ok(if outcome.missed.is_empty() {
         Exit::Success

@@ -48,8 +48,7 @@ fn folder(path: &Path) -> &Path {
     }
 }
 
-/// The path with its folder resolved, so that `a.csv` and `./a.csv` are one; a link that is there
-/// is followed.
+/// The path with its folder resolved, so that `a.csv` and `./a.csv` are one; a link that is there is followed.
 fn resolved(path: &Path) -> PathBuf {
     if let Ok(full) = path.canonicalize() {
         return full;

@@ -37,9 +37,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = args.logs.iter().map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.model.as_path()]).collect();

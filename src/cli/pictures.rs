@@ -10,9 +10,6 @@ use cft_ident_stages::replay::{Replay, Replayed};
 
 /// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
 /// is no reason to lose the report.
-///
-/// # Errors
-/// Those of [`identify::read_whole`].
 pub(super) fn in_memory(
     machine: &LoggedRobot,
     logs: &[Log],
@@ -26,9 +23,6 @@ pub(super) fn in_memory(
 }
 
 /// These logs with the processing of their robot file.
-///
-/// # Errors
-/// Settings that the sampling rate does not carry.
 pub(super) fn replay<'a>(
     machine: &'a LoggedRobot,
     in_memory: Option<&'a InMemory>,
@@ -39,9 +33,6 @@ pub(super) fn replay<'a>(
 }
 
 /// A model and its file replayed along these logs, of which some were `used` for the model.
-///
-/// # Errors
-/// Settings that the sampling rate does not carry; logs that are too short for the filter.
 pub(super) fn replayed(
     machine: &LoggedRobot,
     in_memory: Option<&InMemory>,
@@ -55,9 +46,6 @@ pub(super) fn replayed(
 }
 
 /// What is wrong with logs, by the robot file.
-///
-/// # Errors
-/// Interruption.
 pub(super) fn inspected<'a>(
     logs: impl IntoIterator<Item = &'a LogSpec>,
     machine: &LoggedRobot,

@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(short, long, value_name = "FRICTION.toml")]
     pub model: Option<PathBuf>,
     /// File of reduced logs to write
-    #[arg(short, long, value_name = "PART.cfi", value_parser = arguments::reduced_file)]
+    #[arg(short, long, value_name = "PART.cfi", value_parser = arguments::ends_in(["cfi"]))]
     pub output: PathBuf,
     #[command(flatten)]
     pub setup: setup::SetupArgs,
@@ -75,9 +75,6 @@ struct LogInFile {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     let mut outputs = vec![args.output.as_path()];
@@ -85,21 +82,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
-    let friction = match &args.model {
-        None => None,
-        Some(path) => {
-            let model = files::model_of(path, &machine.file, context)?;
-            Some((model.name, model.value))
-        }
-    };
-    if friction.is_none() && machine.file.needs_friction_first() {
-        return Err(CliError::usage("reduce needs the friction of every joint")
-            .hint("identify it first with `cft-ident friction`, and give its model with -m")
-            .hint("or set `fitted_with_inertias = true` in [friction] of the robot file"));
-    }
-    let known = friction
-        .as_ref()
-        .map(|(name, model)| (name.as_str(), model));
+    let friction = files::friction("reduce", args.model.as_deref(), &machine.file, context)?;
+    let known = friction.as_ref();
+    let known = known.map(|model| (model.name.as_str(), &model.value));
     let logs = logs(&args.logs)?;
     let checked = setup::checked(
         machine,

@@ -43,9 +43,6 @@ impl Checked {
 
 /// Checks the set-up by these logs. `robot` is the path of the robot file, in which `before` is what the
 /// machine has that the file lacks.
-///
-/// # Errors
-/// A set-up that the torques plainly contradict, where the arguments do not say what to do with it.
 pub fn checked(
     machine: LoggedRobot,
     (robot, before): (&Path, &[Edit]),
@@ -117,9 +114,6 @@ fn check(machine: &LoggedRobot, logs: &[Log], context: &Context) -> Result<Check
 }
 
 /// What the check says of these logs, for a command that only reports it.
-///
-/// # Errors
-/// Interruption.
 pub fn report(
     machine: &LoggedRobot,
     logs: &[Log],

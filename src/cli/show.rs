@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(value_name = "MODEL.toml")]
     pub model: PathBuf,
     /// Write the same as a page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 
@@ -45,9 +45,6 @@ pub struct ShownModel {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs: Vec<&Path> = args.report.as_deref().into_iter().collect();
     context.check_outputs(&[&args.model], &outputs)?;

@@ -74,9 +74,6 @@ fn planned(
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: [&Path; 2] = [&args.log.path, &args.model];
     context.check_outputs(&inputs, &[args.output.as_path()])?;

@@ -45,10 +45,10 @@ pub struct Args {
     #[arg(short, long, value_name = "RESIDUAL.csv|.mcap", value_parser = arguments::log_file)]
     pub output: Option<PathBuf>,
     /// Draw measured and reconstructed torque; may be given more than once
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 
@@ -135,9 +135,6 @@ fn drifts(found: &OpenLoop) -> String {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args
         .logs

@@ -151,10 +151,6 @@ fn in_json(name: &str) -> String {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]. An input that ends within a line, or holds one that cannot be read, behind its first rows
-/// ends the command with status 3 after what was seen is written.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let of_stream = args.log.path == Path::new(STREAM);
     let mut inputs = vec![args.model.as_path()];

@@ -445,3 +445,35 @@ fn a_one_joint_log_that_the_friction_filter_cannot_hold_is_refused_with_a_span_t
     let words = ["long.csv: more than 2000000 rows", "FILE@0..600s"];
     bench.refuses("friction long.csv -r slide.toml -o f.toml", 3, &words);
 }
+
+#[test]
+fn names_with_a_semicolon_stand_whole_in_every_error() {
+    let bench = Bench::with_model();
+    bench.file("my; log.csv", "t,q_slide,tau_slide\n0,0,x\n1,2,3\n");
+    bench.file("my; robot.toml", "[robot]\nmodl = 1\n");
+    let lines: [&[&str]; 9] = [
+        &["inspect", "my; none.csv"],
+        &["inspect", "my; log.csv", "-r", "my; robot.toml"],
+        &["lsq", "my; log.csv", "-r", "slide.toml", "-o", "m.toml"],
+        &["lsq", "my; none.csv", "-r", "slide.toml", "-o", "m.toml"],
+        &["lsq", "good.csv", "-r", "my; robot.toml", "-o", "m.toml"],
+        &[
+            "lsq",
+            "good.csv",
+            "-r",
+            "slide.toml",
+            "-o",
+            "my; folder/m.toml",
+        ],
+        &["validate", "my; log.csv", "-m", "model.toml"],
+        &["show", "my; none.toml"],
+        &["compare", "my; none.json", "my; none.json"],
+    ];
+    for line in lines {
+        let output = bench.tool("").args(line).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let first = said.lines().find(|l| l.starts_with("error: "));
+        let whole = first.is_some_and(|l| l.contains("my; ") && l.contains('.'));
+        assert!(whole && !output.status.success(), "{line:?}: {said}");
+    }
+}

@@ -141,7 +141,7 @@ fn a_callback_stops_a_stage_and_hears_of_its_progress() {
     let log = [Log::of_rows("screw", &t, &q, &tau).unwrap()];
     let said = Arc::new(Mutex::new(Vec::new()));
     let heard = Arc::clone(&said);
-    let control = Control::default().told_to(move |progress| {
+    let control = Control::default().reporting_to(move |progress| {
         if let Progress::Begin(work, _) = progress {
             heard.lock().unwrap().push(work.to_owned());
         }

@@ -1,5 +1,7 @@
 //! Faults of a set-up are named, mended and, where the user says so, kept; a right one says nothing.
 
+mod motors;
+
 use crate::measured_support;
 
 use std::path::{Path, PathBuf};
@@ -88,16 +90,16 @@ impl Altered {
     }
 
     /// The entries of the key `setup`, by none of which the error of a joint rises.
-    fn told(&self) -> Vec<Value> {
+    fn findings(&self) -> Vec<Value> {
         let found = run(self.folder.path(), &self.words("inspect", &[]));
-        let told = found["setup"].as_array().unwrap().clone();
-        for entry in &told {
+        let findings = found["setup"].as_array().unwrap().clone();
+        for entry in &findings {
             for joint in entry["joints"].as_array().unwrap() {
                 let [before, after] = ["before", "after"].map(|key| joint[key].as_f64());
                 assert!(before.is_none() || after <= before, "{entry}");
             }
         }
-        told
+        findings
     }
 
     /// Standard error of a fit that is refused, which writes nothing.
@@ -170,12 +172,15 @@ fn right_set_ups_of_measured_machines_say_nothing() {
             folder.path(),
             &["inspect", log.to_str().unwrap(), "-r", robot],
         );
-        let told = found["setup"].as_array().unwrap();
+        let findings = found["setup"].as_array().unwrap();
         // the wrist of the TX40 is coupled, which is no mistake of the list: these data cannot tell, and say so
         let open = |t: &Value| t["kind"] == "undecided" && t["severity"] == "hint";
         let coupled = robot.contains("tx40");
-        assert!(told.iter().all(|t| coupled && open(t)), "{log:?} {told:?}");
-        assert!(!coupled || !told.is_empty(), "{log:?}");
+        assert!(
+            findings.iter().all(|t| coupled && open(t)),
+            "{log:?} {findings:?}"
+        );
+        assert!(!coupled || !findings.is_empty(), "{log:?}");
     }
 }
 
@@ -227,12 +232,12 @@ fn one_axis_with_a_turned_torque_is_told_by_physics_with_both_readings() {
     let turned = Altered::new(&log, "configs/emps.toml", |log| {
         log.map("tau1", |x| -x);
     });
-    let told = turned.told();
-    assert_eq!(short(&told[0]), ("sign", "torque", "q1", true));
-    assert_eq!(told[0]["tied_with"][0]["channel"], "position");
+    let findings = turned.findings();
+    assert_eq!(short(&findings[0]), ("sign", "torque", "q1", true));
+    assert_eq!(findings[0]["tied_with"][0]["channel"], "position");
     assert_eq!(
-        told[0]["error_before"].as_f64(),
-        told[0]["error_after"].as_f64()
+        findings[0]["error_before"].as_f64(),
+        findings[0]["error_after"].as_f64()
     );
     let mended = turned.mended();
     assert!(mended["parameters"][0]["value"].as_f64().unwrap() > 90.0);
@@ -248,10 +253,11 @@ fn all_torques_turned_leave_the_same_residual_and_are_told_by_physics() {
             log.map(&format!("tau{j}"), |x| -x);
         }
     });
-    let told = turned.told();
-    assert_eq!(told.len(), 6, "{told:?}");
+    let findings = turned.findings();
+    assert_eq!(findings.len(), 6, "{findings:?}");
     assert!(
-        told.iter()
+        findings
+            .iter()
             .all(|t| (short(t).0, short(t).1) == ("sign", "torque"))
     );
 }
@@ -261,13 +267,14 @@ fn exchanged_channels_and_wrong_units_are_named_with_their_joint() {
     let Some(log) = shared("ur10/ur10_exciting.csv") else {
         return;
     };
-    let told = |alter: &dyn Fn(&mut Log)| Altered::new(&log, "configs/ur10.toml", alter).told();
-    let exchanged = told(&|log| {
+    let findings =
+        |alter: &dyn Fn(&mut Log)| Altered::new(&log, "configs/ur10.toml", alter).findings();
+    let exchanged = findings(&|log| {
         log.swap("tau1", "tau2");
     });
     assert_eq!(short(&exchanged[0]), ("order", "torque", "q1", true));
     assert_eq!(exchanged[0]["with"], "q2");
-    let degrees = told(&|log| {
+    let degrees = findings(&|log| {
         log.map("q2", f64::to_degrees);
     });
     assert_eq!(short(&degrees[0]), ("scale", "position", "q2", true));
@@ -292,9 +299,9 @@ fn an_arm_whose_gravity_is_declared_along_the_wrong_axis_is_told_the_right_one()
     );
     std::fs::write(folder.path().join("wall.toml"), wrong).unwrap();
     let words = ["inspect", log.to_str().unwrap(), "-r", "wall.toml"];
-    let told = run(folder.path(), &words)["setup"][0].clone();
-    assert_eq!(short(&told), ("gravity", "", "", true));
-    let found: Vec<f64> = told["found"]
+    let findings = run(folder.path(), &words)["setup"][0].clone();
+    assert_eq!(short(&findings), ("gravity", "", "", true));
+    let found: Vec<f64> = findings["found"]
         .as_array()
         .unwrap()
         .iter()
@@ -358,11 +365,14 @@ fn what_leaves_more_than_sound_machines_do_is_a_warning_with_both_readings_and_t
     });
     // status 0, and no robot file that is right by the torques
     let fit = turned.mended();
-    let told = &fit["setup"];
-    assert_eq!(told.as_array().map(Vec::len), Some(1), "{told}");
-    assert_eq!(short(&told[0]), ("sign", "torque", "q2", false));
-    assert_eq!(told[0]["severity"], "warning");
-    assert!(told[0]["error_after"].as_f64() > Some(0.33), "{told}");
+    let findings = &fit["setup"];
+    assert_eq!(findings.as_array().map(Vec::len), Some(1), "{findings}");
+    assert_eq!(short(&findings[0]), ("sign", "torque", "q2", false));
+    assert_eq!(findings[0]["severity"], "warning");
+    assert!(
+        findings[0]["error_after"].as_f64() > Some(0.33),
+        "{findings}"
+    );
     assert!(!turned.folder.path().join("new.toml").exists());
     let warnings = fit["warnings"].to_string();
     for reading in [
@@ -386,7 +396,7 @@ fn a_zero_that_no_torque_shows_is_named_by_the_limits_of_the_file() {
     // links of a last joint that turn with its zero fit as well
     let quarter = std::f64::consts::FRAC_PI_2;
     let mut log = turned(-quarter);
-    assert!(log.told().is_empty());
+    assert!(log.findings().is_empty());
     let limits = "\n[limits.q7]\nposition = [-2.8973, 2.8973]\n";
     let with_limits = |log: &mut Altered| {
         let robot = log.folder.path().join("robot.toml");
@@ -395,13 +405,13 @@ fn a_zero_that_no_torque_shows_is_named_by_the_limits_of_the_file() {
         log.robot = robot;
     };
     with_limits(&mut log);
-    let told = &log.told()[0];
-    assert_eq!(short(told), ("zero", "position", "q7", false));
-    let readings = told["tied_with"].to_string() + &told["remedy"].to_string();
-    assert!(readings.contains("position_offset = 1.57079"), "{told}");
+    let findings = &log.findings()[0];
+    assert_eq!(short(findings), ("zero", "position", "q7", false));
+    let readings = findings["tied_with"].to_string() + &findings["remedy"].to_string();
+    assert!(readings.contains("position_offset = 1.57079"), "{findings}");
     let mut right = turned(0.0);
     with_limits(&mut right);
-    assert!(right.told().is_empty());
+    assert!(right.findings().is_empty());
 }
 
 #[test]
@@ -409,13 +419,13 @@ fn a_factor_that_is_no_ratio_is_an_estimate_and_a_ratio_is_written() {
     let Some(log) = shared("ur10/ur10_exciting.csv") else {
         return;
     };
-    let told = |factor: f64| {
+    let findings = |factor: f64| {
         Altered::new(&log, "configs/ur10.toml", |log| {
             log.map("tau2", |x| x / factor);
         })
-        .told()
+        .findings()
     };
-    let estimate = &told(7.23)[0];
+    let estimate = &findings(7.23)[0];
     assert_eq!(short(estimate), ("scale", "torque", "q2", false));
     assert_eq!(
         (&estimate["severity"], &estimate["remedy"]),
@@ -426,7 +436,7 @@ fn a_factor_that_is_no_ratio_is_an_estimate_and_a_ratio_is_written() {
         (found - 7.23).abs() < 3.0 * std.max(0.02 * found),
         "{estimate}"
     );
-    let thousand = &told(1e3)[0];
+    let thousand = &findings(1e3)[0];
     assert_eq!(short(thousand), ("scale", "torque", "q2", true));
     assert!(
         thousand["remedy"]
@@ -445,70 +455,9 @@ fn a_ratio_among_several_that_fit_alike_is_a_warning_with_all_of_them() {
     let geared = Altered::new(&log, "configs/ur10.toml", |log| {
         log.map("q3", |x| x * 50.0);
     });
-    let told = &geared.told()[0];
-    assert_eq!(short(told), ("scale", "position", "q3", false));
+    let findings = &geared.findings()[0];
+    assert_eq!(short(findings), ("scale", "position", "q3", false));
     // the motion tells the ratio to two percent: 49.5 and 50 are both in it
-    let readings = told["tied_with"].to_string() + &told["remedy"].to_string();
+    let readings = findings["tied_with"].to_string() + &findings["remedy"].to_string();
     assert!(readings.contains("position_scale = 0.02`"), "{readings}");
-}
-
-const MOTORS: [(&str, f64, [&str; 4]); 2] = [
-    (
-        "x_c2",
-        -1.0,
-        ["sign", "position", "x_c2", "position_sign = -1"],
-    ),
-    (
-        "x_c1",
-        1000.0,
-        ["scale", "position", "x_c1", "position_unit = \"mm\""],
-    ),
-];
-
-#[test]
-fn motors_whose_positions_are_no_poses_or_in_other_units_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let words = "simulate -r configs/cft.toml --seconds 20 --seed 5 -o made.csv";
-    run(folder.path(), &words.split(' ').collect::<Vec<_>>());
-    let made = folder.path().join("made.csv");
-    let motors = |log: &mut Log| {
-        let of_motor =
-            |name: &String| name == "t" || name.starts_with("x_c") || name.starts_with("u_");
-        let kept: Vec<usize> = (0..log.names.len())
-            .filter(|i| of_motor(&log.names[*i]))
-            .collect();
-        log.names = kept.iter().map(|i| log.names[*i].clone()).collect();
-        for row in &mut log.rows {
-            *row = kept.iter().map(|i| row[*i]).collect();
-        }
-    };
-    assert!(
-        Altered::new(&made, "configs/cft.toml", motors)
-            .told()
-            .is_empty()
-    );
-    for (column, factor, [kind, channel, joint, remedy]) in MOTORS {
-        let altered = Altered::new(&made, "configs/cft.toml", |log| {
-            motors(log);
-            log.map(column, |x| x * factor);
-        });
-        let told = altered.told();
-        let entry = told.first().expect("something is said");
-        let of = ["kind", "channel", "joint"].map(|key| entry[key].as_str());
-        assert_eq!(of, [kind, channel, joint].map(Some), "{entry}");
-        assert!(
-            entry["remedy"].as_str().unwrap().contains(remedy),
-            "{entry}"
-        );
-    }
-    // whose factor these data do not tell: three times as much fits as well
-    let altered = Altered::new(&made, "configs/cft.toml", |log| {
-        motors(log);
-        log.map("x_c4", |x| x * 1000.0);
-    });
-    let told = altered.told();
-    assert!(
-        told.iter().all(|entry| entry["joint"] == "x_c4"),
-        "{told:?}"
-    );
 }

@@ -1,6 +1,8 @@
 //! Temperatures of drives, from the column that the robot file names to the effect that they make: what is left of a
 //! residual, formulas, models, exports; and what is told where a temperature is missing or is no number.
 
+mod missing;
+
 use crate::serial_arm;
 
 use std::fs;
@@ -103,7 +105,7 @@ fn number(value: &Value) -> f64 {
 }
 
 /// Value and deviation of a number of a step.
-fn told(step: &Value, key: &str) -> [f64; 2] {
+fn value_and_std(step: &Value, key: &str) -> [f64; 2] {
     let of = &step["parameters"][key];
     [number(&of["value"]), number(&of["std"])]
 }
@@ -177,7 +179,7 @@ fn grease_that_thins_is_seen_in_what_is_left_and_found_by_its_formula() {
     assert!(header.starts_with("t,q_x,tau_x,motor_temperature\n"));
     let found = found_by_its_formula(at, ("x", 0), "temperature", "grease");
     for (key, truth) in [("c", SIZE), ("k", FALL)] {
-        let [value, std] = told(&found["steps"][0], key);
+        let [value, std] = value_and_std(&found["steps"][0], key);
         assert!((value - truth).abs() < 3.0 * std, "{key}: {value} +- {std}");
         assert!(std < 0.2 * truth, "{key}: {value} +- {std}");
     }
@@ -221,105 +223,8 @@ fn a_joint_of_an_arm_hangs_on_the_temperature_of_another() {
     let more = ["--seconds", "20", "--seed", "5"];
     simulate(at, "unseen.csv", &[&more[..], &effect].concat());
     let found = found_by_its_formula(at, ("shoulder", 0), "temperature of elbow", "sump");
-    let [value, std] = told(&found["steps"][0], "c");
+    let [value, std] = value_and_std(&found["steps"][0], "c");
     assert!((value + 0.06).abs() < 3.0 * std, "{value} +- {std}");
-}
-
-#[test]
-fn a_temperature_that_is_missing_or_is_no_number_is_told_with_log_and_column() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    axis(at);
-    with_grease(at, "id.csv", &["--seconds", "20"]);
-    let text = fs::read_to_string(at.join("id.csv")).unwrap();
-    let renamed = text.replacen("motor_temperature", "motor_temp", 1);
-    fs::write(at.join("renamed.csv"), renamed).unwrap();
-    let rows: Vec<&str> = text.lines().collect();
-    let row = |(k, row): (usize, &&str)| match k {
-        700 => format!("{},NaN", row.rsplit_once(',').unwrap().0),
-        _ => (*row).to_owned(),
-    };
-    let broken: Vec<String> = rows.iter().enumerate().map(row).collect();
-    fs::write(at.join("broken.csv"), broken.join("\n") + "\n").unwrap();
-    let model = fs::read_to_string(at.join("truth.toml")).unwrap();
-    let unnamed = model.replace("[log.joint.x]\ntemperature = \"motor_temperature\"\n", "");
-    assert!(unnamed.len() < model.len());
-    fs::write(at.join("unnamed.toml"), &unnamed).unwrap();
-    let with = |model: &str| {
-        format!(
-            "{model}{GREASE}\n[[effect]]\nname = \"grease\"\njoint = \"x\"\n[effect.parameters]\n\
-             c = {{ value = {SIZE:?}, unit = \"1\" }}\nk = {{ value = {FALL:?}, unit = \"1\" }}\n"
-        )
-    };
-    fs::write(at.join("with.toml"), with(&model)).unwrap();
-    fs::write(at.join("with_unnamed.toml"), with(&unnamed)).unwrap();
-    let told = |words: &str, says: &[&str]| {
-        let words: Vec<&str> = words.split(' ').collect();
-        let (status, message, _) = run(at, &words);
-        assert_eq!(status, 3, "{words:?}: {message}");
-        for says in says {
-            assert!(message.contains(says), "{words:?}: {says}: {message}");
-        }
-    };
-    let missing = [
-        "renamed.csv: `grease",
-        "takes the temperature of x",
-        "column `motor_temperature`",
-        "`motor_temp`",
-        "[log.joint.x] temperature",
-    ];
-    let unnamed = [
-        "id.csv: `grease",
-        "takes the temperature of x",
-        "[log.joint.x] temperature = \"COLUMN\"",
-    ];
-    let broken = ["broken.csv:701", "column `motor_temperature`", "NaN"];
-    for (log, model, says) in [
-        ("renamed.csv", "truth.toml", &missing[..]),
-        ("id.csv", "unnamed.toml", &unnamed),
-        ("broken.csv", "truth.toml", &broken),
-    ] {
-        told(
-            &format!("diagnose {log} -m {model} --candidates own.toml -o new.toml"),
-            says,
-        );
-    }
-    for (log, model, says) in [
-        ("renamed.csv", "with.toml", &missing[..]),
-        ("id.csv", "with_unnamed.toml", &unnamed),
-        ("broken.csv", "with.toml", &broken),
-    ] {
-        for line in [
-            format!("validate {log} -m {model}"),
-            format!("validate --open-loop {log} -m {model}"),
-            format!("torque {log} -m {model} -o new.csv"),
-            format!("compare {model} {model} {log}"),
-            format!("export {log} -m {model} --mjcf new.xml"),
-        ] {
-            told(&line, says);
-        }
-    }
-    for output in ["new.toml", "new.csv", "new.xml"] {
-        assert!(!at.join(output).exists());
-    }
-    // what takes no temperature goes on without it, and says so
-    let (status, message, _) = run(at, &["diagnose", "renamed.csv", "-m", "truth.toml"]);
-    assert!(
-        status == 0 && message.contains("no temperature of this log is used"),
-        "{message}"
-    );
-    // the plant has no course of it
-    let plant = unnamed_plant(at);
-    assert!(
-        plant.contains("takes the temperature of x") && plant.contains("[sensors.temperature.x]"),
-        "{plant}"
-    );
-    let own = GREASE.replace("temperature", "temperature_y");
-    fs::write(at.join("own.toml"), own).unwrap();
-    told(
-        "diagnose id.csv -m truth.toml --candidates own.toml",
-        &["`temperature_y` is not known"],
-    );
 }
 
 /// What the simulator says of the formula where the robot file declares no temperature.
@@ -397,17 +302,18 @@ fn a_recording_and_arrays_hold_temperatures_as_a_text_log_does() {
     assert_eq!(of(&log), Vec::<Vec<f64>>::new());
     let mut broken = column(3);
     broken[7] = f64::NAN;
-    let told = log.clone().with_temperature(0, &broken).unwrap_err();
+    let error = log.clone().with_temperature(0, &broken).unwrap_err();
     assert!(
-        told.to_string()
+        error
+            .to_string()
             .starts_with("arrays, row 8: column `the temperature` holds NaN"),
-        "{told}"
+        "{error}"
     );
-    let told = log
+    let error = log
         .with_temperature(0, &broken[1..])
         .unwrap_err()
         .to_string();
-    assert!(told.contains("give one temperature per row"), "{told}");
+    assert!(error.contains("give one temperature per row"), "{error}");
 }
 
 #[test]
@@ -449,14 +355,14 @@ fn inspect_says_what_is_wrong_with_a_temperature_and_new_proposes_its_column() {
             let channel = f["channel"].as_str().unwrap_or("motor_temperature");
             channel == "motor_temperature" && f["severity"] != "info"
         });
-        let told = of.map(|f| {
+        let words = of.map(|f| {
             format!(
                 "{}: {}",
                 f["kind"].as_str().unwrap(),
                 f["effect"].as_str().unwrap()
             )
         });
-        told.collect()
+        words.collect()
     };
     assert_eq!(faults("id.csv"), Vec::<String>::new());
     for (log, kind, says) in [

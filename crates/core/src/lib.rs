@@ -33,7 +33,11 @@
 
 #![forbid(unsafe_code)]
 
+// `cft-ident-derive` names this crate
+extern crate self as cft_ident_core;
+
 pub mod block;
+pub mod explain;
 pub mod math;
 pub mod number;
 pub mod robot;

@@ -144,7 +144,7 @@ impl<'a> Taken<'a> {
         if begins {
             (self.stretch, self.count, self.began) = (Some(stretch), 0, t);
         } else if self.count == 1 {
-            // rows come at full rate: two of them tell the step
+            // rows come at full rate: two of them give the step
             self.every = self.settings.decimation_at(t - self.began);
         }
         let keeps = self.count.is_multiple_of(self.every) || begins;
@@ -219,9 +219,6 @@ impl<'a> Reconstruction<'a> {
 
     /// Runs one log through with the processing that the model declares. `row` gets every raw
     /// sample.
-    ///
-    /// # Errors
-    /// Those of the source and of [`motion::run`].
     pub fn add<E>(
         &mut self,
         settings: &FilterSettings,

@@ -35,7 +35,7 @@ fn map() -> MapFigure {
     };
     MapFigure {
         title: "what is left of q2".into(),
-        told: "made-up numbers".into(),
+        description: "made-up numbers".into(),
         over: [
             ("position".into(), "rad".into()),
             ("speed of q3".into(), "rad/s".into()),

@@ -216,7 +216,11 @@ fn groups() -> Vec<Range<usize>> {
 }
 
 /// The last change that is told in a group once the first `logs` logs are there, as the relative size of the largest.
-fn told(estimates: &[Vec<LogEstimate>], group: &Range<usize>, logs: usize) -> Option<f64> {
+fn expected_change(
+    estimates: &[Vec<LogEstimate>],
+    group: &Range<usize>,
+    logs: usize,
+) -> Option<f64> {
     let level = ALARMS / groups().len() as f64;
     let own = estimates[group.clone()].iter();
     let own: Vec<&[LogEstimate]> = own.map(|all| &all[..logs]).collect();
@@ -235,7 +239,11 @@ fn robot(seed: u64) -> Value {
     if seed % 10 != 9 {
         let estimates = simulated(seed, (0, false), &|_| 0.0);
         let groups = groups();
-        let any = |logs: &usize| groups.iter().any(|g| told(&estimates, g, *logs).is_some());
+        let any = |logs: &usize| {
+            groups
+                .iter()
+                .any(|g| expected_change(&estimates, g, *logs).is_some())
+        };
         let alarms = (FIRST..=LOGS).find(any);
         return json!({ "seed": seed, "alarms": u64::from(alarms.is_some()), "off": off });
     }
@@ -256,7 +264,7 @@ fn robot(seed: u64) -> Value {
             let estimates = simulated(seed, (joint, *both), &change);
             let mut row = json!({ "kind": kind, "what": what, "size": size });
             for logs in from + 1..=LOGS {
-                if let Some(relative) = told(&estimates, &friction_of(joint), logs) {
+                if let Some(relative) = expected_change(&estimates, &friction_of(joint), logs) {
                     row["delay"] = json!(logs - from);
                     row["found"] = json!(relative);
                     break;

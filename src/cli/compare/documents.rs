@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::cli::{CliError, Context, Exit, Outcome};
+use crate::cli::{CliError, Context, Outcome};
 use cft_ident_files::config;
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_report::report::json::Document;
@@ -12,14 +12,10 @@ use cft_ident_report::report::stages;
 use cft_ident_stages::compare::runs;
 
 /// Lists what differs between two documents.
-///
-/// # Errors
-/// A file that is no such document; documents of two commands.
 pub(super) fn run([a, b]: [&Path; 2], context: &Context) -> Result<Outcome, CliError> {
     let (a, b) = (read(a)?, read(b)?);
     let names = [&a, &b].map(|(name, ..)| name.clone());
-    let found = runs((&names[0], &a.1), (&names[1], &b.1))
-        .map_err(|error| CliError::from_room(Exit::BadInput, &error))?;
+    let found = runs((&names[0], &a.1), (&names[1], &b.1)).map_err(CliError::input)?;
     let report = stages::diff::diff(&found, &names);
     Ok(Outcome {
         text: report.text_for(context.detail()),

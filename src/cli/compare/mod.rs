@@ -37,17 +37,14 @@ pub struct Args {
     #[arg(value_name = "LOG")]
     pub logs: Vec<LogSpec>,
     /// Draw the friction curves over each other; may be given more than once
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = args.logs.iter().map(|l| l.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.a.as_path(), args.b.as_path()]).collect();

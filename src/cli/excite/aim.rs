@@ -12,7 +12,7 @@ use cft_ident_plant::excite::{Criterion, ExciteError, InformationBefore, usual_m
 use cft_ident_stages::identify::LoggedRobot;
 
 /// Samples of a period of the motion that stands for a usual one.
-const SAMPLES: usize = 100;
+const SAMPLES_PER_PERIOD: usize = 100;
 
 /// What the next motion is for.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,7 +112,8 @@ pub(super) fn weak(
     }
     let fundamental = std::f64::consts::TAU * bench.frequency_hz;
     let series = usual_motion(machine, fundamental, usize::from(args.harmonics));
-    let usual = Information::of_period(machine, &series, SAMPLES).map_err(ExciteError::Robot)?;
+    let usual =
+        Information::of_period(machine, &series, SAMPLES_PER_PERIOD).map_err(ExciteError::Robot)?;
     let rows = bench.rate_hz * series.period() * f64::from(args.periods);
     let factors = known.factors(machine, (&usual, rows))?;
     Ok((known, Criterion::AOptimal(factors)))

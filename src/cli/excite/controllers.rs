@@ -48,7 +48,10 @@ pub(super) fn write<'a>(
         let turns = (0..robot.joints()).all(|j| robot.joint_kind(j) == JointKind::Revolute);
         if robot.joints() != OF_UR || !turns {
             return Err(CliError::usage(format!(
-                "--urscript is for arms of {OF_UR} joints that turn; this robot has the joints {}",
+                "--urscript is for arms of {OF_UR} joints that turn"
+            ))
+            .hint(format!(
+                "this robot has the joints {}",
                 escape(&robot.joint_names().join(", "))
             ))
             .hint("--samples and --trajectory-message write the motion of any robot"));

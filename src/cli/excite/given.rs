@@ -1,5 +1,6 @@
 //! Noise levels, and what is used together with a design: logs and other trajectories.
 
+use cft_ident_core::explain::Explain;
 use std::path::Path;
 
 use super::Bench;
@@ -7,7 +8,7 @@ use crate::cli::error::CliError;
 use crate::cli::files;
 use cft_ident_core::inertia::accumulate;
 use cft_ident_files::config::RobotFile;
-use cft_ident_logs::log::LogSpec;
+use cft_ident_logs::log::{LogError, LogSpec};
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::{GivenInformation, Motion, foresee};
 use cft_ident_stages::identify::{IdentifyError, Log, LoggedRobot};
@@ -15,8 +16,7 @@ use cft_ident_stages::identify::{IdentifyError, Log, LoggedRobot};
 /// Share of a joint's usual torque that its noise is taken for, where the robot file does not say.
 const NOISE_SHARE: f64 = 0.01;
 
-/// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque, or 1 where no torque is
-/// foreseen.
+/// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque, or 1 where no torque is foreseen.
 pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut ForeseenRobot) {
     let known = machine.source.known();
     let names = machine.model.robot.joint_names();
@@ -51,9 +51,9 @@ pub(super) fn add(
         given.add_motion(&information, rows);
         return Ok(());
     }
-    let spec: LogSpec = name
-        .parse()
-        .map_err(|error| CliError::usage(format!("--with {name}: {error}")))?;
+    let spec: LogSpec = name.parse().map_err(|error: LogError| {
+        CliError::usage(error.explanation().of(format!("--with {name}")))
+    })?;
     let logs = LoggedRobot::new(name, bench.file.clone());
     let mut log = logs.open_positions(&Log::from(&spec), bench.context.control())?;
     let (sums, summary) = accumulate(

@@ -125,10 +125,10 @@ pub struct Args {
     #[arg(hide_short_help = true, long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
     pub samples: Option<PathBuf>,
     /// Write the motion for ROS 2, as trajectory_msgs/msg/JointTrajectory
-    #[arg(hide_short_help = true, long, value_name = "FILE.yaml|.mcap", value_parser = arguments::message_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.yaml|.mcap", value_parser = arguments::ends_in(["yaml", "mcap"]))]
     pub trajectory_message: Option<PathBuf>,
     /// Write the motion as a program for a controller of Universal Robots
-    #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::script_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::ends_in(["script"]))]
     pub urscript: Option<PathBuf>,
     /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
     /// [control], else 1000]
@@ -138,10 +138,10 @@ pub struct Args {
     #[arg(hide_short_help = true, long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Option<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
 }
 
@@ -189,19 +189,12 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A search that the user ended.
-#[derive(Debug, thiserror::Error)]
-#[error("interrupted; the best motion so far is written to {file}")]
-struct Stopped {
-    file: String,
-}
-
 impl From<ExciteError> for CliError {
     fn from(error: ExciteError) -> Self {
         match error {
             ExciteError::Config(error) => error.into(),
             ExciteError::Reference(error) => error.into(),
-            error => Self::from_room(Exit::BadInput, &error),
+            error => Self::input(error),
         }
     }
 }
@@ -222,9 +215,6 @@ struct Bench<'a> {
 }
 
 /// Designs or checks.
-///
-/// # Errors
-/// Every [`CliError`]; a search that is stopped writes the best motion that it has first.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all = Names::of(args);
     let mut read: Vec<&Path> = args.robot.iter().map(PathBuf::as_path).collect();
@@ -395,9 +385,9 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         warnings.extend(judged.warnings.iter().cloned());
         all.push(judged);
         if found.stopped {
-            let stopped = Stopped { file: shown };
             context.files().commit()?;
-            return Err(CliError::from_room(Exit::Interrupted, &stopped));
+            return Err(CliError::new(Exit::Interrupted, "interrupted")
+                .hint(format!("the best motion so far is written to {shown}")));
         }
         let (information, rows) =
             foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;

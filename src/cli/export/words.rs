@@ -47,9 +47,9 @@ pub(super) fn about_effects(program: &Program, left_out: &[String]) -> Vec<Strin
     }
     let mut lines = vec!["Nothing of the model is left out.".to_owned()];
     let effects = &program.effects;
-    if !effects.told.is_empty() {
-        let told: Vec<String> = effects.told.iter().map(|name| escape(name)).collect();
-        lines.push(format!("Effects: {}.", told.join(", ")));
+    if !effects.titles.is_empty() {
+        let titles: Vec<String> = effects.titles.iter().map(|name| escape(name)).collect();
+        lines.push(format!("Effects: {}.", titles.join(", ")));
     }
     if effects.remember_anything() {
         lines.push("Some remember the motion: init, then step once a sample.".to_owned());
@@ -71,7 +71,7 @@ pub(super) fn about_effects(program: &Program, left_out: &[String]) -> Vec<Strin
 pub(super) fn never_driving(program: &Program) -> Vec<String> {
     let each = program.joints.iter().zip(&program.kinds);
     let each = each.zip(&program.drives_at);
-    let told = each.filter_map(|((joint, kind), speeds)| {
+    let words = each.filter_map(|((joint, kind), speeds)| {
         let [low, high] = (*speeds)?.map(|v| number::significant(v, 2));
         Some(format!(
             "the friction of {} drives it between {low} and {high} {}/s in the model: there it is 0 in the code",
@@ -79,7 +79,7 @@ pub(super) fn never_driving(program: &Program) -> Vec<String> {
             kind.position_unit()
         ))
     });
-    told.collect()
+    words.collect()
 }
 
 /// What a URDF says of effects.

@@ -16,9 +16,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// None but those of the output.
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "cft-ident", &mut script);

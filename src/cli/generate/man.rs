@@ -18,9 +18,6 @@ pub struct Args {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// A folder that is not there, or cannot be written.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if !args.folder.is_dir() {
         return Err(

@@ -30,9 +30,6 @@ pub enum What {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// A folder that is not there, or an output that cannot be written.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     match &args.what {
         What::Schema(args) => schema::run(args),

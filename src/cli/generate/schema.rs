@@ -114,9 +114,6 @@ pub fn schema(kind: Kind) -> Value {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// None but those of the output.
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let found = schema(args.kind);
     let text = format!("{found:#}\n");

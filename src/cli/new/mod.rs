@@ -95,9 +95,6 @@ pub struct Drafted {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// A file that is there already; a URDF or log that cannot be used.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let target = match args.name.extension() {
         Some(end) if end == "toml" => args.name.clone(),
@@ -264,9 +261,6 @@ impl Described {
 }
 
 /// Drafts the robot file `target` from what a URDF and a log show; nothing is written.
-///
-/// # Errors
-/// A URDF or log that cannot be used.
 pub(super) fn describe(
     args: &Args,
     target: &Path,

@@ -8,7 +8,7 @@ use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{Block, LogSpec, Reader, escape};
 
 /// Rows that are looked at, and every how many of the log's.
-const ROWS: usize = 20_000;
+const MAX_ROWS: usize = 20_000;
 const EVERY: usize = 5;
 /// Correlation of torque and weight from which the torque is one of gravity.
 const ALIKE: f64 = 0.8;
@@ -65,9 +65,6 @@ fn parameters(file: &RobotFile, robot: &Robot) -> Option<Vec<f64>> {
 }
 
 /// What is to be said of torques that the weights do not go with.
-///
-/// # Errors
-/// Interruption. A log that cannot be read says nothing.
 pub(super) fn warning(
     file: &RobotFile,
     spec: &LogSpec,
@@ -85,7 +82,7 @@ pub(super) fn warning(
         return Ok(None);
     };
     let (mut block, mut rows) = (Block::default(), 0);
-    while rows < ROWS && reader.read(&mut block).unwrap_or(false) {
+    while rows < MAX_ROWS && reader.read(&mut block).unwrap_or(false) {
         context.check()?;
         for row in (0..block.len()).step_by(EVERY) {
             let part = row * n..(row + 1) * n;

@@ -81,7 +81,8 @@ fn of_one_crate(text: &str) -> String {
         let end = part
             .find(|c: char| !c.is_alphanumeric())
             .unwrap_or(part.len());
-        let import = part[end..].starts_with("::");
+        // the derive is no room
+        let import = part[end..].starts_with("::") && &part[..end] != "derive";
         out.push_str(if import { "crate" } else { "cft_ident_" });
         out.push_str(if import { &part[end..] } else { part });
     }

@@ -1,29 +1,31 @@
 //! Why no diagnosis comes out.
 
 use crate::effect::formula::FormulaError;
+use crate::explain::{ErrorText, Explain};
 use crate::motion::MotionError;
 
 /// Why no diagnosis came out.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum DiagnoseError {
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Motion(#[from] MotionError),
-    #[error(
-        "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} \
-         unknowns; give a longer log, or logs of their own by --holdout"
+    #[explain(
+        "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} unknowns",
+        "give a longer log, or logs of their own by --holdout"
     )]
     TooFewRows { rows: usize, unknowns: usize },
-    #[error(
-        "these logs determine none of the {unknowns} unknowns of the model; log a motion of every joint"
+    #[explain(
+        "these logs determine none of the {unknowns} unknowns of the model",
+        "log a motion of every joint"
     )]
     NothingDetermined { unknowns: usize },
-    #[error("the torque of joint {joint} is zero throughout; check its channel")]
+    #[explain("the torque of joint {joint} is zero throughout", "check its channel")]
     NoTorque { joint: String },
-    #[error("no effect {name} can be accepted: {why}")]
-    Accept { name: String, why: String },
-    #[error(transparent)]
+    #[explain(why.clone().of(format!("no effect {name} can be accepted")))]
+    Accept { name: String, why: ErrorText },
+    #[explain(_0.explanation())]
     Formula(Box<FormulaError>),
-    #[error("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
 }
 

@@ -78,8 +78,8 @@ pub struct LeftCandidate {
     pub reason: String,
 }
 
-/// Errors before or after.
-#[derive(Debug, Clone)]
+/// Errors on the logs that were fitted and on held-out data.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SplitErrors {
     pub train: Errors,
     pub holdout: Option<Errors>,

@@ -1,6 +1,7 @@
 //! What is chosen of all candidates: one pass over the rows, then the search; once more about the friction laws that
 //! are found, for what goes by a joint's direction goes by its law.
 
+use crate::explain::ErrorText;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -235,9 +236,7 @@ fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
     let place = joint.as_ref().map_or(String::new(), |j| format!(" of {j}"));
     DiagnoseError::Accept {
         name: format!("{name}{place}"),
-        why: "it was not among the candidates: see `candidates` in the JSON document for those that there are; a \
-              formula is there with --search"
-            .to_owned(),
+        why: ErrorText::new("it was not among the candidates: see `candidates` in the JSON document for those that there are").remedy("a formula is there with --search"),
     }
 }
 

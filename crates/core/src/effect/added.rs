@@ -54,9 +54,6 @@ impl Added {
     }
 
     /// The effect at the place and with the numbers that a file gives.
-    ///
-    /// # Errors
-    /// [`EffectError`] for a joint or key that does not fit.
     pub(crate) fn of_values(
         law: &'static Law,
         robot: &Robot,

@@ -17,9 +17,6 @@ pub const INERTIA: usize = 9;
 
 impl EffectsCode {
     /// Those of a model.
-    ///
-    /// # Errors
-    /// [`EffectError::NoCode`].
     pub fn of(refined: &AugmentedModel) -> Result<Self, EffectError> {
         let mut out = EffectsCode {
             lead_s: vec![0.0; refined.model.robot.joints()],
@@ -49,7 +46,7 @@ impl EffectsCode {
             if !written {
                 return Err(EffectError::NoCode { effect: title });
             }
-            out.told.push(title);
+            out.titles.push(title);
         }
         Ok(out)
     }

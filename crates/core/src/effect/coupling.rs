@@ -26,9 +26,9 @@ pub static ENTRY: Entry = Entry {
     places: Places::Pairs,
     search: Search::Grid,
     must: &[
-        Rule::not_negative("viscous", TRAIN).or_zero(),
-        Rule::not_negative("coulomb", TRAIN).or_zero(),
-        Rule::not_negative("inertia", TRAIN).or_zero(),
+        Rule::not_negative("viscous", TRAIN),
+        Rule::not_negative("coulomb", TRAIN),
+        Rule::not_negative("inertia", TRAIN),
     ],
     ladder: Some(Ladder::USUAL),
     separate_by: "move the other joint alone, both ways at several speeds",

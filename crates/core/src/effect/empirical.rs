@@ -1,5 +1,5 @@
 //! `empirical`: a torque that the data show and that no named law gives with numbers that a machine can have: a
-//! natural cubic spline of one signal of one joint (de Boor 1978, ch. IV), told by its peak.
+//! natural cubic spline of one signal of one joint (de Boor 1978, ch. IV), described by its peak.
 
 use super::added::Added;
 use super::entry::{Entry, Family, Key, Role, Search};

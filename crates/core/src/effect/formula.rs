@@ -4,6 +4,7 @@ use super::formula_state::FormulaState;
 use super::law_text::exact;
 use super::place::Place;
 use super::scene::Scene;
+use crate::explain::Explain;
 use crate::math::formula::{Formula, MOST_NAMES};
 use crate::robot::{FormulaSignal, Robot};
 
@@ -32,26 +33,29 @@ pub struct Shape {
 }
 
 /// Why a formula cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum FormulaError {
-    #[error("candidate `{name}` has the name of an effect that is known: give it another")]
+    #[explain("candidate `{name}` has the name of an effect that is known: give it another")]
     Known { name: String },
-    #[error("candidate `{name}`: this robot has no joint `{joint}`; it has {known}")]
+    #[explain(
+        "candidate `{name}`: this robot has no joint `{joint}`",
+        "it has {known}"
+    )]
     Joint {
         name: String,
         joint: String,
         known: String,
     },
-    #[error("candidate `{name}`, `{coefficient}`: `{formula}` is no formula: {why}")]
+    #[explain("candidate `{name}`, `{coefficient}`: `{formula}` is no formula: {why}")]
     Syntax {
         name: String,
         coefficient: String,
         formula: String,
         why: String,
     },
-    #[error(
-        "candidate `{name}`, `{coefficient}`: `{variable}` is not known; known are q, v, a, load, direction, \
-         temperature, since_reversal, play and dahl of the joint, the same of others (q_{joint}), t{shapes}"
+    #[explain(
+        "candidate `{name}`, `{coefficient}`: `{variable}` is not known",
+        "known are q, v, a, load, direction, temperature, since_reversal, play and dahl of the joint, the same of others (q_{joint}), t{shapes}"
     )]
     Variable {
         name: String,
@@ -60,7 +64,7 @@ pub enum FormulaError {
         joint: String,
         shapes: String,
     },
-    #[error(
+    #[explain(
         "candidate `{name}`, `{coefficient}`: `{variable}` needs its scale in m or rad: give it in `shapes` as `{scale}`"
     )]
     Scale {
@@ -96,9 +100,6 @@ enum Input {
 
 impl Formulas {
     /// Reads the formulas of a definition.
-    ///
-    /// # Errors
-    /// [`FormulaError`].
     pub(super) fn of(definition: &Definition, robot: &Robot) -> Result<Self, FormulaError> {
         let name = &definition.name;
         let names = robot.joint_names();
@@ -273,9 +274,6 @@ impl Formulas {
 impl Formulas {
     /// The torque at joint `joint` as an expression of generated code, for the text of a signal; and whether it
     /// hangs on the time.
-    ///
-    /// # Errors
-    /// What has no text.
     pub(super) fn code(
         &self,
         joint: usize,

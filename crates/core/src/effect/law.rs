@@ -129,9 +129,6 @@ impl Law {
     }
 
     /// Shape and coefficients of numbers in a file.
-    ///
-    /// # Errors
-    /// [`EffectError`] for a key that is absent or unusable.
     pub(crate) fn of_keys(&self, values: &Values) -> Result<[Vec<f64>; 2], EffectError> {
         if let Some(with) = &self.reparametrised {
             return (with.of_keys)(values);

@@ -18,7 +18,7 @@ pub static ENTRY: Entry = Entry {
     ],
     search: Search::Refined,
     // mu_v may be negative: what it takes at speed is bounded by the power of all friction of the joint
-    must: &[Rule::not_negative("mu_c", LOADED).or_zero()],
+    must: &[Rule::not_negative("mu_c", LOADED)],
     otherwise: Some(CurveSignal::Load),
     friction: true,
     separate_by: "log the same path at the same speed with and without a known payload",

@@ -15,9 +15,6 @@ use crate::robot::Robot;
 static MADE: Mutex<Vec<(Definition, Vec<String>, &'static Law)>> = Mutex::new(Vec::new());
 
 /// The law of a definition on a robot. It lives as long as the program: the same definition gives the same law.
-///
-/// # Errors
-/// [`FormulaError`].
 pub fn law(definition: &Definition, robot: &Robot) -> Result<&'static Law, FormulaError> {
     let mut made = MADE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let same = |(d, joints, _): &&(Definition, Vec<String>, &'static Law)| {

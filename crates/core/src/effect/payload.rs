@@ -25,7 +25,7 @@ pub static ENTRY: Entry = Entry {
     search: Search::Refined,
     must: &[
         Rule::not_negative("mass", BODY),
-        Rule::not_negative("inertia", BODY).or_zero(),
+        Rule::not_negative("inertia", BODY),
     ],
     separate_by: "identify unloaded, then diagnose loaded logs with --keep",
     formula: "a body with its centre at (mx, my, mz)/mass in the frame of the last link, and its \

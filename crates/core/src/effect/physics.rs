@@ -14,8 +14,6 @@ pub struct Rule {
     pub most: Limit,
     /// Why, in words: `a worn gear has up to 0.03 rad or 2 mm`.
     pub why: &'static str,
-    /// A number beyond its limit by no more than two deviations is zero, and what is left keeps the name.
-    pub may_be_zero: bool,
 }
 
 /// A number of an effect that is looked at.
@@ -71,7 +69,6 @@ impl Rule {
         least: Limit::None,
         most: Limit::None,
         why: "",
-        may_be_zero: false,
     };
 
     /// A number at most as large.
@@ -97,14 +94,6 @@ impl Rule {
     /// A key that is not negative.
     pub(crate) const fn not_negative(key: &'static str, why: &'static str) -> Rule {
         Rule::at_least(Number::Key(key), Limit::Is(0.0), why)
-    }
-
-    /// One of several sizes, which may be zero while the others are not.
-    pub(crate) const fn or_zero(self) -> Rule {
-        Rule {
-            may_be_zero: true,
-            ..self
-        }
     }
 
     /// What it says of an effect's keys, where they break it: the number in words and why it cannot be.

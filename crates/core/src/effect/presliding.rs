@@ -28,7 +28,7 @@ pub static ENTRY: Entry = Entry {
     must: &[
         Rule::not_negative("sigma0", BRISTLES),
         Rule::not_negative("fc", BRISTLES),
-        Rule::not_negative("sigma1", BRISTLES).or_zero(),
+        Rule::not_negative("sigma1", BRISTLES),
         Rule::at_most(
             Number::Ratio("fc", "sigma0"),
             Limit::Presliding,

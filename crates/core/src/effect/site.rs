@@ -42,7 +42,7 @@ pub struct EffectsCode {
     /// Time by which the logged torque of each joint is late \[s\].
     pub lead_s: Vec<f64>,
     /// What is in the file, one line each.
-    pub told: Vec<String>,
+    pub titles: Vec<String>,
 }
 
 /// What writes the code of an effect.

@@ -1,4 +1,4 @@
-//! Units of an effect's numbers, told once it is known where the effect sits.
+//! Units of an effect's numbers, known once it is known where the effect sits.
 
 use crate::robot::JointKind;
 

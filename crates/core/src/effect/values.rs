@@ -1,29 +1,30 @@
 //! Numbers of an effect by their keys, as a model file has them, and why they cannot be used.
 
+use crate::explain::Explain;
 use std::collections::BTreeMap;
 
 /// Why an effect of a model file cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum EffectError {
-    #[error("effect `{name}` is not known; known are {known}")]
+    #[explain("effect `{name}` is not known", "known are {known}")]
     Unknown { name: String, known: String },
-    #[error("effect `{name}`: this robot has no joint `{joint}`; it has {known}")]
+    #[explain("effect `{name}`: this robot has no joint `{joint}`", "it has {known}")]
     Joint {
         name: String,
         joint: String,
         known: String,
     },
-    #[error("no code is known for the effect {effect}")]
+    #[explain("no code is known for the effect {effect}")]
     NoCode { effect: String },
-    #[error("effect `{name}` cannot sit there on this robot")]
+    #[explain("effect `{name}` cannot sit there on this robot")]
     Place { name: String },
-    #[error("effect `{name}` lacks its parameter `{key}`; it takes {known}")]
+    #[explain("effect `{name}` lacks its parameter `{key}`", "it takes {known}")]
     Key {
         name: String,
         key: String,
         known: String,
     },
-    #[error("effect `{name}`: `{key}` = {value} is not a usable number")]
+    #[explain("effect `{name}`: `{key}` = {value} is not a usable number")]
     Value {
         name: String,
         key: String,
@@ -59,9 +60,6 @@ impl Values<'_> {
     }
 
     /// The same of a key that may be left out.
-    ///
-    /// # Errors
-    /// [`EffectError::Value`].
     pub(crate) fn get_or(&self, key: &str, absent: f64) -> Result<f64, EffectError> {
         match self.given.contains_key(key) {
             true => self.get(key),

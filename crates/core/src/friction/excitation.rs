@@ -1,21 +1,22 @@
 //! Which joint a log moves, and whether its motion can show friction at all.
 
+use crate::explain::Explain;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::prepare::{SmoothedMotion, rms};
 
 /// Why a log cannot give a joint's friction. Each message says what motion is missing.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum FrictionError {
-    #[error(
-        "no joint moves in this log: the largest travel is {travel:.3e} of a joint's range; \
-         log an experiment in which one joint runs back and forth"
+    #[explain(
+        "no joint moves in this log: the largest travel is {travel:.3e} of a joint's range",
+        "log an experiment in which one joint runs back and forth"
     )]
     NothingMoves { travel: f64 },
-    #[error(
-        "joints {first} and {second} both move ({first_share:.0} % and {second_share:.0} % of their ranges), so \
-         it is open which joint this log is about; name it with --joint, or log one joint at a time"
+    #[explain(
+        "joints {first} and {second} both move ({first_share:.0} % and {second_share:.0} % of their ranges), so it is open which joint this log is about",
+        "name it with --joint, or log one joint at a time"
     )]
     SeveralMove {
         first: String,
@@ -23,29 +24,32 @@ pub enum FrictionError {
         first_share: f64,
         second_share: f64,
     },
-    #[error(
-        "joint {joint} does not move in this log, or its torque is zero throughout; log it moving back and forth"
+    #[explain(
+        "joint {joint} does not move in this log, or its torque is zero throughout",
+        "log it moving back and forth"
     )]
     StandsStill { joint: String },
-    #[error(
-        "joint {joint} never reverses (speeds from {least:.4} to {most:.4}): Coulomb friction cannot be \
-         separated from a constant torque; log it in both directions"
+    #[explain(
+        "joint {joint} never reverses (speeds from {least:.4} to {most:.4}): Coulomb friction cannot be separated from a constant torque",
+        "log it in both directions"
     )]
     NeverReverses {
         joint: String,
         least: f64,
         most: f64,
     },
-    #[error(
-        "the log of joint {joint} holds {samples} samples in which it moves, too few for {unknowns} unknowns; log longer"
+    #[explain(
+        "the log of joint {joint} holds {samples} samples in which it moves, too few for {unknowns} unknowns",
+        "log longer"
     )]
     TooShort {
         joint: String,
         samples: usize,
         unknowns: usize,
     },
-    #[error(
-        "the filter found no finite estimate for joint {joint} from any start; inspect the log's torque and position channels"
+    #[explain(
+        "the filter found no finite estimate for joint {joint} from any start",
+        "inspect the log's torque and position channels"
     )]
     NoEstimate { joint: String },
 }

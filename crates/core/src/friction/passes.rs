@@ -37,7 +37,7 @@ const TUNE_EVALUATIONS: u64 = 24;
 /// Most Gauss-Newton steps of one refinement.
 const MOST_STEPS: usize = 40;
 /// A step that gains less log-likelihood than this is the last.
-const SETTLED: f64 = 1e-4;
+const MIN_LIKELIHOOD_GAIN: f64 = 1e-4;
 /// Log-likelihood that a second Coulomb term has to gain: that of its two parameters (Akaike 1974).
 const SECOND_TERM: f64 = 2.0;
 /// What stands still where there is one Coulomb term: Bf2 and w2.
@@ -336,9 +336,9 @@ pub(super) fn refine_others(
             let gain = next.log_likelihood - at.log_likelihood;
             let rounding = 1e-9 * at.log_likelihood.abs();
             Ok(match gain.is_finite() {
-                true if gain >= SETTLED => Trial::Accepted((trial, next)),
+                true if gain >= MIN_LIKELIHOOD_GAIN => Trial::Accepted((trial, next)),
                 true if gain >= 0.0 => Trial::Last((trial, next)),
-                true if gain > -SETTLED * (1.0 + rounding) => Trial::Settled,
+                true if gain > -MIN_LIKELIHOOD_GAIN * (1.0 + rounding) => Trial::Settled,
                 _ => Trial::Rejected,
             })
         });
@@ -349,8 +349,7 @@ pub(super) fn refine_others(
     }
 }
 
-/// Noise levels of highest likelihood at fixed parameters; the position's never below the
-/// resolution's own.
+/// Noise levels of highest likelihood at fixed parameters; the position's never below the resolution's own.
 fn tune(
     problem: &FrictionProblem,
     p: &[f64],

@@ -24,7 +24,7 @@ pub struct Plateau {
 }
 
 /// Shortest plateau [s]; largest departure from its own speed, relative.
-const SHORTEST: f64 = 0.15;
+const MIN_PLATEAU_S: f64 = 0.15;
 const DEPARTURE: f64 = 0.02;
 
 /// A curve follows its plateaus to this share of their torque.
@@ -113,7 +113,7 @@ pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
                 end += 1;
             }
             let seconds = record.t[end.min(n)] - record.t[k];
-            if speed > 0.02 * problem.velocity_scale && seconds >= SHORTEST {
+            if speed > 0.02 * problem.velocity_scale && seconds >= MIN_PLATEAU_S {
                 let count = (end - k) as f64;
                 let mean = (k..end).map(net).sum::<f64>() / count;
                 let parts = 10usize.min(end - k);

@@ -109,8 +109,7 @@ impl ScaledLaw {
         self.at(v).slope
     }
 
-    /// Sub-steps for an interval from v with acceleration a: the steepest slope that the
-    /// interval can meet decides.
+    /// Sub-steps for an interval from v with acceleration a: the steepest slope that the interval can meet decides.
     #[inline(always)]
     fn steps(&self, v: f64, a: f64, minv: f64, dt: f64) -> usize {
         let bound = self.viscous.abs()

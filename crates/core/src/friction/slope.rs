@@ -6,7 +6,7 @@ use super::problem::FrictionProblem;
 /// Drop of the log-likelihood at a one-sided 95 % bound: half of 1.645 squared.
 const BOUND_DROP: f64 = 1.353;
 /// Gauss-Newton steps of the other parameters at each slope.
-const STEPS: usize = 8;
+const GAUSS_NEWTON_STEPS: usize = 8;
 /// Step of the slope's logarithm on the way down.
 const STRIDE: f64 = 0.25;
 
@@ -17,14 +17,21 @@ fn drop(maximum: &Maximum, value: f64) -> f64 {
 }
 
 /// Whether the slope with index `i` (3 or 4) may be as steep as any that is tried, the other
-/// parameters fitted anew. A standard deviation cannot tell: it knows the curvature at the maximum
+/// parameters fitted anew. A standard deviation does not say so: it knows the curvature at the maximum
 /// alone, and a likelihood that rises to a plateau is curved at its edge.
 pub(crate) fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> bool {
     let mut p = maximum.parameters.clone();
     p[i] = (problem.slope_range.1 * problem.velocity_scale).ln();
     let spread = spread(problem);
     let fixed = [&[i], maximum.fixed].concat();
-    let refined = refine_others(problem, p, maximum.noise, &spread, STEPS, &fixed);
+    let refined = refine_others(
+        problem,
+        p,
+        maximum.noise,
+        &spread,
+        GAUSS_NEWTON_STEPS,
+        &fixed,
+    );
     drop(maximum, refined.score.log_likelihood) < BOUND_DROP
 }
 
@@ -40,18 +47,38 @@ pub(crate) fn profile_slope(problem: &FrictionProblem, maximum: &Maximum, i: usi
     while p[i] > lowest {
         p[i] = (p[i] - STRIDE).max(lowest);
         let from = p.clone();
-        let mut refined = refine_others(problem, p, maximum.noise, &spread, STEPS, &fixed);
+        let mut refined = refine_others(
+            problem,
+            p,
+            maximum.noise,
+            &spread,
+            GAUSS_NEWTON_STEPS,
+            &fixed,
+        );
         if i == 3 && !maximum.one_term() && refined.parameters[4] > refined.parameters[3] {
             let mut both = from;
             both[4] = both[4].min(both[3]);
             let fixed = [3, 4];
-            let merged =
-                refine_others(problem, both.clone(), maximum.noise, &spread, STEPS, &fixed);
+            let merged = refine_others(
+                problem,
+                both.clone(),
+                maximum.noise,
+                &spread,
+                GAUSS_NEWTON_STEPS,
+                &fixed,
+            );
             // apart again, should the data want that
             both = merged.parameters.clone();
             both[4] -= 1.0;
             problem.clamp(&mut both);
-            let apart = refine_others(problem, both, maximum.noise, &spread, STEPS, &[3]);
+            let apart = refine_others(
+                problem,
+                both,
+                maximum.noise,
+                &spread,
+                GAUSS_NEWTON_STEPS,
+                &[3],
+            );
             let admissible = apart.parameters[4] <= apart.parameters[3]
                 && apart.score.log_likelihood > merged.score.log_likelihood;
             refined = if admissible { apart } else { merged };

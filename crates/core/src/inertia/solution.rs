@@ -1,6 +1,7 @@
 //! The weighted least-squares solution (41) by singular values: rank, condition numbers, and combinations that the
 //! data leave open.
 
+use crate::explain::Explain;
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -10,18 +11,19 @@ use crate::math::rank;
 use crate::math::rfactor::RFactor;
 
 /// Why no fit came out.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Debug, Clone, Explain, thiserror::Error)]
 pub enum FitError {
-    #[error(
-        "{rows} rows are left after filtering and decimation, too few for {unknowns} unknowns; \
-         give a longer log, a lower decimation or a higher cut-off"
+    #[explain(
+        "{rows} rows are left after filtering and decimation, too few for {unknowns} unknowns",
+        "give a longer log, a lower decimation or a higher cut-off"
     )]
     TooFewRows { rows: u64, unknowns: usize },
-    #[error(
-        "no column of the regressor is excited by these logs: every joint stands still, or its torque is zero; log a motion of every joint"
+    #[explain(
+        "no column of the regressor is excited by these logs: every joint stands still, or its torque is zero",
+        "log a motion of every joint"
     )]
     NothingExcited,
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Math(#[from] crate::math::MathError),
 }
 

@@ -83,9 +83,6 @@ pub type DescentStep<'a, S, E> = dyn FnMut(&S, f64) -> Result<Trial<S>, E> + 'a;
 
 /// Descends from `start` by at most so many tried steps: `step` gets the present point and the control
 /// number. The point at the end, how it ended, and the steps that were tried.
-///
-/// # Errors
-/// Those of `step`.
 pub fn descend<S, E>(
     start: S,
     control: &StepControl,

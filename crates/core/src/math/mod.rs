@@ -34,13 +34,14 @@ pub mod zero_phase;
 #[cfg(test)]
 mod properties;
 
+use crate::explain::Explain;
 use thiserror::Error;
 
 /// What the room `math` cannot compute, with the numbers that offend.
-#[derive(Debug, Clone, PartialEq, Error)]
+#[derive(Debug, Clone, PartialEq, Explain, Error)]
 pub enum MathError {
     /// An entry is NaN or infinite.
-    #[error(
+    #[explain(
         "matrix entry ({row}, {column}) is {value}: find the row of data that is not finite and leave it out"
     )]
     NotFinite {
@@ -53,7 +54,7 @@ pub enum MathError {
     },
 
     /// Neither method found singular values that reproduce the norm of the matrix.
-    #[error(
+    #[explain(
         "singular values of a {rows} x {columns} matrix have square sum {found:e}, its entries {expected:e}: scale the columns to norm 1 first"
     )]
     NoConvergence {
@@ -68,7 +69,7 @@ pub enum MathError {
     },
 
     /// Two R factors of different width cannot be merged.
-    #[error(
+    #[explain(
         "an R factor of {found} columns cannot be merged into one of {expected}: both must come from the same model"
     )]
     ColumnMismatch {
@@ -79,9 +80,12 @@ pub enum MathError {
     },
 
     /// A cut-off frequency that the sampling rate does not carry.
-    #[error(
-        "a cut-off of {cutoff_hz} Hz needs a sampling rate of more than {} Hz, found {rate_hz} Hz; lower the cut-off, or correct the times of the log if its rate is another",
-        2.0 * cutoff_hz
+    #[explain(
+        format!(
+            "a cut-off of {cutoff_hz} Hz needs a sampling rate of more than {} Hz, found {rate_hz} Hz",
+            2.0 * cutoff_hz
+        ),
+        "lower the cut-off, or correct the times of the log if its rate is another"
     )]
     Cutoff {
         /// Cut-off frequency (Hz).
@@ -91,21 +95,21 @@ pub enum MathError {
     },
 
     /// A filter order outside 1..=16.
-    #[error("a filter of order {order} is not offered: choose 1 to 16")]
+    #[explain("a filter of order {order} is not offered: choose 1 to 16")]
     FilterOrder {
         /// The order asked for.
         order: usize,
     },
 
     /// A pass-band ripple that is not a positive number of decibels.
-    #[error("a pass-band ripple of {ripple_db} dB is not possible: choose more than 0, 0.05 say")]
+    #[explain("a pass-band ripple of {ripple_db} dB is not possible: choose more than 0, 0.05 say")]
     Ripple {
         /// Ripple (dB).
         ripple_db: f64,
     },
 
     /// A signal shorter than the extension at its ends.
-    #[error(
+    #[explain(
         "{samples} samples are too few for a zero-phase filter that extends each end by {needed}: give a longer record or a filter of lower order"
     )]
     TooShort {

@@ -15,11 +15,11 @@ use crate::math::sos::Sos;
 /// Rows from which the sampling step is found.
 const CLOCK_ROWS: usize = 256;
 /// Samples by which the differences are late.
-const REACH: usize = 2;
+const LATE_SAMPLES: usize = 2;
 /// Samples that they are formed from.
-const POINTS: usize = 2 * REACH + 1;
+const POINTS: usize = 2 * LATE_SAMPLES + 1;
 /// Time constants after which a filter has forgotten its start.
-const SETTLED: f64 = 8.0;
+const SETTLING_TIME_CONSTANTS: f64 = 8.0;
 
 /// Turns rows into samples that are smoothed and differentiated.
 pub struct CausalMotion {
@@ -54,9 +54,12 @@ impl CausalFilter {
         cutoffs.iter_mut().for_each(|hz| *hz = hz.min(most));
         let filter = PositionFilter::design(settings.q_order, cutoffs, rate)?;
         let sos = filter.map(|f| f.narrowest().sos().clone());
-        let late = sos.as_ref().map_or(0.0, delay_samples) + REACH as f64;
+        let late = sos.as_ref().map_or(0.0, delay_samples) + LATE_SAMPLES as f64;
         Ok(Self {
-            settle: sos.as_ref().map_or(0, |sos| sos.settle_samples(SETTLED)) + POINTS,
+            settle: sos
+                .as_ref()
+                .map_or(0, |sos| sos.settle_samples(SETTLING_TIME_CONSTANTS))
+                + POINTS,
             delay_s: late * dt,
             sos,
         })
@@ -92,9 +95,6 @@ pub struct CausalSample<'a> {
 
 impl CausalMotion {
     /// For logs of so many joints, by the position filter of `settings`.
-    ///
-    /// # Errors
-    /// [`MotionError::Setting`].
     pub fn new(joints: usize, settings: &FilterSettings) -> Result<Self, MotionError> {
         Ok(Self {
             joints,
@@ -115,7 +115,7 @@ impl CausalMotion {
         self.chain.as_ref().map(|chain| chain.delay_s)
     }
 
-    /// Takes rows and hands out the sampling step \[s\] and the samples that they determine; none before the first 256 rows have told the
+    /// Takes rows and hands out the sampling step \[s\] and the samples that they determine; none before the first 256 rows have given the
     /// sampling step. With `last`, all that is left.
     ///
     /// # Errors
@@ -187,7 +187,7 @@ impl Chain {
         }
         // five points about the third newest: exact for polynomials of degree 4
         let back = |m: usize| (self.at + POINTS - m) % POINTS * 2 * n;
-        let middle = back(REACH);
+        let middle = back(LATE_SAMPLES);
         for j in 0..n {
             let at = |m: usize| self.ring[back(m) + j];
             let [ahead2, ahead, here, behind, behind2] = [0, 1, 2, 3, 4].map(at);

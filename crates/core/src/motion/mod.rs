@@ -29,7 +29,7 @@
 //! | `rest` | what rows weigh where a joint stands or turns |
 //! | `full_rate` | smooth q, v, a at every sample of one short record |
 //! | `stretch` | whole stretches in memory, for searches |
-//! | `added_noise` | a stretch smoothed twice, or with noise of its own level added (SIMEX) |
+//! | `added_noise` | what noise of positions becomes, and how rough a signal is |
 
 mod added_noise;
 mod causal;
@@ -55,6 +55,7 @@ pub(crate) use stretch::alike;
 pub use stretch::{Parallel, ParallelFilters, Stretch, stretches};
 pub use zero_order_hold::ZeroOrderHold;
 
+use crate::explain::Explain;
 use thiserror::Error;
 
 use crate::math::MathError;
@@ -100,21 +101,21 @@ pub struct FilteredRow<'a> {
 }
 
 /// Why a log cannot be turned into rows.
-#[derive(Debug, Clone, PartialEq, Error)]
+#[derive(Debug, Clone, PartialEq, Explain, Error)]
 pub enum MotionError {
     /// A filter cannot be designed or run.
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Math(#[from] MathError),
 
     /// Fewer samples than a sampling step needs.
-    #[error("the log holds {samples} samples: two are the least that has a sampling step")]
+    #[explain("the log holds {samples} samples: two are the least that has a sampling step")]
     TooFewSamples {
         /// Samples of the log.
         samples: u64,
     },
 
     /// A block of another width than the robot.
-    #[error(
+    #[explain(
         "{channel} has {values} values in {rows} rows, but the robot has {joints} joints: check the columns of the log"
     )]
     Shape {
@@ -129,7 +130,7 @@ pub enum MotionError {
     },
 
     /// Time stands still or runs backwards.
-    #[error("time goes from {before} s to {after} s: sort the log and remove repeated rows")]
+    #[explain("time goes from {before} s to {after} s: sort the log and remove repeated rows")]
     Time {
         /// Time of a row (s).
         before: f64,
@@ -138,7 +139,7 @@ pub enum MotionError {
     },
 
     /// A setting out of its range.
-    #[error("{name} = {value} is not possible: {remedy}")]
+    #[explain("{name} = {value} is not possible: {remedy}")]
     Setting {
         /// Name of the setting.
         name: &'static str,
@@ -149,8 +150,9 @@ pub enum MotionError {
     },
 
     /// Every stretch without a gap is too short to filter.
-    #[error(
-        "no stretch of the log is long enough to filter: {segments} stretches between gaps, the longest of {longest} samples, {needed} are needed; bridge gaps that are short beside the motion by `gap_factor = 8` in [filter], raise `cutoff_hz`, or record longer"
+    #[explain(
+        "no stretch of the log is long enough to filter: {segments} stretches between gaps, the longest of {longest} samples, {needed} are needed",
+        "bridge gaps that are short beside the motion by `gap_factor = 8` in [filter], raise `cutoff_hz`, or record longer"
     )]
     NoSegment {
         /// Stretches between gaps.
@@ -162,7 +164,7 @@ pub enum MotionError {
     },
 
     /// A record that must be of one piece has a gap.
-    #[error("no row between {from} s and {to} s: smooth the stretches before and after it apart")]
+    #[explain("no row between {from} s and {to} s: smooth the stretches before and after it apart")]
     Gap {
         /// Last time before the gap (s).
         from: f64,
@@ -171,7 +173,7 @@ pub enum MotionError {
     },
 
     /// A computed channel is NaN or infinite.
-    #[error(
+    #[explain(
         "channel {channel} is {value} at t = {t} s: the position there is outside of what the model covers"
     )]
     NotFinite {

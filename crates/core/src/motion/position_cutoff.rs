@@ -28,7 +28,7 @@ const TRIED: [f64; 7] = [4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0];
 /// Cut-off of the filter by which the smear is seen, over the one that is tried.
 const NARROWER: f64 = 0.6;
 /// Time constants of the position filter within which it has not settled.
-const SETTLED: f64 = 10.0;
+const SETTLING_TIME_CONSTANTS: f64 = 10.0;
 
 /// What a cut-off costs the friction of one joint: root mean squares over filtered rows in which it moves, in the
 /// unit of the friction law.
@@ -254,7 +254,13 @@ impl Parallel {
     /// Samples at a stretch's end in which the position filter has not settled.
     fn unsettled(&self) -> Option<usize> {
         let filter = self.position.as_ref()?;
-        Some(filter.narrowest().sos().settle_samples(SETTLED) + self.differences.reach())
+        Some(
+            filter
+                .narrowest()
+                .sos()
+                .settle_samples(SETTLING_TIME_CONSTANTS)
+                + self.differences.reach(),
+        )
     }
 
     /// Samples of the shortest stretch that gives a row.

@@ -106,9 +106,6 @@ impl Stretch {
 
 /// Reads one log into stretches. They end where the parallel filter begins: what it leaves off at
 /// the ends is [`Parallel::trim`].
-///
-/// # Errors
-/// Those of the source and of [`run`].
 pub fn stretches<E>(
     log: usize,
     joints: usize,

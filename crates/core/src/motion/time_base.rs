@@ -261,8 +261,7 @@ impl TimeBase {
         Ok(None)
     }
 
-    /// Hands out the samples that the rows before `end` determine; `closed` when no more rows of
-    /// this stretch follow.
+    /// Hands out the samples that the rows before `end` determine; `closed` when no more rows of this stretch follow.
     fn advance(
         &mut self,
         clock: SampleClock,

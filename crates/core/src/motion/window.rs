@@ -5,8 +5,7 @@ use std::cell::RefCell;
 use super::settings::FilterChain;
 use super::{FilteredRow, MotionError, MotionSample, rest};
 
-/// Channels filtered together. Each group of channels lies apart, so that a pass over it stays in
-/// a second-level cache.
+/// Channels filtered together. Each group of channels lies apart, so that a pass over it stays in a second-level cache.
 const GROUP: usize = 8;
 /// Share of movement in what a row is mostly made of, above which it is none of rest for sure.
 const MAY_REST: f64 = 0.6;

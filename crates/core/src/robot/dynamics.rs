@@ -78,9 +78,6 @@ impl Dynamics {
 
     /// x with M x = b, in the place of b; `false` where M, n x n row-major, is not positive definite. M may be
     /// overwritten. Does not allocate.
-    ///
-    /// # Panics
-    /// As [`Self::inertia_and_bias`].
     #[inline]
     pub fn solve(&self, mass: &mut [f64], b: &mut [f64]) -> bool {
         if self.closed.is_none() {

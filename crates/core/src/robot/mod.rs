@@ -293,9 +293,6 @@ impl Robot {
     }
 
     /// Writes Y(q, v, a) theta: the torque of every joint \[N or N m\], friction aside. Does not allocate.
-    ///
-    /// # Panics
-    /// As [`Self::regressor`].
     #[inline]
     pub fn torque(&self, theta: &[f64], q: &[f64], v: &[f64], a: &[f64], tau: &mut [f64]) {
         match &self.0.form {

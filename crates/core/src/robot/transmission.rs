@@ -96,9 +96,6 @@ impl Transmission {
     }
 
     /// Joint positions of the motors' positions.
-    ///
-    /// # Errors
-    /// [`RobotError::OutOfReach`].
     #[inline]
     pub fn joints(&self, x: &[f64], q: &mut [f64]) -> Result<(), RobotError> {
         match self.pantograph {
@@ -109,9 +106,6 @@ impl Transmission {
     }
 
     /// Joint velocities of the motors' velocities at the pose q.
-    ///
-    /// # Errors
-    /// [`RobotError::Singular`].
     #[inline]
     pub fn joint_velocities(&self, q: &[f64], xd: &[f64], v: &mut [f64]) -> Result<(), RobotError> {
         match self.pantograph {
@@ -122,9 +116,6 @@ impl Transmission {
     }
 
     /// Joint accelerations of the motors' accelerations at q and v.
-    ///
-    /// # Errors
-    /// [`RobotError::Singular`].
     #[inline]
     pub fn joint_accelerations(
         &self,
@@ -183,9 +174,6 @@ impl Transmission {
     }
 
     /// Volts of joint torques \[N or N m\] at a pose.
-    ///
-    /// # Errors
-    /// [`RobotError::Singular`].
     #[inline]
     pub fn volts(&self, q: &[f64], tau: &[f64], volts: &mut [f64]) -> Result<(), RobotError> {
         match self.pantograph {

@@ -1,24 +1,25 @@
 //! Why a model cannot be exported.
 
 use cft_ident_core::effect::EffectError;
+use cft_ident_core::explain::Explain;
 use cft_ident_files::config::ConfigError;
 
 /// Why a model cannot be exported.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum ExportError {
     /// Files of links have no word for this.
-    #[error("a file of links cannot hold {what}; {remedy}")]
+    #[explain("a file of links cannot hold {what}", remedy)]
     NoLinks { what: String, remedy: &'static str },
     /// No code is known of an effect.
-    #[error(
-        "{0}; export the rest with --without-effects, or compute the torque with `cft-ident torque`"
+    #[explain(
+        _0.explanation(),
+        "export the rest with --without-effects, or compute the torque with `cft-ident torque`"
     )]
     Effect(#[from] EffectError),
     /// The mass of a link comes out as 0 while its first moment does not.
-    #[error(
-        "link `{link}` has the mass {mass:e} kg by this model but the first moment {moment:.3e} kg m, \
-         which no centre of gravity gives; give it a prior mass in [[robot.link]] `inertial`, or \
-         export with --c or --rust"
+    #[explain(
+        "link `{link}` has the mass {mass:e} kg by this model but the first moment {moment:.3e} kg m, which no centre of gravity gives",
+        "give it a prior mass in [[robot.link]] `inertial`, or export with --c or --rust"
     )]
     NoMass {
         link: String,
@@ -26,28 +27,28 @@ pub enum ExportError {
         moment: f64,
     },
     /// Gains come from an inertia above zero.
-    #[error(
-        "{joint} has the inertia {inertia:.3e} in the middle of its travel, which no machine has; identify with \
-         `lsq` without --unconstrained"
+    #[explain(
+        "{joint} has the inertia {inertia:.3e} in the middle of its travel, which no machine has",
+        "identify with `lsq` without --unconstrained"
     )]
     NoInertia { joint: String, inertia: f64 },
     /// A link that no body can be, which simulators refuse or integrate into nonsense.
-    #[error(
-        "link `{link}` can be no body: its pseudo-inertia has the eigenvalue {eigenvalue:.3e}; identify with \
-         `lsq` without --unconstrained, whose links can exist"
+    #[explain(
+        "link `{link}` can be no body: its pseudo-inertia has the eigenvalue {eigenvalue:.3e}",
+        "identify with `lsq` without --unconstrained, whose links can exist"
     )]
     Impossible { link: String, eigenvalue: f64 },
     /// The user's URDF is of another robot, or its frames are others.
-    #[error("{file}: {problem}; {remedy}")]
+    #[explain("{file}: {problem}", remedy)]
     OtherUrdf {
         file: String,
         problem: String,
         remedy: &'static str,
     },
     /// The side file could not be written as text.
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Config(#[from] ConfigError),
     /// A list of what is left out could not be written as text.
-    #[error("what is left out cannot be written: {0}")]
+    #[explain("what is left out cannot be written: {_0}")]
     Side(#[from] toml::ser::Error),
 }

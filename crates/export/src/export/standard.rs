@@ -68,7 +68,7 @@ pub fn nearest(
     let theta = DVector::from_column_slice(&theta[..rows]);
     // every row has a column of its own, so that B B' is positive definite
     let gram = &b * b.transpose();
-    let mut told = vec![Identifiability::Nothing; p];
+    let mut identifiability = vec![Identifiability::Nothing; p];
     if let Some(factor) = gram.cholesky() {
         // a second step, for the last digits
         for _ in 0..2 {
@@ -76,9 +76,9 @@ pub fn nearest(
             x += b.transpose() * factor.solve(&rest);
         }
         let shares = factor.solve(&b);
-        for (i, told) in told.iter_mut().enumerate() {
+        for (i, identifiability) in identifiability.iter_mut().enumerate() {
             let share = b.column(i).dot(&shares.column(i));
-            *told = match share {
+            *identifiability = match share {
                 share if share > 1.0 - 1e-9 => Identifiability::Alone,
                 share if share > 1e-9 => Identifiability::InSum,
                 _ => Identifiability::Nothing,
@@ -88,7 +88,7 @@ pub fn nearest(
     let moved = (&x - &prior).amax() / prior.amax().max(f64::MIN_POSITIVE);
     Standard {
         values: x.iter().copied().collect(),
-        identifiability: told,
+        identifiability,
         is_prior: moved < ROUNDING,
     }
 }

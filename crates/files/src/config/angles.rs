@@ -8,10 +8,10 @@ use std::f64::consts::PI;
 
 /// Parts of a turn that count as meant: multiples of pi/12 [rad].
 const PARTS: f64 = 12.0;
-/// Fewest decimals that tell a rounded multiple from a number that is near one by chance.
+/// Fewest decimals that distinguish a rounded multiple from a number that is near one by chance.
 const FEWEST_DECIMALS: i32 = 3;
 /// A change below it [rad] is no news: the file says pi/2 in ten digits or more.
-const TOLD: f64 = 1e-9;
+const SAME_ANGLE_RAD: f64 = 1e-9;
 
 /// What was changed in a file, for one warning.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -26,7 +26,7 @@ impl Changes {
         let Some(meant) = angle(written, value) else {
             return value;
         };
-        if (meant - value).abs() > TOLD {
+        if (meant - value).abs() > SAME_ANGLE_RAD {
             self.add(place, written, &in_words(meant));
         }
         meant
@@ -40,7 +40,7 @@ impl Changes {
         let length = value.iter().map(|x| x * x).sum::<f64>().sqrt();
         let turned = meant.iter().zip(&value);
         let turned = turned.map(|(m, v)| (m - v / length).powi(2)).sum::<f64>();
-        if turned.sqrt() > TOLD {
+        if turned.sqrt() > SAME_ANGLE_RAD {
             let exact: Vec<String> = meant.iter().map(|x| format!("{x:.9}")).collect();
             self.add(place, &written.join(" "), &exact.join(" "));
         }

@@ -16,7 +16,7 @@ const MAX_EFFECTS: usize = 100;
 const MOST_COLUMNS: usize = 12;
 const MOST_SHAPES: usize = 3;
 /// Longest formula.
-const LONGEST: usize = 400;
+const MAX_FORMULA_CHARACTERS: usize = 400;
 
 /// An effect of a user's own: a torque linear in some coefficients, each with a formula in the motion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -129,7 +129,7 @@ pub(super) fn check(
         }
         for (name, formula) in &candidate.formulas {
             let at = ["candidate", index_text.as_str(), "formulas", name.as_str()];
-            if formula.len() > LONGEST {
+            if formula.len() > MAX_FORMULA_CHARACTERS {
                 return Err(document.value(&at, "is too long", "give at most 400 characters"));
             }
             let taken = candidate.shapes.contains_key(name);

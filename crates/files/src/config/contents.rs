@@ -25,7 +25,7 @@ pub struct Contents {
     estimate_covariance: usize,
     /// Joints whose residual is known.
     residual_std: Vec<String>,
-    /// Joints of which it keeps what one-joint logs told.
+    /// Joints of which it keeps the friction from one-joint logs.
     #[serde(default)]
     friction_prior: Vec<String>,
     /// Joints of which it keeps what was left of torques that were set aside.

@@ -1,5 +1,6 @@
 //! One TOML text, read with errors that name file, line and the way out.
 
+use cft_ident_core::explain::ErrorText;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -122,36 +123,33 @@ impl<'a> Document<'a> {
                 return ConfigError::Syntax {
                     file: self.file.to_owned(),
                     line,
-                    message: format!(
-                        "`{}` is no known value; {}",
-                        escape(name),
-                        nearest_or_all(name, known, "known values")
-                    ),
+                    problem: ErrorText::new(format!("`{}` is no known value", escape(name)))
+                        .remedy(nearest_or_all(name, known, "known values")),
                 };
             }
         }
         let message = escape_whole(&message);
-        let told = if let Some([name]) = message.strip_prefix("missing field").map(|_| &listed[..])
-        {
-            return ConfigError::MissingKey {
-                file: self.file.to_owned(),
-                line,
-                key: escape(name),
-                remedy: "it; the files in configs/ show how".to_owned(),
+        let problem =
+            if let Some([name]) = message.strip_prefix("missing field").map(|_| &listed[..]) {
+                return ConfigError::MissingKey {
+                    file: self.file.to_owned(),
+                    line,
+                    key: escape(name),
+                    remedy: "it; the files in configs/ show how".to_owned(),
+                };
+            } else if message == "duplicate key" {
+                let name = error.span().and_then(|span| self.text.get(span));
+                let name = escape(name.unwrap_or_default().trim());
+                ErrorText::new(format!("duplicate key `{name}`")).remedy("keep one of the two")
+            } else if message.starts_with("invalid type") || message.starts_with("wanted") {
+                ErrorText::new(message).remedy("give a value of that kind")
+            } else {
+                ErrorText::new(message).remedy("correct this line: `key = value`, text in quotes")
             };
-        } else if message == "duplicate key" {
-            let name = error.span().and_then(|span| self.text.get(span));
-            let name = escape(name.unwrap_or_default().trim());
-            format!("duplicate key `{name}`; keep one of the two")
-        } else if message.starts_with("invalid type") || message.starts_with("wanted") {
-            format!("{message}; give a value of that kind")
-        } else {
-            format!("{message}; correct this line: `key = value`, text in quotes")
-        };
         ConfigError::Syntax {
             file: self.file.to_owned(),
             line,
-            message: told,
+            problem,
         }
     }
 
@@ -184,8 +182,7 @@ impl<'a> Document<'a> {
         Some(text.trim())
     }
 
-    /// Goes along `path` as far as it exists; `seen` gets the spans of each key (of the value, in an
-    /// array) and value.
+    /// Goes along `path` as far as it exists; `seen` gets the spans of each key (of the value, in an array) and value.
     fn follow(&self, path: &[&str], mut seen: impl FnMut(Range<usize>, Range<usize>)) {
         let Ok(root) = DeTable::parse(self.text) else {
             return;

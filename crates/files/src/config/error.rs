@@ -1,12 +1,13 @@
 //! What can be wrong with a configuration file, and the way out.
 
+use cft_ident_core::explain::{ErrorText, Explain};
 use thiserror::Error;
 
 /// An error in a robot, model, trajectory or campaign file. Lines count from 1.
-#[derive(Debug, Error)]
+#[derive(Debug, Explain, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("{file}: cannot be read: {source}; {remedy}")]
+    #[explain("{file}: cannot be read: {source}", remedy)]
     Read {
         /// File as the user named it.
         file: String,
@@ -16,7 +17,7 @@ pub enum ConfigError {
         remedy: String,
     },
     /// A file of another kind.
-    #[error("{file}: is {found}, not {wanted}; {remedy}")]
+    #[explain("{file}: is {found}, not {wanted}", remedy)]
     Kind {
         /// File as the user named it.
         file: String,
@@ -28,17 +29,16 @@ pub enum ConfigError {
         remedy: String,
     },
     /// The text is no TOML, or a value has the wrong type.
-    #[error("{file}:{line}: {message}")]
+    #[explain(problem.clone().of(format!("{file}:{line}")))]
     Syntax {
         /// File as the user named it.
         file: String,
         /// Line.
         line: usize,
-        /// What the TOML reader says, on one line.
-        message: String,
+        problem: ErrorText,
     },
     /// A key that the file may not have.
-    #[error("{file}:{line}: unknown key `{key}`; {remedy}")]
+    #[explain("{file}:{line}: unknown key `{key}`", remedy)]
     UnknownKey {
         /// File as the user named it.
         file: String,
@@ -50,7 +50,7 @@ pub enum ConfigError {
         remedy: String,
     },
     /// A key that the file must have.
-    #[error("{file}:{line}: `{key}` is missing; add {remedy}")]
+    #[explain("{file}:{line}: `{key}` is missing", "add {remedy}")]
     MissingKey {
         /// File as the user named it.
         file: String,
@@ -62,7 +62,7 @@ pub enum ConfigError {
         remedy: String,
     },
     /// A key with a value that cannot be.
-    #[error("{file}:{line}: `{key}` {problem}; {remedy}")]
+    #[explain("{file}:{line}: `{key}` {problem}", remedy)]
     Value {
         /// File as the user named it.
         file: String,
@@ -76,7 +76,7 @@ pub enum ConfigError {
         remedy: String,
     },
     /// A model file that belongs to another robot.
-    #[error("{file}: the model is of another robot: {difference}; {remedy}")]
+    #[explain("{file}: the model is of another robot: {difference}", remedy)]
     OtherRobot {
         /// The model file.
         file: String,
@@ -86,7 +86,7 @@ pub enum ConfigError {
         remedy: String,
     },
     /// A model file without a parameter that its robot needs.
-    #[error("{file}: parameter `{name}` is missing; {remedy}")]
+    #[explain("{file}: parameter `{name}` is missing", remedy)]
     MissingParameter {
         /// The model file.
         file: String,

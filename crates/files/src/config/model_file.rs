@@ -288,9 +288,6 @@ impl ModelFile {
     }
 
     /// A parameter by name, of one joint or of none; `file` names the model in the error.
-    ///
-    /// # Errors
-    /// [`ConfigError::MissingParameter`].
     pub fn parameter(
         &self,
         file: &str,
@@ -332,9 +329,6 @@ impl ModelFile {
     }
 
     /// Double-tanh friction of one joint, eq. (18).
-    ///
-    /// # Errors
-    /// [`ConfigError::MissingParameter`].
     pub fn double_tanh(&self, file: &str, joint: &str) -> Result<DoubleTanh, ConfigError> {
         let mut values = [0.0; 5];
         for (value, name) in values.iter_mut().zip(DoubleTanh::NAMES) {
@@ -344,9 +338,6 @@ impl ModelFile {
     }
 
     /// Viscous and Coulomb friction of one joint.
-    ///
-    /// # Errors
-    /// [`ConfigError::MissingParameter`].
     pub fn viscous_coulomb(&self, file: &str, joint: &str) -> Result<ViscousCoulomb, ConfigError> {
         let value = |name| Ok(self.parameter(file, name, Some(joint))?.in_use());
         Ok(ViscousCoulomb {

@@ -186,7 +186,7 @@ impl ModelFile {
         let unwritable = |error: toml::ser::Error| ConfigError::Syntax {
             file: "model".to_owned(),
             line: 1,
-            message: format!("cannot be written: {error}"),
+            problem: format!("cannot be written: {error}").into(),
         };
         text.push_str("# What this file must hold, so that a part that is lost is noticed. Values may be edited.\n");
         let contents = BTreeMap::from([("contents", Contents::of(self))]);

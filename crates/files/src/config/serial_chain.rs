@@ -9,6 +9,7 @@ use super::robot_file::RobotSection;
 use super::serial_section::{
     BASE, CouplingSection, FollowsSection, LinkSection, MOST_LINKS, SineSection,
 };
+use cft_ident_core::explain::Explain;
 use cft_ident_core::robot::tree::space::{Rotation, Vector};
 use cft_ident_core::robot::tree::{
     Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError,
@@ -49,10 +50,6 @@ impl RobotSection {
     }
 
     /// The serial robot that the section describes.
-    ///
-    /// # Errors
-    /// What is wrong, the index of the link or coupling and the key where one can be named, and
-    /// what to do.
     pub(super) fn serial(&self) -> Result<Robot, Misfit> {
         let names = Names {
             links: self.link_names(),
@@ -123,9 +120,6 @@ impl RobotSection {
     }
 
     /// The robot of a section that was checked.
-    ///
-    /// # Panics
-    /// Where it was not: [`super::check`] lets no such file through.
     pub(super) fn checked_serial(&self) -> Robot {
         self.serial().expect("the robot section was checked")
     }
@@ -282,11 +276,12 @@ impl Misfit {
     }
 
     fn of_tree(error: &TreeError) -> Self {
-        let text = error.to_string();
-        let (problem, remedy) = text
-            .rsplit_once("; ")
-            .unwrap_or((&text, "correct [[robot.link]]"));
-        Self::of_robot(&format!("is \"serial\", but {problem}"), remedy)
+        let problem = error.explanation();
+        let remedy = problem.remedies.first().map(String::as_str);
+        Self::of_robot(
+            &format!("is \"serial\", but {}", problem.what),
+            remedy.unwrap_or("correct [[robot.link]]"),
+        )
     }
 }
 

@@ -11,8 +11,7 @@ use cft_ident_core::robot::standard::Body;
 /// Name of the frame that does not move.
 pub(super) const BASE: &str = "base";
 
-/// Most links that are gathered, of a URDF those that move; what a robot may have is fewer, and told by the
-/// chain.
+/// Most links that are gathered, of a URDF those that move; what a robot may have is fewer, and told by the chain.
 pub(super) const MOST_LINKS: usize = 200;
 
 /// A sine in a dependent coordinate: amplitude sin(phase + sum of `of`).

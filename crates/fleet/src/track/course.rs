@@ -105,13 +105,13 @@ struct Signal {
 
 impl Signal {
     fn of(estimates: &[LogEstimate]) -> Self {
-        let told =
+        let known =
             |e: &LogEstimate| e.variance.is_finite() && e.variance > 0.0 && e.value.is_finite();
         let mut variances: Vec<f64> = (estimates.iter())
-            .map(|e| if told(e) { e.variance } else { f64::INFINITY })
+            .map(|e| if known(e) { e.variance } else { f64::INFINITY })
             .collect();
         let values: Vec<f64> = (estimates.iter())
-            .map(|e| if told(e) { e.value } else { 0.0 })
+            .map(|e| if known(e) { e.value } else { 0.0 })
             .collect();
         let outliers = alone(&values, &variances);
         for k in &outliers {
@@ -173,23 +173,23 @@ fn spacings(times: &[f64]) -> Vec<f64> {
 /// Estimates that stand alone: far from the median of those before them and of those after them. So is a log in which the robot carried
 /// something; a change is one when as many logs show it as do not.
 fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
-    let told: Vec<usize> = (0..signal.len())
+    let known: Vec<usize> = (0..signal.len())
         .filter(|k| variances[*k].is_finite())
         .collect();
-    if told.len() < 2 * NEIGHBOURS + 1 {
+    if known.len() < 2 * NEIGHBOURS + 1 {
         return Vec::new();
     }
     let middle = |places: std::ops::Range<usize>, but: usize| {
         let others = places.filter(|p| *p != but);
-        median(others.map(|p| signal[told[p]])).unwrap_or_default()
+        median(others.map(|p| signal[known[p]])).unwrap_or_default()
     };
     // Beside a step those before and those after differ: what is like either does not stand alone.
     let off = |place: usize| {
         let (from, to) = (
             place.saturating_sub(NEIGHBOURS),
-            (place + NEIGHBOURS + 1).min(told.len()),
+            (place + NEIGHBOURS + 1).min(known.len()),
         );
-        let x = signal[told[place]];
+        let x = signal[known[place]];
         match place - from < 2 || to - place < 3 {
             true => x - middle(from..to, place),
             false => {
@@ -203,17 +203,17 @@ fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
             }
         }
     };
-    let off: Vec<f64> = (0..told.len()).map(off).collect();
+    let off: Vec<f64> = (0..known.len()).map(off).collect();
     let Some(scale) = median(off.iter().map(|x| x.abs())) else {
         return Vec::new();
     };
     let far = |place: usize| {
-        let std = (1.4826 * scale).max(variances[told[place]].sqrt());
+        let std = (1.4826 * scale).max(variances[known[place]].sqrt());
         off[place].abs() > OUTLIER_DEVIATIONS * std
     };
-    (0..told.len())
+    (0..known.len())
         .filter(|p| far(*p))
-        .map(|p| told[p])
+        .map(|p| known[p])
         .collect()
 }
 
@@ -254,13 +254,13 @@ mod tests {
 
     #[test]
     fn the_least_step_that_is_seen_is_told_in_about_one_course_of_two() {
-        let (mut told, mut sizes) = ([0; 3], Vec::new());
+        let (mut known, mut sizes) = ([0; 3], Vec::new());
         for seed in 0..60 {
             let least = follow(&course(seed, |_| 0.0), 1e-3).least_seen.unwrap();
             sizes.push(least);
-            for (told, times) in told.iter_mut().zip([0.5, 1.0, 1.6]) {
+            for (known, times) in known.iter_mut().zip([0.5, 1.0, 1.6]) {
                 let step = |k: usize| if k < 25 { 0.0 } else { times * least };
-                *told += u32::from(!follow(&course(seed, step), 1e-3).changes.is_empty());
+                *known += u32::from(!follow(&course(seed, step), 1e-3).changes.is_empty());
             }
         }
         // noise of 0.3 in 25 logs on each side: a mean difference has a deviation of 0.085, and one of 4.4 deviations
@@ -268,8 +268,8 @@ mod tests {
         sizes.sort_by(f64::total_cmp);
         assert!((0.3..0.5).contains(&sizes[30]), "{sizes:?}");
         assert!(
-            told[0] <= 6 && (18..=45).contains(&told[1]) && told[2] >= 54,
-            "{told:?}"
+            known[0] <= 6 && (18..=45).contains(&known[1]) && known[2] >= 54,
+            "{known:?}"
         );
         let few = course(0, |_| 0.0);
         assert_eq!(follow(&few[..11], 1e-3).least_seen, None);

@@ -79,7 +79,7 @@ impl Whitener {
     }
 
     /// Whether a log has an innovation.
-    pub(super) fn tells(&self, log: usize) -> bool {
+    pub(super) fn is_informative(&self, log: usize) -> bool {
         matches!(self.steps[log], Step::Innovation { .. })
     }
 
@@ -184,7 +184,7 @@ mod tests {
         let white = whitener.apply(&SIGNAL);
         let found: f64 = white.iter().map(|x| x * x).sum();
         assert!((found / square - 1.0).abs() < 1e-12, "{found} {square}");
-        let shown: Vec<usize> = (0..5).filter(|k| whitener.tells(*k)).collect();
+        let shown: Vec<usize> = (0..5).filter(|k| whitener.is_informative(*k)).collect();
         assert_eq!(shown, [1, 3, 4]);
         assert!((0..5).all(|k| shown.contains(&k) || white[k] == 0.0));
     }

@@ -60,7 +60,7 @@ pub(super) struct White<'a> {
 }
 
 impl<'a> White<'a> {
-    /// By the sizes of walk and scatter; `rests` are signals without changes, whose innovations tell how they go
+    /// By the sizes of walk and scatter; `rests` are signals without changes, whose innovations show how they go
     /// together.
     pub(super) fn new(about: About<'a>, sizes: &[Sizes], rests: &[Vec<f64>]) -> Self {
         let members = about.members.iter().zip(sizes);
@@ -129,7 +129,8 @@ impl<'a> White<'a> {
 /// Courses with an innovation at a log, as bits.
 fn mask(whiteners: &[Whitener], log: usize) -> u64 {
     let own = whiteners.iter().enumerate();
-    own.map(|(i, w)| u64::from(w.tells(log)) << i).sum()
+    own.map(|(i, w)| u64::from(w.is_informative(log)) << i)
+        .sum()
 }
 
 fn members_of(mask: u64, count: usize) -> impl Iterator<Item = usize> {
@@ -141,7 +142,10 @@ fn correlation(whiteners: &[Whitener], rests: &[Vec<f64>], fits: Option<&[f64]>)
     let count = whiteners.len();
     let clipped = |(own, rest): (&Whitener, &Vec<f64>)| {
         let white = own.apply(rest);
-        let known = white.iter().enumerate().filter(|(k, _)| own.tells(*k));
+        let known = white
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| own.is_informative(*k));
         let most = median(known.map(|(_, x)| x.abs())).unwrap_or_default();
         let most = (CLIPPED * 1.4826 * most).max(1e-12);
         white.iter().map(|x| x.clamp(-most, most)).collect()
@@ -151,7 +155,8 @@ fn correlation(whiteners: &[Whitener], rests: &[Vec<f64>], fits: Option<&[f64]>)
         if i == j {
             return 1.0;
         }
-        let both = (0..white[i].len()).filter(|k| whiteners[i].tells(*k) && whiteners[j].tells(*k));
+        let both = (0..white[i].len())
+            .filter(|k| whiteners[i].is_informative(*k) && whiteners[j].is_informative(*k));
         let (mut n, mut product, mut squares) = (0.0, 0.0, [0.0; 2]);
         for k in both {
             let (x, y) = (white[i][k], white[j][k]);

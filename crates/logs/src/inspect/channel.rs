@@ -1,4 +1,4 @@
-//! What the columns of a log are: told by the robot file, or guessed from their names.
+//! What the columns of a log are: named by the robot file, or guessed from their names.
 
 use super::words::{self, ChannelRole};
 

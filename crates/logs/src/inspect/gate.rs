@@ -10,11 +10,10 @@ use crate::log::{
     Block, Bridge, DeclaredChannels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
 };
 
-/// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven
-/// clock closes none.
-const WIDER: f64 = 1.1;
+/// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven clock closes none.
+const CUT_GAP_FACTOR: f64 = 1.1;
 /// Readings at most that look for what was hidden by what an earlier one found.
-const ROUNDS: usize = 4;
+const MAX_READINGS: usize = 4;
 
 /// What the first look at a log found.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -86,7 +85,7 @@ impl Gate {
         }
         // what is mended may have hidden more of its kind, and what goes along takes no number of it
         let (mut bridges, mut failed, mut mended) = (Vec::new(), Vec::new(), Vec::new());
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_READINGS {
             if found.bridges.is_empty() && found.failed.is_empty() {
                 break;
             }
@@ -189,7 +188,7 @@ impl Gate {
     /// Takes rows out of the log so that a step is left that parts it: one longer than `longest` has it for the
     /// median step \[s\].
     pub fn cutter(&self, longest: &dyn Fn(f64) -> f64) -> Cutter {
-        let gap = WIDER * longest(self.dt);
+        let gap = CUT_GAP_FACTOR * longest(self.dt);
         let widened = self.cuts.iter().map(|[from, to]| {
             let more = (0.5 * (gap - (to - from))).max(0.6 * self.dt);
             [from - more, to + more]

@@ -17,18 +17,18 @@ use super::words::ChannelRole;
 use crate::log::RowFault;
 
 /// A joint moves where it travels further than this share of what the farthest joint does.
-const TRAVELS: f64 = 0.02;
+const MIN_TRAVEL_SHARE: f64 = 0.02;
 
 /// Band in which noise is counted where none is declared \[Hz\].
-const BAND_HZ: f64 = 20.0;
+const NOISE_BAND_HZ: f64 = 20.0;
 /// Channels whose shape is looked at; of more only the numbers are.
 const SHAPED: usize = 512;
 /// Channels that are compared with each other.
 const COMPARED: usize = 64;
 
 /// What no drive warms up by within so short a time: 5 degC, 1 s.
-const LEAP: f64 = 5.0;
-const LEAP_S: f64 = 1.0;
+const TEMPERATURE_LEAP_DEGC: f64 = 5.0;
+const TEMPERATURE_LEAP_S: f64 = 1.0;
 
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,7 +172,7 @@ impl Track {
     /// Looks for a leap between two rows of a temperature.
     fn heat(&mut self, t: f64, value: f64, join: f64) {
         let height = (value - self.latest).abs();
-        if height > LEAP && t - self.before < LEAP_S {
+        if height > TEMPERATURE_LEAP_DEGC && t - self.before < TEMPERATURE_LEAP_S {
             self.leaps_of_heat.add(self.before, t, 1, join);
             self.highest = self.highest.max(height);
         }
@@ -285,7 +285,7 @@ impl LogJudge {
             fresh: Vec::new(),
             fresh_rows: FreshRows::new(positions.len()),
             keep: Vec::new(),
-            band_hz: BAND_HZ,
+            band_hz: NOISE_BAND_HZ,
             messages: false,
             failed: FailedReads::new(positions.len()),
             repeats: Repeats::new(positions.len(), others.len()),
@@ -309,7 +309,7 @@ impl LogJudge {
 
     /// The same, with the band that a fit keeps \[Hz\], where it is known.
     pub fn within(mut self, band_hz: Option<f64>) -> Self {
-        self.band_hz = band_hz.unwrap_or(BAND_HZ);
+        self.band_hz = band_hz.unwrap_or(NOISE_BAND_HZ);
         self
     }
 
@@ -424,6 +424,6 @@ impl LogJudge {
             .map(|index| self.tracks[*index].travel());
         let farthest = travels.fold(0.0, f64::max);
         let step = track.flat.steps.quantile_not_zero(0.05);
-        track.travel() > (30.0 * step).max(TRAVELS * farthest)
+        track.travel() > (30.0 * step).max(MIN_TRAVEL_SHARE * farthest)
     }
 }

@@ -9,9 +9,9 @@ use super::words::ChannelRole;
 use crate::log::{DelayEstimate, DelayEstimator};
 
 /// Stretches of the log that are looked at.
-const STRETCHES: usize = 8;
+const MAX_STRETCHES: usize = 8;
 /// A delay of fewer rows is none: the time of a torque is not known better than its row.
-const ROWS: f64 = 2.0;
+const MIN_DELAY_ROWS: f64 = 2.0;
 /// A shorter one is not reported without a model: what other joints do to a joint looks like one [s].
 const MIN_DELAY_S: f64 = 0.01;
 /// Deviations from 0 at which a delay is believed.
@@ -38,7 +38,7 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
         return;
     };
     if delay_s.abs()
-        < (ROWS * clock.dt)
+        < (MIN_DELAY_ROWS * clock.dt)
             .max(MIN_DEVIATIONS * std_s)
             .max(MIN_DELAY_S)
     {
@@ -57,7 +57,7 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
 fn delay(judge: &LogJudge, pairs: &[(usize, usize)]) -> Option<DelayEstimate> {
     let mut delay = DelayEstimator::default();
     let (mut q, mut tau) = (Vec::new(), Vec::new());
-    for window in judge.windows.spread(STRETCHES) {
+    for window in judge.windows.spread(MAX_STRETCHES) {
         delay.begin_stretch();
         for (row, t) in window.t.iter().enumerate() {
             q.clear();

@@ -10,15 +10,15 @@ use super::lag;
 use crate::log::escape;
 
 /// A model that is off by less, as a share of the torque's power, is not doubted.
-const DOUBT: f64 = 0.04;
+const MIN_MODEL_ERROR_SHARE: f64 = 0.04;
 /// A change must leave at most this share of what is left without it...
-const BETTER: f64 = 0.25;
+const MAX_SHARE_LEFT: f64 = 0.25;
 /// ... and explain more than half of the torque's power.
-const EXPLAINED: f64 = 0.5;
+const MIN_EXPLAINED_SHARE: f64 = 0.5;
 /// A delay of fewer rows of the log is none...
-const DELAY_ROWS: f64 = 2.0;
+const MIN_DELAY_ROWS: f64 = 2.0;
 /// ... nor is one that explains a smaller share of what the model leaves.
-const DELAY_EXPLAINS: f64 = 0.5;
+const MIN_SHARE_BY_DELAY: f64 = 0.5;
 
 /// What may be wrong with the order and signs of joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,7 +166,7 @@ impl OrderComparison {
                 all += 1.0;
             }
         }
-        if delay.abs() < DELAY_ROWS * dt || explained < DELAY_EXPLAINS * all {
+        if delay.abs() < MIN_DELAY_ROWS * dt || explained < MIN_SHARE_BY_DELAY * all {
             return None;
         }
         let side = if delay > 0.0 { "behind" } else { "ahead of" };
@@ -220,7 +220,10 @@ impl OrderComparison {
             }
         }
         let (left, change, what) = best;
-        if as_logged < DOUBT || left > BETTER * as_logged || left > EXPLAINED {
+        if as_logged < MIN_MODEL_ERROR_SHARE
+            || left > MAX_SHARE_LEFT * as_logged
+            || left > MIN_EXPLAINED_SHARE
+        {
             return None;
         }
         let name = |joint: usize| {

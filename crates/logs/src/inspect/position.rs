@@ -11,27 +11,27 @@ use super::words::ChannelRole;
 use cft_ident_core::number;
 
 /// Steps of an encoder that a leap has at least: rounding four rows makes two at most.
-const GRAINS: f64 = 4.0;
+const MIN_LEAP_STEPS: f64 = 4.0;
 /// A drive that accelerates as much as it can may turn its torque round from one row to the next,
 /// and within a row it may reach twice what it has on average over the time in which accelerations
 /// are formed.
-const DRIVE: f64 = 4.0;
+const DRIVE_FACTOR: f64 = 4.0;
 /// What is off by so many times what nearly all rows are is no acceleration of the motion.
-const EVENT: f64 = 3.0;
+const EVENT_FACTOR: f64 = 3.0;
 /// Leaps of several joints at one time are one event: within so many steps.
-const TOGETHER: f64 = 1.5;
+const SAME_EVENT_STEPS: f64 = 1.5;
 
 /// Leap of a position from one row to the next that its drive could make, by the accelerations of
 /// this log in which no event took part [unit of the channel].
 pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
-    DRIVE * acceleration(track) * clock.dt * clock.dt
+    DRIVE_FACTOR * acceleration(track) * clock.dt * clock.dt
 }
 
 /// The largest acceleration in which no leap and no spike took part.
 fn acceleration(track: &Track) -> f64 {
     let usual = track.spikes.usual(track.deviation());
     let spikes = track.spikes.found().iter();
-    let spikes = spikes.filter(|spike| spike.height.abs() > EVENT * usual);
+    let spikes = spikes.filter(|spike| spike.height.abs() > EVENT_FACTOR * usual);
     let spikes = spikes.map(|spike| spike.t);
     let leaps = track.leaps.found().iter().map(|leap| leap.at);
     let events: Vec<f64> = spikes.chain(leaps).collect();
@@ -43,17 +43,16 @@ fn acceleration(track: &Track) -> f64 {
 /// least height that is, for one in a step of the clock.
 fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
     let grain = track.flat.steps.quantile_not_zero(0.0);
-    let noise = track.leaps.unusual(track.rows).max(GRAINS * grain);
+    let noise = track.leaps.unusual(track.rows).max(MIN_LEAP_STEPS * grain);
     let acceleration = acceleration(track);
     // Rows that were left out leave the drive more time.
-    let least = |step: f64| noise.max(DRIVE * acceleration * step * step);
+    let least = |step: f64| noise.max(DRIVE_FACTOR * acceleration * step * step);
     let high = |leap: &&Leap| leap.height.abs() > least(leap.at - leap.before);
     let found = track.leaps.found().iter().filter(high).copied();
     (found.collect(), least(clock.dt))
 }
 
-/// Tells the leaps of a position, where it is not `told` of already, and parts the log there; they are
-/// told then, `reach` about each [s].
+/// Reports the leaps of a position that are not reported yet, `reach` about each [s], and parts the log there.
 pub(super) fn leaps(
     judge: &LogJudge,
     place: usize,
@@ -123,11 +122,11 @@ pub(super) fn leaps(
     draft.cut(FaultKind::PositionStep, name, &episodes);
 }
 
-/// Tells a position that leaps to and fro in so many rows that none of them is a spike among others: what nearly all
+/// Reports a position that leaps to and fro in so many rows that none of them is a spike among others: what nearly all
 /// rows differ from their neighbours is more than a spike must have, and the steps between rows are noise and no motion.
 pub(super) fn erratic(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     let grain = track.flat.steps.quantile_not_zero(0.0);
-    let height = (SPIKE_SHARE * track.deviation()).max(GRAINS * grain);
+    let height = (SPIKE_SHARE * track.deviation()).max(MIN_LEAP_STEPS * grain);
     let hidden = track.spikes.nearly_all() > height && track.spikes.goes_to_and_fro();
     // a joint at rest shows its noise, and no two sources
     if !hidden || !(judge.moves(track) || track.spikes.alternates()) {
@@ -159,7 +158,7 @@ fn with_it(judge: &LogJudge, place: usize, t: f64, clock: &ClockFacts) -> Vec<St
         let (found, _) = unusual(track, clock);
         found
             .iter()
-            .any(|leap| (leap.at - t).abs() < TOGETHER * clock.dt)
+            .any(|leap| (leap.at - t).abs() < SAME_EVENT_STEPS * clock.dt)
     };
     others
         .map(|other| &judge.tracks[*other])
@@ -168,7 +167,7 @@ fn with_it(judge: &LogJudge, place: usize, t: f64, clock: &ClockFacts) -> Vec<St
         .collect()
 }
 
-/// Tells a position that begins anew, and whether it does.
+/// Reports a position that begins anew, and whether it does.
 pub(super) fn wrapped(judge: &LogJudge, place: usize, draft: &mut FaultList) -> bool {
     let track = &judge.tracks[place];
     if track.channel.role != ChannelRole::Position {

@@ -15,17 +15,17 @@ use super::words::ChannelRole;
 /// Rows of one value from which a channel may be stuck.
 const STUCK_ROWS: u64 = 10;
 /// An edge is abrupt where its step is so many times the usual bends of the channel...
-const ABRUPT: f64 = 6.0;
+const ABRUPT_BENDS: f64 = 6.0;
 /// ... and so many times its smallest usual step.
-const GRAINS: f64 = 4.0;
+const ABRUPT_STEPS: f64 = 4.0;
 /// Smallest usual steps that a joint goes from row to row where it moves.
 const MIN_STEPS_IN_MOTION: f64 = 3.0;
 /// Levels over its range from which a channel's grain is not worth a word.
-const FINE: f64 = 4096.0;
+const FINE_LEVELS: f64 = 4096.0;
 /// Acceleration noise by the grain of a position, over the acceleration, that spoils a fit.
-const COARSE: f64 = 0.1;
+const COARSE_ACCELERATION_SHARE: f64 = 0.1;
 /// Grain of a torque over its deviation that spoils a fit.
-const COARSE_TORQUE: f64 = 0.1;
+const COARSE_TORQUE_SHARE: f64 = 0.1;
 
 /// The faults of one channel.
 pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
@@ -54,7 +54,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     flat.tops.retain(|run| !stalled(run));
     flat.stuck.retain(|run| !stalled(run));
     flat.off(place, draft);
-    flat.tell(track, draft);
+    flat.report(track, draft);
     // Where a channel leaps out of a flat stretch it is reported already.
     let reach = 5.5 * clock.dt;
     let mut shown: Vec<[f64; 2]> = (flat.tops.iter().chain(&flat.stuck))
@@ -176,7 +176,7 @@ impl<'a> Flatness<'a> {
         });
         Self {
             track,
-            abrupt: (ABRUPT * bends).max(GRAINS * grain),
+            abrupt: (ABRUPT_BENDS * bends).max(ABRUPT_STEPS * grain),
             slow: MIN_STEPS_IN_MOTION * grain,
             leaps: match track.channel.role {
                 ChannelRole::Position => position::places(track, clock),
@@ -274,7 +274,7 @@ impl<'a> Flatness<'a> {
         draft.stretches(FaultKind::MotorOff, Info, name, &episodes, &effect, remedy);
     }
 
-    fn tell(&self, track: &Track, draft: &mut FaultList) {
+    fn report(&self, track: &Track, draft: &mut FaultList) {
         let name = Some(track.channel.name.as_str());
         let role = track.channel.role;
         let used = matches!(role, ChannelRole::Position | ChannelRole::Torque);
@@ -322,7 +322,7 @@ impl<'a> Flatness<'a> {
         };
         let severity = if used { Warning } else { Info };
         let of_tops = if applied { Info } else { severity };
-        // Told as reaching the limit of the robot file where that is known.
+        // Reported as reaching the limit of the robot file where that is known.
         if track.at_limit.is_empty() {
             draft.stretches(kind, of_tops, name, &tops, &effect, remedy);
         }
@@ -367,7 +367,7 @@ fn spikes(
     };
     let grain = track.flat.steps.quantile_not_zero(0.05);
     let least = (SPIKE * usual)
-        .max(GRAINS * grain)
+        .max(ABRUPT_STEPS * grain)
         .max(match track.channel.role {
             // A row that is off makes twice its height of the second difference.
             ChannelRole::Position => 0.5 * position::drive(track, clock),
@@ -450,7 +450,7 @@ fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut Fault
             let w = std::f64::consts::TAU * band;
             let noise = step * (clock.dt * band / 30.0).sqrt() * w * w;
             let share = noise / excitation.acceleration_rms();
-            if share > COARSE {
+            if share > COARSE_ACCELERATION_SHARE {
                 let effect = format!(
                     "steps of {step:.3e}: below {band} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",
                     100.0 * share
@@ -459,7 +459,7 @@ fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut Fault
                 return;
             }
         }
-        (ChannelRole::Torque, _) if step > COARSE_TORQUE * track.deviation() => {
+        (ChannelRole::Torque, _) if step > COARSE_TORQUE_SHARE * track.deviation() => {
             let effect = format!(
                 "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters cannot be identified from it",
                 100.0 * step / track.deviation()
@@ -469,7 +469,7 @@ fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut Fault
         }
         _ => {}
     }
-    if levels < FINE {
+    if levels < FINE_LEVELS {
         let effect = format!(
             "steps of {step:.3e}, {levels:.0} levels over the range: a fit averages them out"
         );

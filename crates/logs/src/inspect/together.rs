@@ -15,12 +15,12 @@ use std::f64::consts::{PI, TAU};
 /// A velocity that lags by more rows is filtered.
 const LAG_ROWS: f64 = 1.5;
 /// What the lag must explain: the part of the velocity left over without it, over that with it.
-const EXPLAINED: f64 = 1.3;
+const MIN_IMPROVEMENT_BY_LAG: f64 = 1.3;
 /// Correlation from which on a velocity follows a position, and the share by which it may be off as filters make it.
-const FOLLOWS: f64 = 0.95;
-const OFF: f64 = 0.1;
+const MIN_CORRELATION: f64 = 0.95;
+const SCALE_TOLERANCE: f64 = 0.1;
 /// Noise over range below which a position is no measurement.
-const NOISELESS: f64 = 1e-8;
+const NOISELESS_SHARE_OF_RANGE: f64 = 1e-8;
 
 /// The faults between channels.
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
@@ -221,7 +221,7 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             other_joint(judge, (index, position), draft);
             continue;
         }
-        if found.best > FOLLOWS && (found.times - 1.0).abs() > OFF {
+        if found.best > MIN_CORRELATION && (found.times - 1.0).abs() > SCALE_TOLERANCE {
             let cause = match named_ratio(found.times) {
                 Some(units) => format!("{units}, or the clock of the log"),
                 None => "its unit or gear is another, or the clock of the log".to_owned(),
@@ -235,7 +235,9 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             draft.whole(Warning, FaultKind::WrongSignOrOrder, track, effect, remedy);
         }
         let left = |correlation: f64| 1.0 - correlation * correlation;
-        if found.rows.abs() > LAG_ROWS && left(found.now) > EXPLAINED * left(found.best) {
+        if found.rows.abs() > LAG_ROWS
+            && left(found.now) > MIN_IMPROVEMENT_BY_LAG * left(found.best)
+        {
             let side = if found.rows > 0.0 {
                 "behind"
             } else {
@@ -263,14 +265,14 @@ fn named_ratio(times: f64) -> Option<&'static str> {
     ];
     let off = |(ratio, _): &(f64, &str)| (times / ratio).ln().abs();
     let nearest = RATIOS.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
-    (off(nearest) < OFF).then_some(nearest.1)
+    (off(nearest) < SCALE_TOLERANCE).then_some(nearest.1)
 }
 
 /// Names the joint whose velocity a channel really is.
 fn other_joint(judge: &LogJudge, (index, own): (usize, usize), draft: &mut FaultList) {
     let follows = |position: &&usize| {
         let found = velocity::follows(judge.windows.iter(), **position, index);
-        **position != own && found.is_some_and(|found| found.best.abs() > FOLLOWS)
+        **position != own && found.is_some_and(|found| found.best.abs() > MIN_CORRELATION)
     };
     let Some(other) = judge.positions.iter().find(follows) else {
         return;
@@ -298,7 +300,7 @@ fn noiseless(judge: &LogJudge, draft: &mut FaultList) {
             fault.kind == FaultKind::CommandAsMeasurement
                 && fault.channel.as_ref() == Some(&track.channel.name)
         });
-        if shown || noise.is_none_or(|noise| noise > NOISELESS * track.travel()) {
+        if shown || noise.is_none_or(|noise| noise > NOISELESS_SHARE_OF_RANGE * track.travel()) {
             continue;
         }
         let effect = "has neither noise nor the step of an encoder: it was filtered or computed, or it is a command, in which case a fit takes tracking errors for forces".to_owned();

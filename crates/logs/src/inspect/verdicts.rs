@@ -13,9 +13,9 @@ use super::{shape, together};
 use crate::log::round_within;
 
 /// Steps off the median by more than a tenth, as a share of all, from which a clock is irregular.
-const UNEVEN: f64 = 0.05;
+const UNEVEN_STEPS_SHARE: f64 = 0.05;
 /// Jitter from which it is worth knowing.
-const JITTER: f64 = 0.02;
+const JITTER_SHARE: f64 = 0.02;
 
 impl LogJudge {
     /// What there is to say about the log.
@@ -266,8 +266,12 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
         remedy,
     );
     gap_faults(clock, draft);
-    if clock.uneven > UNEVEN || clock.jitter > JITTER {
-        let severity = if clock.uneven > UNEVEN { Warning } else { Info };
+    if clock.uneven > UNEVEN_STEPS_SHARE || clock.jitter > JITTER_SHARE {
+        let severity = if clock.uneven > UNEVEN_STEPS_SHARE {
+            Warning
+        } else {
+            Info
+        };
         let effect = format!(
             "steps from {} to {}, median {}, {:.1} % of them off it by more than a tenth: samples are interpolated onto an even clock, which is right as far as the times are those of the measurements",
             seconds(clock.least),

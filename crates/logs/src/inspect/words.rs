@@ -42,8 +42,7 @@ impl Word {
     }
 }
 
-/// Whether a capital with what follows it begins a word of its own: `Pos` in `AIPos`, `In` in `qIn`; not `Nm`
-/// in `mNm`.
+/// Whether a capital with what follows it begins a word of its own: `Pos` in `AIPos`, `In` in `qIn`; not `Nm` in `mNm`.
 fn begins_word(rest: &str) -> bool {
     let mut letters = rest.chars();
     let first = letters.next().is_some_and(char::is_uppercase);
@@ -93,171 +92,33 @@ pub fn words(name: &str) -> Vec<Word> {
 
 /// Words that make a command of whatever they stand in; the arm that leads another one is no measurement
 /// of the arm that follows.
-const COMMANDS: [&str; 25] = [
-    "ref",
-    "refs",
-    "reference",
-    "cmd",
-    "cmds",
-    "command",
-    "commands",
-    "commanded",
-    "des",
-    "desired",
-    "target",
-    "setpoint",
-    "goal",
-    "wanted",
-    "sp",
-    "leader",
-    "master",
-    "operator",
-    "teleop",
-    "action",
-    "ctrl",
-    "soll",
-    "sollwert",
-    "setp",
-    "demand",
-];
+const COMMANDS: &str = "\
+    ref refs reference cmd cmds command commands commanded des desired target setpoint goal \
+    wanted sp leader master operator teleop action ctrl soll sollwert setp demand";
 
 /// Words of what is about a channel and no channel itself.
-const ASIDE: [&str; 27] = [
-    "error",
-    "err",
-    "errors",
-    "deviation",
-    "limit",
-    "limits",
-    "max",
-    "min",
-    "std",
-    "var",
-    "variance",
-    "temp",
-    "temperature",
-    "status",
-    "flag",
-    "fault",
-    "warning",
-    "enabled",
-    "mode",
-    "gain",
-    "kp",
-    "kd",
-    "counter",
-    "id",
-    "power",
-    "energy",
-    "stiffness",
-];
+const ASIDE: &str = "\
+    error err errors deviation limit limits max min std var variance temp temperature status \
+    flag fault warning enabled mode gain kp kd counter id power energy stiffness";
 
-const ACCELERATIONS: [&str; 9] = [
-    "acceleration",
-    "accelerations",
-    "accel",
-    "acc",
-    "ddq",
-    "qdd",
-    "qddot",
-    "ddtheta",
-    "qacc",
-];
-const VELOCITIES: [&str; 18] = [
-    "velocity",
-    "velocities",
-    "vel",
-    "vels",
-    "speed",
-    "speeds",
-    "omega",
-    "dq",
-    "qd",
-    "qdot",
-    "dtheta",
-    "thetadot",
-    "thetad",
-    "jvel",
-    "rpm",
-    "qvel",
-    "spd",
-    "geschwindigkeit",
-];
-const POSITIONS: [&str; 27] = [
-    "position",
-    "positions",
-    "pos",
-    "angle",
-    "angles",
-    "ang",
-    "q",
-    "theta",
-    "thetas",
-    "jpos",
-    "encoder",
-    "enc",
-    "posn",
-    "winkel",
-    "poz",
-    "qpos",
-    "stroke",
-    "strokes",
-    "extension",
-    "extensions",
-    "travel",
-    "displacement",
-    "elongation",
-    "hub",
-    "weg",
-    "lage",
-    "fbpos",
-];
-const TORQUES: [&str; 21] = [
-    "jtrq",
-    "torque",
-    "torques",
-    "effort",
-    "efforts",
-    "force",
-    "forces",
-    "tau",
-    "taus",
-    "moment",
-    "moments",
-    "trq",
-    "tq",
-    "mom",
-    "jtau",
-    "qfrc",
-    "frc",
-    "kraft",
-    "drehmoment",
-    "jnttrq",
-    "trqs",
-];
+const ACCELERATIONS: &str = "acceleration accelerations accel acc ddq qdd qddot ddtheta qacc";
+const VELOCITIES: &str = "\
+    velocity velocities vel vels speed speeds omega dq qd qdot dtheta thetadot thetad jvel rpm \
+    qvel spd geschwindigkeit";
+const POSITIONS: &str = "\
+    position positions pos angle angles ang q theta thetas jpos encoder enc posn winkel poz qpos \
+    stroke strokes extension extensions travel displacement elongation hub weg lage fbpos";
+const TORQUES: &str = "\
+    jtrq torque torques effort efforts force forces tau taus moment moments trq tq mom jtau qfrc \
+    frc kraft drehmoment jnttrq trqs";
 /// What makes torques; `current` is an adjective where another of these words stands beside it.
-const CURRENTS: [&str; 14] = [
-    "current", "currents", "curr", "cur", "iq", "amps", "amp", "ampere", "strom", "voltage",
-    "voltages", "volts", "volt", "spannung",
-];
-const VOLTAGES: [&str; 5] = ["voltage", "voltages", "volts", "volt", "spannung"];
+const CURRENTS: &str = "\
+    current currents curr cur iq amps amp ampere strom voltage voltages volts volt spannung";
+const VOLTAGES: &str = "voltage voltages volts volt spannung";
 /// Words of what slides.
-const SLIDING: [&str; 14] = [
-    "stroke",
-    "strokes",
-    "extension",
-    "extensions",
-    "travel",
-    "displacement",
-    "elongation",
-    "hub",
-    "weg",
-    "force",
-    "forces",
-    "kraft",
-    "slide",
-    "rail",
-];
+const SLIDING: &str = "\
+    stroke strokes extension extensions travel displacement elongation hub weg force forces \
+    kraft slide rail";
 
 /// What makes a torque, as words name it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -272,11 +133,11 @@ pub enum NamedDrive {
 
 /// What words call a torque channel. `current` before a torque is an adjective, behind it a noun.
 pub fn drive(words: &[Word]) -> NamedDrive {
-    let last = |known: &[&str]| words.iter().rposition(|word| known.contains(&&*word.text));
-    let (torque, current) = (last(&TORQUES), last(&CURRENTS));
+    let last = |known: &str| words.iter().rposition(|word| lists(known, &word.text));
+    let (torque, current) = (last(TORQUES), last(CURRENTS));
     match (torque, current) {
         (torque, Some(current)) if torque.is_none_or(|torque| torque < current) => {
-            match VOLTAGES.contains(&&*words[current].text) {
+            match lists(VOLTAGES, &words[current].text) {
                 true => NamedDrive::Voltage,
                 false => NamedDrive::Current,
             }
@@ -292,32 +153,37 @@ pub fn drive(words: &[Word]) -> NamedDrive {
 
 /// Whether words are of a joint that slides.
 pub fn slides(words: &[Word]) -> bool {
-    has(words, &SLIDING) && !has(words, &["actuator"])
+    has(words, SLIDING) && !has(words, "actuator")
 }
 
-fn has(words: &[Word], known: &[&str]) -> bool {
-    words.iter().any(|word| known.contains(&word.text.as_str()))
+fn lists(known: &str, word: &str) -> bool {
+    known.split_whitespace().any(|one| one == word)
+}
+
+/// Whether one of these words is in a list, whose words are parted by spaces.
+pub fn has(words: &[Word], known: &str) -> bool {
+    words.iter().any(|word| lists(known, &word.text))
 }
 
 /// Whether words name what was commanded: `q_ref`, `target`, `q_d` of a desired one, a leader's.
 pub fn is_command(words: &[Word]) -> bool {
     let desired = |pair: &[Word]| {
         let of = &pair[0].text;
-        let short = [&POSITIONS[..], &VELOCITIES, &TORQUES].concat();
-        pair[1].text == "d" && (short.contains(&of.as_str()) || of == "j")
+        let short = [POSITIONS, VELOCITIES, TORQUES, "j"];
+        pair[1].text == "d" && short.iter().any(|known| lists(known, of))
     };
     // mc_rtc has qIn and qOut, KUKA's sensor interface AIPos and ASPos
     let out = |pair: &[Word]| match &*pair[1].text {
-        "out" => ["q", "alpha", "tau", "pos", "vel"].contains(&&*pair[0].text),
+        "out" => lists("q alpha tau pos vel", &pair[0].text),
         "pos" => pair[0].text == "as",
         _ => false,
     };
-    has(words, &COMMANDS) || words.windows(2).any(|pair| desired(pair) || out(pair))
+    has(words, COMMANDS) || words.windows(2).any(|pair| desired(pair) || out(pair))
 }
 
 /// Whether words are of what is about a channel and no channel itself.
 pub fn is_aside(words: &[Word]) -> bool {
-    has(words, &ASIDE)
+    has(words, ASIDE)
 }
 
 /// What words say a channel holds, whether or not it was commanded; `None` where nothing.
@@ -325,90 +191,36 @@ pub fn role(words: &[Word]) -> Option<ChannelRole> {
     if is_aside(words) {
         return Some(ChannelRole::Other);
     }
-    if has(words, &ACCELERATIONS) || has(words, &["ddot"]) {
+    if has(words, ACCELERATIONS) || has(words, "ddot") {
         return Some(ChannelRole::Acceleration);
     }
-    let alpha = |pair: &[Word]| pair[0].text == "alpha" && ["in", "out"].contains(&&*pair[1].text);
-    if has(words, &VELOCITIES) || has(words, &["dot"]) || words.windows(2).any(alpha) {
+    let alpha = |pair: &[Word]| pair[0].text == "alpha" && lists("in out", &pair[1].text);
+    if has(words, VELOCITIES) || has(words, "dot") || words.windows(2).any(alpha) {
         return Some(ChannelRole::Velocity);
     }
     // tau_q1 is the torque of q1
     let short = |word: &Word| word.text == "q";
-    let position = words
-        .iter()
-        .any(|w| !short(w) && POSITIONS.contains(&&*w.text));
+    let position = words.iter().any(|w| !short(w) && lists(POSITIONS, &w.text));
     // a dataset of LeRobot calls positions the observed state
     let observed = |pair: &[Word]| pair[0].text == "observation" && pair[1].text == "state";
     match (
         position || words.windows(2).any(observed),
-        has(words, &TORQUES),
+        has(words, TORQUES),
     ) {
         (true, _) => Some(ChannelRole::Position),
         (_, true) => Some(ChannelRole::Torque),
         _ if words.iter().any(short) => Some(ChannelRole::Position),
-        _ if has(words, &CURRENTS) => Some(ChannelRole::Torque),
+        _ if has(words, CURRENTS) => Some(ChannelRole::Torque),
         _ => None,
     }
 }
 
-/// Words that tell no joint from another: how it was measured, in which unit.
-const NOISE: [&str; 55] = [
-    "act",
-    "actual",
-    "meas",
-    "measured",
-    "msr",
-    "state",
-    "states",
-    "deg",
-    "degs",
-    "degree",
-    "degrees",
-    "rad",
-    "rads",
-    "nm",
-    "mnm",
-    "knm",
-    "ncm",
-    "kn",
-    "n",
-    "mm",
-    "cm",
-    "m",
-    "per",
-    "s",
-    "percent",
-    "pct",
-    "feedback",
-    "fbk",
-    "fb",
-    "current",
-    "the",
-    "of",
-    "value",
-    "data",
-    "sensor",
-    "ist",
-    "in",
-    "out",
-    "alpha",
-    "ai",
-    "ma",
-    "jnt",
-    "actuator",
-    "counts",
-    "count",
-    "ticks",
-    "turn",
-    "turns",
-    "rev",
-    "revs",
-    "revolutions",
-    "mrad",
-    "milliamps",
-    "newton",
-    "amperes",
-];
+/// Words that distinguish no joint from another: how it was measured, in which unit.
+const NOISE: &str = "\
+    act actual meas measured msr state states deg degs degree degrees rad rads nm mnm knm ncm kn \
+    n mm cm m per s percent pct feedback fbk fb current the of value data sensor ist in out \
+    alpha ai ma jnt actuator counts count ticks turn turns rev revs revolutions mrad milliamps \
+    newton amperes";
 
 /// A name without the words of a joint, where it has them in a row.
 pub fn without_joint(name: &str, joint: &str) -> String {
@@ -424,14 +236,12 @@ pub fn without_joint(name: &str, joint: &str) -> String {
 /// The signs of a name without the words of units, `#` kept: columns that differ in their units alone look the
 /// same.
 pub fn without_units(name: &str) -> String {
-    const UNITS: [&str; 26] = [
-        "deg", "degs", "degree", "degrees", "rad", "rads", "mrad", "m", "mm", "cm", "nm", "mnm",
-        "knm", "ncm", "n", "kn", "a", "v", "ma", "rpm", "per", "s", "turns", "counts", "percent",
-        "pct",
-    ];
+    const UNITS: &str = "\
+        deg degs degree degrees rad rads mrad m mm cm nm mnm knm ncm n kn a v ma rpm per s turns \
+        counts percent pct";
     let part = |part: &str| -> Vec<String> {
         let spoken = words(part).into_iter().map(|word| word.text);
-        spoken.filter(|word| !UNITS.contains(&&**word)).collect()
+        spoken.filter(|word| !lists(UNITS, word)).collect()
     };
     let parts: Vec<String> = name.split('#').map(|one| part(one).join("_")).collect();
     parts.join("#")
@@ -439,21 +249,15 @@ pub fn without_units(name: &str) -> String {
 
 /// What is left of a name when the words of its role and of its unit are taken out: the joint.
 pub fn joint(words: &[Word]) -> String {
-    let said = [
-        &ACCELERATIONS[..],
-        &VELOCITIES,
-        &POSITIONS,
-        &TORQUES,
-        &CURRENTS,
-        &NOISE,
-        &["dot", "ddot"],
-    ]
-    .concat();
+    let of_role = [ACCELERATIONS, VELOCITIES, POSITIONS, TORQUES, CURRENTS];
+    let said = |word: &str| {
+        lists(NOISE, word) || lists("dot ddot", word) || of_role.iter().any(|of| lists(of, word))
+    };
     let text = |k: usize| words.get(k).map_or("", |word| word.text.as_str());
     let left = (0..words.len()).filter(|k| {
         // joint_states is the name of a topic
-        let of_topic = text(*k) == "joint" && ["state", "states"].contains(&text(k + 1));
-        !of_topic && !said.contains(&text(*k))
+        let of_topic = text(*k) == "joint" && lists("state states", text(k + 1));
+        !of_topic && !said(text(*k))
     });
     let left: Vec<&str> = left.map(text).collect();
     left.join("_")

@@ -80,17 +80,11 @@ impl Read for RawBytes {
 
 impl Content {
     /// Opens a log and looks at its first bytes.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         Self::open_with(path, &[])
     }
 
     /// Opens a table that goes on in other files.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub(super) fn open_with(path: &Path, more: &[PathBuf]) -> Result<Self, LogError> {
         let fail = |error| source::failed(path, error);
         let file = source::open(path)?;
@@ -170,9 +164,6 @@ impl Content {
     }
 
     /// Text that arrives while it is read: no more of it is waited for than its first two lines.
-    ///
-    /// # Errors
-    /// A stream that cannot be read.
     pub(super) fn of_stream(path: &Path, stream: Box<dyn Read + Send>) -> Result<Self, LogError> {
         let watch = Watch::default();
         let mut rest = Stream::new(stream, watch.clone());

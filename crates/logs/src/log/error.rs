@@ -1,40 +1,44 @@
 //! What can be wrong with a log, and the way out. Lines count from 1; names from files are escaped.
 
+use cft_ident_core::explain::Explain;
 use thiserror::Error;
 
 /// An error in a log or in the way it was asked for.
 ///
 /// Files and folders are shown as the user named them; `at` is a file with the line or the message in
 /// it, `line` counts from 1, a `remedy` says what to do.
-#[derive(Debug, Error)]
+#[derive(Debug, Explain, Error)]
 pub enum LogError {
     /// A span that makes no sense.
-    #[error(
-        "`{spec}`: the span after @ cannot be used: {reason}; write FILE@0..70% or FILE@15.2..23s"
+    #[explain(
+        "`{spec}`: the span after @ cannot be used: {reason}",
+        "write FILE@0..70% or FILE@15.2..23s"
     )]
     Span { spec: String, reason: &'static str },
     /// The system cannot read the file.
-    #[error("{file}: cannot be read: {source}; {remedy}")]
+    #[explain("{file}: cannot be read: {source}", remedy)]
     Read {
         file: String,
         source: std::io::Error,
         remedy: String,
     },
     /// The file is of a kind that is not read.
-    #[error("{file}: is {kind}; {remedy}")]
+    #[explain("{file}: is {kind}", remedy)]
     Format {
         file: String,
         kind: &'static str,
         remedy: &'static str,
     },
     /// Arrays or a Parquet file that are no table of numbers.
-    #[error(
-        "{file}: cannot be read: {problem}; copy it again from where it was recorded, or write it as CSV, a column for each channel"
+    #[explain(
+        "{file}: cannot be read: {problem}",
+        "copy it again from where it was recorded, or write it as CSV, a column for each channel"
     )]
     Table { file: String, problem: String },
     /// A part of a recording that is not what was written.
-    #[error(
-        "{file}: {part} is damaged: its checksum is {calculated:08x}, not {saved:08x}; copy the file again from where it was recorded, or use the part before it: FILE@0..10s"
+    #[explain(
+        "{file}: {part} is damaged: its checksum is {calculated:08x}, not {saved:08x}",
+        "copy the file again from where it was recorded, or use the part before it: FILE@0..10s"
     )]
     Damaged {
         file: String,
@@ -45,41 +49,49 @@ pub enum LogError {
         calculated: u32,
     },
     /// A database that is no recording, or that cannot be read.
-    #[error(
-        "{file}: is no rosbag2 database that can be read: {reason}; check it with `ros2 bag info`"
+    #[explain(
+        "{file}: is no rosbag2 database that can be read: {reason}",
+        "check it with `ros2 bag info`"
     )]
     Database { file: String, reason: String },
     /// A folder that is no recording.
-    #[error(
-        "{folder}: {problem}; name a file inside this folder, or the folder of one rosbag2 recording"
+    #[explain(
+        "{folder}: {problem}",
+        "name a file inside this folder, or the folder of one rosbag2 recording"
     )]
     Folder {
         folder: String,
         problem: &'static str,
     },
     /// A recording without messages that hold the robot's channels.
-    #[error("{file}: {problem}; {remedy}")]
+    #[explain("{file}: {problem}", remedy)]
     Topic {
         file: String,
         problem: String,
         remedy: String,
     },
     /// No header line.
-    #[error("{file}: is empty; record again, or check that the recorder closed the file")]
+    #[explain(
+        "{file}: is empty",
+        "record again, or check that the recorder closed the file"
+    )]
     Empty { file: String },
     /// The first line holds numbers.
-    #[error(
-        "{file}:{line}: there is no header: the first line holds only numbers; add a line that names the columns, e.g. `t,q_q1,tau_q1`, or give them by number in [log] of the robot file, e.g. `time = 1`"
+    #[explain(
+        "{file}:{line}: there is no header: the first line holds only numbers",
+        "add a line that names the columns, e.g. `t,q_q1,tau_q1`, or give them by number in [log] of the robot file, e.g. `time = 1`"
     )]
     NoHeader { file: String, line: u64 },
     /// A header and fewer than two rows.
-    #[error(
-        "{file}: holds {rows} row(s) after its header, which determine nothing; two at least, and some seconds of motion, are needed"
+    #[explain(
+        "{file}: holds {rows} row(s) after its header, which determine nothing",
+        "two at least, and some seconds of motion, are needed"
     )]
     TooFewRows { file: String, rows: u64 },
     /// A span with fewer than two rows in it.
-    #[error(
-        "{spec}: the span holds {rows} row(s); the log lasts {duration_s} s: choose a span inside it"
+    #[explain(
+        "{spec}: the span holds {rows} row(s)",
+        "the log lasts {duration_s} s: choose a span inside it"
     )]
     EmptySpan {
         spec: String,
@@ -88,7 +100,7 @@ pub enum LogError {
         duration_s: f64,
     },
     /// Arrays whose sizes do not belong together.
-    #[error("{log}: {channel} holds {values} values for {rows} rows; {remedy}")]
+    #[explain("{log}: {channel} holds {values} values for {rows} rows", remedy)]
     Shape {
         /// Name of the log.
         log: String,
@@ -102,7 +114,7 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// A column that the robot needs.
-    #[error("{file}:{line}: column `{column}` ({purpose}) is missing; {remedy}")]
+    #[explain("{file}:{line}: column `{column}` ({purpose}) is missing", remedy)]
     MissingColumn {
         file: String,
         line: u64,
@@ -111,8 +123,9 @@ pub enum LogError {
         remedy: String,
     },
     /// A column that is there more than once.
-    #[error(
-        "{file}:{line}: column `{column}` is named {count} times; rename or delete all but one"
+    #[explain(
+        "{file}:{line}: column `{column}` is named {count} times",
+        "rename or delete all but one"
     )]
     RepeatedColumn {
         file: String,
@@ -121,8 +134,9 @@ pub enum LogError {
         count: usize,
     },
     /// A header that states another unit than the robot file.
-    #[error(
-        "{file}:{line}: column `{column}` is in {found}, but is to be read in {declared}; {remedy}"
+    #[explain(
+        "{file}:{line}: column `{column}` is in {found}, but is to be read in {declared}",
+        remedy
     )]
     Unit {
         file: String,
@@ -135,7 +149,10 @@ pub enum LogError {
         remedy: String,
     },
     /// A row with more or fewer fields than the header.
-    #[error("{file}:{line}: the row has {found} fields, the header names {expected}; {remedy}")]
+    #[explain(
+        "{file}:{line}: the row has {found} fields, the header names {expected}",
+        remedy
+    )]
     Fields {
         file: String,
         line: u64,
@@ -144,7 +161,7 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// Text where a number is needed.
-    #[error("{at}: column `{column}` holds `{text}`, which is no number; {remedy}")]
+    #[explain("{at}: column `{column}` holds `{text}`, which is no number", remedy)]
     NotANumber {
         at: String,
         column: String,
@@ -152,15 +169,16 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// A line of JSON that is no row.
-    #[error(
-        "{at}: {problem}; write one object a line: {{\"t\": .., \"q\": [..], \"tau\": [..]}}, or the columns by their names"
+    #[explain(
+        "{at}: {problem}",
+        "write one object a line: {{\"t\": .., \"q\": [..], \"tau\": [..]}}, or the columns by their names"
     )]
     JsonLine { at: String, problem: String },
     /// The input ends within a line.
-    #[error("{at}: the input ends within this line; what came before it is used")]
+    #[explain("{at}: the input ends within this line", "what came before it is used")]
     CutLine { at: String },
     /// NaN or infinity.
-    #[error("{at}: column `{column}` holds {text}; {remedy}")]
+    #[explain("{at}: column `{column}` holds {text}", remedy)]
     NotFinite {
         at: String,
         column: String,
@@ -168,7 +186,10 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// Two rows at one time.
-    #[error("{at}: time stands still at {t} s, with other values than the row before; {remedy}")]
+    #[explain(
+        "{at}: time stands still at {t} s, with other values than the row before",
+        remedy
+    )]
     TimeStandsStill {
         at: String,
         /// The time [s].
@@ -176,8 +197,9 @@ pub enum LogError {
         remedy: String,
     },
     /// The same row twice.
-    #[error(
-        "{at}: the row repeats the row before it (t = {t} s); delete duplicate rows: each sample may stand there once"
+    #[explain(
+        "{at}: the row repeats the row before it (t = {t} s)",
+        "delete duplicate rows: each sample may stand there once"
     )]
     DuplicateRow {
         at: String,
@@ -185,7 +207,7 @@ pub enum LogError {
         t: f64,
     },
     /// Time runs backwards.
-    #[error("{at}: time runs backwards, from {before} s to {t} s; {remedy}")]
+    #[explain("{at}: time runs backwards, from {before} s to {t} s", remedy)]
     TimeBackwards {
         at: String,
         /// Time of the row before [s].
@@ -195,8 +217,9 @@ pub enum LogError {
         remedy: String,
     },
     /// A joint that moves though its torque channel is dead.
-    #[error(
-        "{file}: torque column `{column}` is 0 in all {rows} rows although {joint} moves; check the channel, or name the right column in the [log] section of the robot file"
+    #[explain(
+        "{file}: torque column `{column}` is 0 in all {rows} rows although {joint} moves",
+        "check the channel, or name the right column in the [log] section of the robot file"
     )]
     ZeroTorque {
         file: String,
@@ -205,8 +228,9 @@ pub enum LogError {
         rows: u64,
     },
     /// An actuator position that the robot cannot take.
-    #[error(
-        "{at}: the actuator positions {positions} belong to no pose of the robot; check units, homing offsets and column order in [log.actuator]"
+    #[explain(
+        "{at}: the actuator positions {positions} belong to no pose of the robot",
+        "check units, homing offsets and column order in [log.actuator]"
     )]
     NoPose {
         at: String,
@@ -214,8 +238,9 @@ pub enum LogError {
         positions: String,
     },
     /// A line or a quoted field without an end.
-    #[error(
-        "{file}:{line}: a line or a quoted field is longer than {limit} bytes; this is no text log, or a quote is never closed"
+    #[explain(
+        "{file}:{line}: a line or a quoted field is longer than {limit} bytes",
+        "this is no text log, or a quote is never closed"
     )]
     LongLine {
         file: String,

@@ -81,9 +81,6 @@ impl Read for OpenFile {
 }
 
 /// A file, opened anew unless it is one of a log that somebody holds.
-///
-/// # Errors
-/// What the system says; a folder.
 pub(super) fn opened(path: &Path) -> io::Result<OpenFile> {
     let held: Vec<Arc<HeldFiles>> = lock(&HELD).iter().filter_map(Weak::upgrade).collect();
     let held = held.iter().find(|held| held.has(path));

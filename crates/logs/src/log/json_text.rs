@@ -5,9 +5,6 @@ use std::borrow::Cow;
 use serde_json::Value;
 
 /// A JSON text. Numbers that JSON does not have, `NaN` and `Infinity` as Python writes them, are taken for none.
-///
-/// # Errors
-/// What is no JSON text otherwise.
 pub(super) fn parsed(text: &[u8]) -> Result<Value, serde_json::Error> {
     serde_json::from_slice(text).or_else(|error| match without_words(text) {
         Cow::Borrowed(_) => Err(error),

@@ -1,22 +1,13 @@
 //! Names that come from files: made safe to print, and compared with the names that are known.
 
 /// Characters of a name that are shown before it is cut.
-const SHOWN: usize = 120;
+const MAX_SHOWN_CHARACTERS: usize = 120;
 
-/// A name from a file made safe to print: control and invisible format characters as escapes, cut to 120 characters,
-/// in quotes where it would be read as two parts of a message.
+/// A name from a file made safe to print: control and invisible format characters as escapes, cut to 120 characters.
 pub fn escape(name: &str) -> String {
-    quoted(match name.char_indices().nth(SHOWN) {
+    match name.char_indices().nth(MAX_SHOWN_CHARACTERS) {
         None => escape_whole(name),
         Some((end, _)) => escape_whole(&name[..end]) + "…",
-    })
-}
-
-/// A name in quotes where it holds what parts a message: what is wrong; what to do.
-pub(super) fn quoted(name: String) -> String {
-    match name.contains("; ") {
-        true => format!("\"{}\"", name.replace('"', "'")),
-        false => name,
     }
 }
 

@@ -18,9 +18,9 @@ use super::two_clocks::rest_of;
 use super::{LogError, LogSpec, Span};
 
 /// Rows by whose times a unit is recognised.
-const LOOKED_AT: usize = 1024;
+const UNIT_ROWS: usize = 1024;
 /// Usual steps from a time of 0 to the next one where the clock began at 0.
-const FROM_ZERO: f64 = 10.0;
+const MAX_STEPS_FROM_ZERO: f64 = 10.0;
 
 /// A log that is being gone through.
 #[derive(Debug)]
@@ -106,7 +106,7 @@ impl LogPass {
         let kept = self
             .tape
             .as_ref()
-            .and_then(|tape| tape.first_times(column, LOOKED_AT));
+            .and_then(|tape| tape.first_times(column, UNIT_ROWS));
         let times = match kept {
             Some(times) => times,
             None => match self.first_numbers(column)? {
@@ -126,8 +126,8 @@ impl LogPass {
     /// The first numbers of a column; none where it holds dates, which have no unit.
     fn first_numbers(&self, column: usize) -> Result<Option<Vec<f64>>, LogError> {
         let mut rows = open(&self.files, &self.layout, Strictness::Record)?.rows;
-        let mut numbers = Vec::with_capacity(LOOKED_AT);
-        while numbers.len() < LOOKED_AT && rows.next()?.is_some() {
+        let mut numbers = Vec::with_capacity(UNIT_ROWS);
+        while numbers.len() < UNIT_ROWS && rows.next()?.is_some() {
             match rows.logged(column) {
                 Some(number) => numbers.push(number),
                 None => return Ok(None),
@@ -248,7 +248,7 @@ impl LogPass {
         }
         let (mut rows, mut origin) = (self.again()?, None);
         let (mut zeros, mut after) = (0, None);
-        for _ in 0..LOOKED_AT {
+        for _ in 0..UNIT_ROWS {
             let Some(stamp) = rows.next()? else { break };
             match (stamp.is_zero(), after) {
                 (true, None) => zeros += 1,
@@ -258,7 +258,7 @@ impl LogPass {
                     let step = stamp.seconds(&mut origin) - first;
                     if step > 0.0 {
                         let leap = stamp.instant().seconds() - step;
-                        let far = zeros > 1 && leap > FROM_ZERO * step;
+                        let far = zeros > 1 && leap > MAX_STEPS_FROM_ZERO * step;
                         return Ok(if far { zeros } else { 0 });
                     }
                 }

@@ -16,9 +16,6 @@ use super::{LogError, LogSection, LogSpec};
 use cft_ident_core::number::is_usable;
 
 /// The machines whose joint states a recording holds, by their topics; none of a text log.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
     let files = spec.files()?;
     match is_recording(&files)? {
@@ -28,9 +25,6 @@ pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
 }
 
 /// The topics of a recording, with the numbers in their messages; none of a text log.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn listing(spec: &LogSpec) -> Result<Vec<TopicFacts>, LogError> {
     let files = spec.files()?;
     match is_recording(&files)? {
@@ -110,9 +104,6 @@ impl RawReader {
     }
 
     /// Opens a log of no robot that is known, by what `section` says of topic, delimiter and rate.
-    ///
-    /// # Errors
-    /// Those of [`Self::open`].
     pub fn open_plain(spec: &LogSpec, section: &LogSection) -> Result<Self, LogError> {
         // A log without a header has columns #1, #2, ...
         let layout = Layout {

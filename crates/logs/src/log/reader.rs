@@ -75,9 +75,6 @@ impl Reader {
 
     /// The next row or few, without waiting for more: rows that repeat the one before them come with the
     /// next that does not, at most twenty. False, and an empty block, at the end.
-    ///
-    /// # Errors
-    /// Those of [`Self::read`].
     pub fn read_on(&mut self, block: &mut Block) -> Result<bool, LogError> {
         loop {
             let more = self.read_rows(block, 1)?;

@@ -27,8 +27,7 @@ pub(super) trait LogRows: Debug + Send {
     /// Goes on to the next row; its time, or `None` at the end.
     fn next(&mut self) -> Result<Option<Stamped>, LogError>;
 
-    /// The number in a column of the current row as logged, NaN where there is none; `None` for
-    /// words.
+    /// The number in a column of the current row as logged, NaN where there is none; `None` for words.
     fn logged(&self, column: usize) -> Option<f64>;
 
     /// Refuses a field that is no number because it has a decimal comma.

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::LogError;
 use super::held_files::{OpenFile, opened};
-use super::names::{escape, escape_whole, list, nearest, quoted};
+use super::names::{escape, escape_whole, list, nearest};
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -106,7 +106,7 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// A path for a message.
 pub fn shown(path: &Path) -> String {
-    quoted(escape_whole(&path.to_string_lossy()))
+    escape_whole(&path.to_string_lossy())
 }
 
 /// What to do when the system refuses to read.
@@ -203,9 +203,6 @@ pub fn sha256_of_bytes(bytes: &[u8]) -> String {
 }
 
 /// Bytes of a whole file.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, LogError> {
     let mut all = Vec::new();
     let read = open(path)?.read_to_end(&mut all);

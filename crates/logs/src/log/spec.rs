@@ -200,9 +200,6 @@ impl LogSpec {
     }
 
     /// The files of the log, in order: one file; the recordings in a folder; or `A+B`, joined.
-    ///
-    /// # Errors
-    /// A folder without recordings, or one that cannot be read.
     pub(super) fn files(&self) -> Result<Vec<PathBuf>, LogError> {
         if self.path.is_dir() {
             let dataset = dataset(&self.path).map_err(|error| failed(&self.path, error))?;

@@ -8,15 +8,15 @@
 //! there the torque was read a moment later.
 
 /// Rows in succession that may be stale; a longer standstill is one.
-const LONGEST: usize = 20;
+const MAX_STALE_ROWS: usize = 20;
 /// Steps of a joint's resolution that a motion takes from row to row, at least.
-const STEPS: f64 = 4.0;
+const MIN_STEPS_IN_MOTION: f64 = 4.0;
 /// Stale rows from which a log is known to have them.
 const KNOWN: u64 = 10;
 /// Steps of a motion from which it is known whether samples were held.
-const SAMPLES: u64 = 50;
+const MIN_MOTION_STEPS: u64 = 50;
 /// Speeds before and after are the same motion where neither is more than this many times the other.
-const ALIKE: f64 = 3.0;
+const MAX_SPEED_RATIO: f64 = 3.0;
 
 /// The motion right before the current row.
 #[derive(Debug)]
@@ -65,10 +65,9 @@ impl Stale {
         self.keep = keep;
     }
 
-    /// Rows for which each sample was held, where at least every other row of the motion is one that
-    /// was held.
+    /// Rows for which each sample was held, where at least every other row of the motion is one that was held.
     pub(super) fn hold(&self) -> Option<usize> {
-        let held = self.moving >= SAMPLES && 2 * self.held >= self.moving;
+        let held = self.moving >= MIN_MOTION_STEPS && 2 * self.held >= self.moving;
         let rows = 1.0 + self.held as f64 / self.moving.max(1) as f64;
         held.then(|| rows.round() as usize)
     }
@@ -96,7 +95,7 @@ impl Stale {
 
     #[inline]
     fn moved(&mut self, duration: f64, q: &[f64]) -> usize {
-        let goes_on = self.run <= LONGEST && self.goes_on(duration, q);
+        let goes_on = self.run <= MAX_STALE_ROWS && self.goes_on(duration, q);
         if goes_on {
             self.moving += 1;
             self.held += if self.whole { self.run as u64 } else { 0 };
@@ -122,18 +121,18 @@ impl Stale {
         (0..q.len()).any(|joint| {
             let after = q[joint] - self.q[joint];
             let before = self.step[joint];
-            let enough = STEPS * self.resolution[joint];
+            let enough = MIN_STEPS_IN_MOTION * self.resolution[joint];
             if before.abs() < enough || after.abs() < enough || (before > 0.0) != (after > 0.0) {
                 return false;
             }
             let ratio = (after / duration) / (before / self.duration);
-            (1.0 / ALIKE..=ALIKE).contains(&ratio)
+            (1.0 / MAX_SPEED_RATIO..=MAX_SPEED_RATIO).contains(&ratio)
         })
     }
 
     /// Rows at the end of which it is not known yet whether they are stale.
     pub(super) fn undecided(&self) -> usize {
-        match self.run <= LONGEST {
+        match self.run <= MAX_STALE_ROWS {
             true => self.run,
             false => 0,
         }
@@ -175,7 +174,7 @@ mod tests {
         assert!(dropped(&[0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 4.0, 4.0, 6.0]).is_empty());
         assert!(dropped(&[0.0, 1.0, 9.0, 17.0, 17.0, 9.0, 0.0]).is_empty());
         let mut rest = vec![0.0, 1.0, 9.0, 17.0];
-        rest.extend([17.0; LONGEST + 1]);
+        rest.extend([17.0; MAX_STALE_ROWS + 1]);
         rest.extend([25.0, 33.0]);
         assert!(dropped(&rest).is_empty());
     }

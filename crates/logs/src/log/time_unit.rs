@@ -8,7 +8,7 @@ const STEPS_S: [f64; 2] = [1e-5, 1.0];
 /// A step in the middle of those that are usual [s].
 const USUAL_S: f64 = 2e-3;
 /// A step up to this one is in seconds, as the contract has it.
-const SECONDS: f64 = 0.5;
+const MAX_STEP_IN_SECONDS_S: f64 = 0.5;
 /// Seconds since 1970 of clocks that are set: 2001 to 2096.
 const EPOCH_S: [f64; 2] = [1e9, 4e9];
 /// Rows from which a unit is reported.
@@ -43,7 +43,7 @@ impl TimeUnit {
         if let Some(unit) = all.iter().find(|unit| possible(unit) && of_epoch(unit)) {
             return *unit;
         }
-        if step <= SECONDS {
+        if step <= MAX_STEP_IN_SECONDS_S {
             return Self::Second;
         }
         let off = |unit: &Self| (step * unit.in_seconds().1 / USUAL_S).ln().abs();
@@ -73,7 +73,7 @@ mod tests {
                 ] {
                     // a step below a millisecond in milliseconds may be seconds as well
                     let (first, step) = (begin / size, 1.0 / rate / size);
-                    if step > SECONDS && (rate > 50.0 || begin >= 1e9) {
+                    if step > MAX_STEP_IN_SECONDS_S && (rate > 50.0 || begin >= 1e9) {
                         assert_eq!(unit(first, step), other, "{rate} Hz from {begin} s");
                     }
                 }

@@ -122,7 +122,7 @@ impl Mapping {
         let all = [position, velocity, torque];
         for (taken, (_, what)) in all.iter().zip(ROLES) {
             match taken {
-                Some(taken) => out.tell(taken, what, names.len(), seen.by_content),
+                Some(taken) => out.note(taken, what, names.len(), seen.by_content),
                 None if what == "velocities" => {}
                 None => {
                     out.lacking.push(what);
@@ -215,7 +215,7 @@ impl Mapping {
     }
 
     /// Says how a family was taken.
-    fn tell(&mut self, taken: &Taken, what: &str, joints: usize, by_content: bool) {
+    fn note(&mut self, taken: &Taken, what: &str, joints: usize, by_content: bool) {
         let pattern = escape(&taken.pattern);
         match taken.how {
             _ if by_content => self

@@ -5,7 +5,7 @@ use crate::inspect::ChannelRole;
 /// A clock is known from more rows than this, and too coarse where it moves by more than this share of a step at once;
 /// its longer and its shorter steps have at least this share each.
 const MIN_CLOCK_ROWS: usize = 100;
-const COARSE: f64 = 0.1;
+const MIN_SHARE_OF_EACH_STEP: f64 = 0.1;
 /// Likeness of a column to the differences of another that makes it its velocity.
 const VELOCITY_CORRELATION: f64 = 0.9;
 /// Part of the joints that must show such a velocity.
@@ -38,8 +38,10 @@ pub(super) fn rounded_step(times: &[f64]) -> Option<f64> {
     let whole = (least / rounding - (least / rounding).round()).abs() < 0.01;
     // seldom a longer step is a lost row, seldom a shorter one a row too many
     let longer = (step - least) / rounding;
-    let longer = longer <= 1.0 - COARSE && (longer >= COARSE || least == 0.0);
-    let coarse = times.len() > MIN_CLOCK_ROWS && least >= 0.0 && rounding > COARSE * step;
+    let longer = longer <= 1.0 - MIN_SHARE_OF_EACH_STEP
+        && (longer >= MIN_SHARE_OF_EACH_STEP || least == 0.0);
+    let coarse =
+        times.len() > MIN_CLOCK_ROWS && least >= 0.0 && rounding > MIN_SHARE_OF_EACH_STEP * step;
     let coarse = coarse && whole && longer;
     (coarse && times.iter().enumerate().all(even)).then_some(step)
 }
@@ -130,8 +132,7 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
     out
 }
 
-/// Place of the first position, number of joints and distance between positions, where velocities show
-/// them.
+/// Place of the first position, number of joints and distance between positions, where velocities show them.
 fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, usize, usize)> {
     let m = columns.len();
     let is_rate = |q: usize, dq: usize| likeness(columns[q], columns[dq]) > VELOCITY_CORRELATION;

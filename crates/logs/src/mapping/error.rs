@@ -1,18 +1,21 @@
 //! What keeps a log from being described.
 
+use cft_ident_core::explain::Explain;
 use thiserror::Error;
 
 use crate::log::LogError;
 
 /// Why a log says too little to be described.
-#[derive(Debug, Error)]
+#[derive(Debug, Explain, Error)]
 pub enum MappingError {
     /// A log that cannot be read.
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Log(#[from] LogError),
     /// No column is a time.
-    #[error(
-        "{log}: no column is a time: {columns}; give the rate at which it was recorded: --rate HZ; or add a column of times"
+    #[explain(
+        "{log}: no column is a time: {columns}",
+        "give the rate at which it was recorded: --rate HZ",
+        "or add a column of times"
     )]
     NoTime {
         /// Name of the log.
@@ -21,8 +24,9 @@ pub enum MappingError {
         columns: String,
     },
     /// Several machines in one recording.
-    #[error(
-        "{log}: holds several machines: {topics}; name the topic of the one that was measured: --topic NAME"
+    #[explain(
+        "{log}: holds several machines: {topics}",
+        "name the topic of the one that was measured: --topic NAME"
     )]
     Topics {
         /// Name of the log.
@@ -31,6 +35,6 @@ pub enum MappingError {
         topics: String,
     },
     /// The user stopped it.
-    #[error("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
 }

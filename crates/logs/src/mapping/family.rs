@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::column::LogColumn;
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, without_units, words};
+use crate::inspect::words::{Word, has, without_units, words};
 use crate::log::nearest;
 
 /// What distinguishes a member of a family from the others.
@@ -36,75 +36,26 @@ pub(super) enum How {
 }
 
 /// Words that say that a quantity is not what a joint's sensor measured, and how much they count.
-const PENALTIES: [(&[&str], i32); 4] = [
+const PENALTIES: [(&str, i32); 4] = [
     (
-        &[
-            "ext",
-            "external",
-            "contact",
-            "est",
-            "estimated",
-            "estimate",
-            "model",
-            "predicted",
-            "sim",
-            "simulated",
-            "gravity",
-            "friction",
-            "feedforward",
-            "ff",
-            "comp",
-            "computed",
-            "bias",
-            "offset",
-            "error",
-            "err",
-            "limit",
-            "max",
-            "min",
-            "temp",
-            "temperature",
-        ],
+        "ext external contact est estimated estimate model predicted sim simulated \
+         gravity friction feedforward ff comp computed bias offset error err limit max \
+         min temp temperature",
         3,
     ),
+    ("se secondary rel relative delta diff voltage volts", 2),
     (
-        &[
-            "se",
-            "secondary",
-            "rel",
-            "relative",
-            "delta",
-            "diff",
-            "voltage",
-            "volts",
-        ],
-        2,
-    ),
-    (
-        &[
-            "raw", "filt", "filtered", "mot", "motor", "smooth", "current", "currents", "curr",
-            "cur", "amps", "amp", "iq", "u",
-        ],
+        "raw filt filtered mot motor smooth current currents curr cur amps amp iq u",
         1,
     ),
-    (
-        &[
-            "act", "actual", "meas", "measured", "feedback", "fbk", "follower", "sensor",
-        ],
-        -1,
-    ),
+    ("act actual meas measured feedback fbk follower sensor", -1),
 ];
 
 pub(super) fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
-    let of = |known: &[&str]| {
-        pattern
-            .iter()
-            .any(|word| known.contains(&word.text.as_str()))
-    };
-    let shown = PENALTIES.iter().filter(|(known, _)| of(known));
+    let shown = PENALTIES.iter().filter(|(known, _)| has(pattern, known));
     let sum: i32 = shown.map(|(_, count)| *count).sum();
     // `current` beside a position is an adjective
-    let adjective = role != ChannelRole::Torque && of(&["current"]);
+    let adjective = role != ChannelRole::Torque && has(pattern, "current");
     sum - i32::from(adjective)
 }
 
@@ -223,8 +174,7 @@ fn in_a_row(sorted: &[u32]) -> bool {
     sorted.windows(2).all(next)
 }
 
-/// The places of `count` joints whose names differ in a number alone, in the order of the numbers, which
-/// are in a row.
+/// The places of `count` joints whose names differ in a number alone, in the order of the numbers, which are in a row.
 fn numbered_alike(joints: &[&str], count: usize) -> Option<Vec<usize>> {
     let mut groups: BTreeMap<String, Vec<(u32, usize)>> = BTreeMap::new();
     for (k, joint) in joints.iter().enumerate() {

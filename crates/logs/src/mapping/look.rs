@@ -65,9 +65,6 @@ impl SeenColumns {
 }
 
 /// Looks at a log, to its end; `joints` is the number of the robot's joints where that is known.
-///
-/// # Errors
-/// A log that cannot be read or has no times, a recording of several machines, and interruption.
 pub fn look(
     spec: &LogSpec,
     asked: &Asked,

@@ -7,7 +7,7 @@ use crate::inspect::ChannelRole;
 use crate::inspect::words::{joint, slides, words};
 use cft_ident_core::robot::JointKind;
 
-/// A joint of the robot, where a URDF told it.
+/// A joint of the robot, where a URDF names it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Known {
     pub name: String,

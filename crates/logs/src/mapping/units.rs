@@ -8,11 +8,11 @@ use crate::log::escape;
 use cft_ident_core::robot::JointKind;
 
 /// Largest position that a joint in radians has where it does not turn on and on.
-const TURN: f64 = 1.2 * TAU;
+const MAX_POSITION_RAD: f64 = 1.2 * TAU;
 /// Longest travel of a joint that slides \[m\].
-const TRAVEL_M: f64 = 20.0;
+const MAX_TRAVEL_M: f64 = 20.0;
 /// Largest torque of a joint \[Nm\]: the largest arms stay below it.
-const TORQUE_NM: f64 = 2e4;
+const MAX_TORQUE_NM: f64 = 2e4;
 
 /// A unit, as the keys of a joint in `[log.joint]` say it.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -61,8 +61,7 @@ const TORQUES: [(&str, &[&str]); 10] = [
     ("A", &["amp", "amps", "ampere", "amperes"]),
     ("V", &["volt", "volts"]),
 ];
-/// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of
-/// axes.
+/// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of axes.
 const SHORT_UNITS: [(&str, &str); 5] =
     [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
 
@@ -157,13 +156,13 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
                     turned.max(slid)
                 ),
             ),
-            JointKind::Revolute if turned > TURN => (
+            JointKind::Revolute if turned > MAX_POSITION_RAD => (
                 Some("deg"),
                 format!(
                     "deg is guessed: positions go to {turned:.0}, and no joint turns that far in rad"
                 ),
             ),
-            JointKind::Prismatic if slid > TRAVEL_M => (
+            JointKind::Prismatic if slid > MAX_TRAVEL_M => (
                 Some("mm"),
                 format!(
                     "mm is guessed: positions go to {slid:.0}, and no joint slides that far in m"
@@ -266,7 +265,7 @@ fn guessed_torque(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
         .collect();
     // by the limits of the robot where it has some: no joint gives thirty times its largest torque
     let beyond = match known.is_empty() {
-        true => most > TORQUE_NM,
+        true => most > MAX_TORQUE_NM,
         false => known.iter().any(|ratio| *ratio > 30.0),
     };
     let whole = columns.iter().all(|c| c.whole);

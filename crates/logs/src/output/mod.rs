@@ -17,6 +17,7 @@ pub use log::{LogForm, LogWriter};
 pub use together::Together;
 pub use trajectory::JointTrajectory;
 
+use cft_ident_core::explain::Explain;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -30,8 +31,8 @@ use thiserror::Error;
 use crate::log::shown;
 
 /// An output that cannot be written.
-#[derive(Debug, Error)]
-#[error("{file}: cannot be written: {source}; {remedy}")]
+#[derive(Debug, Explain, Error)]
+#[explain("{file}: cannot be written: {source}", remedy)]
 pub struct OutputError {
     /// File as the user named it.
     pub file: String,

@@ -15,9 +15,9 @@ use parquet::schema::types::{Type, TypePtr};
 use crate::log::Instant;
 
 /// Numbers that are held until they are written.
-const HELD: usize = 1 << 20;
+const MAX_HELD_NUMBERS: usize = 1 << 20;
 /// Rows of a group at least.
-const ROWS: usize = 1024;
+const MIN_GROUP_ROWS: usize = 1024;
 
 /// Rows as a Parquet file.
 pub(super) struct ParquetLog<W: Write + Send> {
@@ -55,7 +55,7 @@ impl<W: Write + Send> ParquetLog<W> {
             column.push(*value);
         }
         let rows = self.held.first().map_or(0, Vec::len);
-        match rows >= ROWS && rows * self.columns.len() >= HELD {
+        match rows >= MIN_GROUP_ROWS && rows * self.columns.len() >= MAX_HELD_NUMBERS {
             true => self.write().map_err(plain),
             false => Ok(()),
         }

@@ -20,7 +20,7 @@ const NOTHING: f64 = 1e-8;
 /// The same of G, which holds squares, where rounding leaves less.
 const NOTHING_OF_SQUARES: f64 = 1e-13;
 /// Share of an unknown in a direction that is not excited from which on it counts as open.
-const PART: f64 = 1e-3;
+const OPEN_SHARE: f64 = 1e-3;
 
 /// Condition numbers of the unweighted stacked regressor; null where its rank is short.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -212,7 +212,7 @@ pub(super) fn inverse(g: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), Exc
             inverse += v * v.transpose() / svd.s[k];
         } else {
             for (open, part) in determined.iter_mut().zip(v.iter()) {
-                *open &= part.abs() <= PART;
+                *open &= part.abs() <= OPEN_SHARE;
             }
         }
     }

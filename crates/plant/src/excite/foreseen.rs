@@ -35,9 +35,6 @@ pub enum TorqueSource {
 
 impl TorqueSource {
     /// A robot's numbers and where they come from.
-    ///
-    /// # Errors
-    /// A model of another robot, or one that lacks a parameter.
     pub(super) fn of(
         file: &RobotFile,
         robot: &Robot,

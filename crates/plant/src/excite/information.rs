@@ -36,9 +36,6 @@ impl Information {
     }
 
     /// Of any motion, given by its samples.
-    ///
-    /// # Errors
-    /// As [`Self::of_period`].
     pub(crate) fn of_path(
         machine: &ForeseenRobot,
         samples: usize,

@@ -13,7 +13,7 @@ use super::{ExciteError, GivenInformation, Motion};
 use cft_ident_core::number;
 
 /// Share of the torque's power that its band holds.
-const BAND: f64 = 0.99;
+const BAND_POWER_SHARE: f64 = 0.99;
 /// Correlation of expected errors from which on two parameters count as confounded.
 const ALIKE: f64 = 0.95;
 
@@ -241,7 +241,7 @@ pub fn judge(
                 torque_power_99_below_hz,
             };
             let band = match machine.source.known() {
-                true => Some(torque_band(machine, series, BAND)?),
+                true => Some(torque_band(machine, series, BAND_POWER_SHARE)?),
                 false => None,
             };
             let band = band.map(|band| joints.iter().zip(band).map(of).collect());

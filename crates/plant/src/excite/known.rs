@@ -12,7 +12,7 @@ use super::foresee::inverse;
 use super::information::Information;
 use super::machine::ForeseenRobot;
 
-/// What the logs of a model have told.
+/// What is known from the logs of a model.
 #[derive(Debug, Clone)]
 pub struct InformationBefore {
     /// Inverse covariance of the unknowns (p x p); 0 of what the model knows no deviation of.

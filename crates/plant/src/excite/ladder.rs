@@ -2,7 +2,7 @@
 //! reversals, that leave the least expected error of its slopes w1 and w2.
 //!
 //! Where a law bends, at speeds of about 1/w1 and 1/w2, is not known to the usual ladder, whose
-//! speeds stand in equal ratios and whose reversals take the same time everywhere. What a log of either will tell is the information of the law's five
+//! speeds stand in equal ratios and whose reversals take the same time everywhere. The value of a log of either is the information of the law's five
 //! derivatives, less what inertia, gravity and a constant torque could take their place with.
 
 use nalgebra::DMatrix;
@@ -25,7 +25,7 @@ use super::motion::differentiated;
 use super::series::MAX_COORDINATES;
 
 /// Samples per second at which information is gathered: a bend is passed in tens of milliseconds.
-const RATE: f64 = 250.0;
+const SAMPLES_PER_SECOND: f64 = 250.0;
 /// Numbers of speeds that are tried.
 const COUNTS: [usize; 4] = [4, 6, 8, 10];
 /// Evaluations of each.
@@ -149,9 +149,6 @@ pub fn design_ladder(
 }
 
 /// What a log of a one-joint move says about the joint's friction law.
-///
-/// # Errors
-/// As [`design_ladder`].
 pub fn foresee_ladder(
     machine: &ForeseenRobot,
     task: &LadderTask,
@@ -361,7 +358,7 @@ fn expected(
     let model = &machine.model;
     let law = &model.friction[joint];
     let (mut g, used) = information(machine, task.seconds, joint, along)?;
-    g *= task.rate_hz / RATE / (machine.noise[joint] * machine.noise[joint]);
+    g *= task.rate_hz / SAMPLES_PER_SECOND / (machine.noise[joint] * machine.noise[joint]);
     let (names, values): (&[&str], Vec<f64>) = match law {
         JointFriction::DoubleTanh(law) => (&DoubleTanh::NAMES, law.parameters().to_vec()),
         JointFriction::ViscousCoulomb(law) => {
@@ -396,8 +393,8 @@ fn information(
     let mut used = (0.0_f64, 0);
     let drives = machine.channels.iter();
     let drives: Vec<_> = drives.filter(|c| c.quantity == Quantity::Drive).collect();
-    for m in 0..(seconds * RATE).ceil() as usize {
-        let k = differentiated(along, (m as f64 + 0.5) / RATE);
+    for m in 0..(seconds * SAMPLES_PER_SECOND).ceil() as usize {
+        let k = differentiated(along, (m as f64 + 0.5) / SAMPLES_PER_SECOND);
         let (q, v, a) = (&k.x[..n], &k.xd[..n], &k.xdd[..n]);
         model.robot.regressor(q, v, a, &mut y);
         row[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);

@@ -24,7 +24,7 @@ pub(super) struct Search {
 }
 
 /// First weight of violations, its growth between rounds and its end.
-const WEIGHT: f64 = 2.0;
+const FIRST_WEIGHT: f64 = 2.0;
 const GROWTH: f64 = 2.5;
 const HEAVIEST: f64 = 2e3;
 /// Derivative below which a round is done.
@@ -34,7 +34,7 @@ impl Search {
     pub fn new(objective: &Objective, z: Vec<f64>) -> Self {
         Self {
             z,
-            multipliers: Multipliers::new(objective.constraints(), WEIGHT),
+            multipliers: Multipliers::new(objective.constraints(), FIRST_WEIGHT),
             evaluations: 0,
         }
     }

@@ -153,9 +153,6 @@ impl ForeseenRobot {
     }
 
     /// [`Self::joints`] into a state whose torques and drives stay.
-    ///
-    /// # Errors
-    /// As there.
     #[inline]
     pub(super) fn follow(&self, k: &Kinematics, state: &mut State) -> Result<(), RobotError> {
         let (n, transmission) = (self.coordinates(), self.model.robot.transmission());
@@ -169,9 +166,6 @@ impl ForeseenRobot {
     }
 
     /// Everything at one instant.
-    ///
-    /// # Errors
-    /// As [`Self::joints`].
     pub fn state(&self, k: &Kinematics) -> Result<State, RobotError> {
         let mut state = State::EMPTY;
         self.fill(k, &mut state)?;
@@ -179,9 +173,6 @@ impl ForeseenRobot {
     }
 
     /// [`Self::state`] into a state that is there.
-    ///
-    /// # Errors
-    /// As there.
     pub(super) fn fill(&self, k: &Kinematics, state: &mut State) -> Result<(), RobotError> {
         self.follow(k, state)?;
         let (n, State { q, v, a, tau, .. }) = (self.coordinates(), &mut *state);
@@ -190,9 +181,6 @@ impl ForeseenRobot {
     }
 
     /// What drives the coordinates where the joints need the torques `tau` at the pose `q`.
-    ///
-    /// # Errors
-    /// As [`Self::joints`].
     pub fn drives(&self, q: &[f64], tau: &[f64]) -> Result<[f64; MAX_COORDINATES], RobotError> {
         let mut state = State::EMPTY;
         state.q[..q.len()].copy_from_slice(q);
@@ -232,9 +220,6 @@ impl ForeseenRobot {
 
     /// The rows of the fit, n x p row-major, with the sign in Coulomb columns as a steep tanh, and
     /// (where `torques` is set) the torques and volts of the state, friction by its straight line.
-    ///
-    /// # Errors
-    /// As [`Self::joints`].
     pub(super) fn rows(
         &self,
         state: &mut State,

@@ -48,21 +48,25 @@ pub use objective::{NoValue, PriorInformation};
 pub use start::{usual_motion, usual_torque};
 
 use crate::simulate::SimulateError;
+use cft_ident_core::explain::Explain;
 use cft_ident_files::config::{ConfigError, did_you_mean};
 
 /// Why no motion came out. Each message says what to change.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum ExciteError {
-    #[error(
-        "the travel of {coordinate} is not known; write `[limits.{coordinate}] position = [low, high]` into the robot file"
+    #[explain(
+        "the travel of {coordinate} is not known",
+        "write `[limits.{coordinate}] position = [low, high]` into the robot file"
     )]
     NoTravel { coordinate: String },
-    #[error(
-        "nothing bounds the speed of {coordinate}; write `[limits.{coordinate}] speed = ...` (or acceleration; or torque, and give a model with -m) into the robot file"
+    #[explain(
+        "nothing bounds the speed of {coordinate}",
+        "write `[limits.{coordinate}] speed = ...` (or acceleration; or torque, and give a model with -m) into the robot file"
     )]
     NoSpeed { coordinate: String },
-    #[error(
-        "the offset {offset} of {coordinate} lies outside [{lower}, {upper}], its limits less the reserve; choose another offset or let the design choose it"
+    #[explain(
+        "the offset {offset} of {coordinate} lies outside [{lower}, {upper}], its limits less the reserve",
+        "choose another offset or let the design choose it"
     )]
     OffsetOutside {
         coordinate: String,
@@ -70,8 +74,9 @@ pub enum ExciteError {
         lower: f64,
         upper: f64,
     },
-    #[error(
-        "{quantity} of {channel} would be {value} at rest already, outside [{lower}, {upper}]; widen that limit or check the model"
+    #[explain(
+        "{quantity} of {channel} would be {value} at rest already, outside [{lower}, {upper}]",
+        "widen that limit or check the model"
     )]
     CannotRest {
         channel: String,
@@ -80,36 +85,47 @@ pub enum ExciteError {
         lower: f64,
         upper: f64,
     },
-    #[error(
-        "none of {starts} starts excites all {unknowns} unknowns within the limits; give more harmonics, wider limits or fewer parameters"
+    #[explain(
+        "none of {starts} starts excites all {unknowns} unknowns within the limits",
+        "give more harmonics, wider limits or fewer parameters"
     )]
     NothingExcited { unknowns: usize, starts: usize },
-    #[error(
-        "rest at the ends needs blends longer than {seconds:.1} s: with those a limit is still used to {:.1} %; keep more in reserve (--margin)",
-        100.0 * share
+    #[explain(
+        format!(
+            "rest at the ends needs blends longer than {seconds:.1} s: with those a limit is still used to {:.1} %",
+            100.0 * share
+        ),
+        "keep more in reserve (--margin)"
     )]
     NoBlend { seconds: f64, share: f64 },
-    #[error(
-        "the pose of --from breaks a limit itself: the {what} is {value:.4}; give the pose in which the robot stands"
+    #[explain(
+        "the pose of --from breaks a limit itself: the {what} is {value:.4}",
+        "give the pose in which the robot stands"
     )]
     BrokenPose { what: String, value: f64 },
-    #[error(
-        "no straight way leads from the given pose into the motion within the limits: one of them breaks that on the {what} after {percent} % of the way; give another pose with --from, or move the robot by hand and leave --from out"
+    #[explain(
+        "no straight way leads from the given pose into the motion within the limits: one of them breaks that on the {what} after {percent} % of the way",
+        "give another pose with --from, or move the robot by hand and leave --from out"
     )]
     NoWay { what: String, percent: f64 },
-    #[error(
-        "`[limits.{joint}] volts` cannot be kept: the motors of this robot act on x_c1..x_c4; write the limit there, or limit the torque of {joint}"
+    #[explain(
+        "`[limits.{joint}] volts` cannot be kept: the motors of this robot act on x_c1..x_c4",
+        "write the limit there, or limit the torque of {joint}"
     )]
     VoltsOfJoint { joint: String },
-    #[error("the series is written in other coordinates than the design's; write it in {wanted}")]
+    #[explain(
+        "the series is written in other coordinates than the design's",
+        "write it in {wanted}"
+    )]
     OtherCoordinates { wanted: String },
-    #[error(
-        "the machine has no coordinate {name}; {}its coordinates are {known}",
-        did_you_mean(name, known)
+    #[explain(
+        "the machine has no coordinate {name}",
+        format!("{}its coordinates are {known}", did_you_mean(name, known))
     )]
     UnknownCoordinate { name: String, known: String },
-    #[error(
-        "a blend of {blend_s:?} s is {periods:.3e} periods of {fundamental_hz:?} Hz, and at most {most} are judged; give a lower `fundamental_hz` or a shorter `blend_s`"
+    #[explain(
+        "a blend of {blend_s:?} s is {periods:.3e} periods of {fundamental_hz:?} Hz, and at most {most} are judged",
+        "give a lower `fundamental_hz` or a shorter `blend_s`"
     )]
     LongBlend {
         blend_s: f64,
@@ -117,14 +133,18 @@ pub enum ExciteError {
         periods: f64,
         most: f64,
     },
-    #[error(
-        "the motion lasts {seconds:?} s, and at most {most:.0} s are judged; give a shorter one"
+    #[explain(
+        "the motion lasts {seconds:?} s, and at most {most:.0} s are judged",
+        "give a shorter one"
     )]
     LongMotion { seconds: f64, most: f64 },
-    #[error(
-        "a ladder of {joint} alone, the other joints in the middle of their positions, takes {:.0} % of the limit of {drive} however short its strokes, and {:.0} % are left free; write `[limits.{drive}] torque = ...` as the drive has it, or positions in whose middle the arm hangs with less weight, into a robot file for -r",
-        100.0 * used,
-        100.0 * free
+    #[explain(
+        format!(
+            "a ladder of {joint} alone, the other joints in the middle of their positions, takes {:.0} % of the limit of {drive} however short its strokes, and {:.0} % are left free",
+            100.0 * used,
+            100.0 * free
+        ),
+        "write `[limits.{drive}] torque = ...` as the drive has it, or positions in whose middle the arm hangs with less weight, into a robot file for -r"
     )]
     BeyondDrive {
         joint: String,
@@ -132,16 +152,19 @@ pub enum ExciteError {
         used: f64,
         free: f64,
     },
-    #[error("joint {joint} has no friction in the model; give one with -m that has")]
+    #[explain(
+        "joint {joint} has no friction in the model",
+        "give one with -m that has"
+    )]
     NoLaw { joint: String },
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Config(#[from] ConfigError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Reference(#[from] SimulateError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     NoValue(#[from] NoValue),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Robot(#[from] cft_ident_core::robot::RobotError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Math(#[from] cft_ident_core::math::MathError),
 }

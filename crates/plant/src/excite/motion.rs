@@ -25,7 +25,7 @@ const BLEND: f64 = 2.0;
 /// Most periods that a blend may last: each is looked through in parts.
 const MOST_PERIODS: f64 = 1000.0;
 /// Longest motion that is looked through \[s\]: some hours.
-const LONGEST: f64 = 1e5;
+const MAX_DURATION_S: f64 = 1e5;
 
 /// Coordinates over time.
 type At = Box<dyn Fn(f64) -> Kinematics + Send + Sync>;
@@ -121,10 +121,10 @@ impl Motion {
 }
 
 fn short_enough(seconds: f64) -> Result<(), ExciteError> {
-    match seconds > LONGEST {
+    match seconds > MAX_DURATION_S {
         true => Err(ExciteError::LongMotion {
             seconds,
-            most: LONGEST,
+            most: MAX_DURATION_S,
         }),
         false => Ok(()),
     }
@@ -178,9 +178,6 @@ pub fn spectrum(series: &Series) -> Vec<Vec<f64>> {
 
 /// Frequency \[Hz\] below which a share of the torque's power along the period lies, per joint; the
 /// constant part is left out. What lies above a log's filter is lost to the fit.
-///
-/// # Errors
-/// [`ExciteError::Robot`] where the machine cannot follow.
 pub(crate) fn torque_band(
     machine: &ForeseenRobot,
     series: &Series,

@@ -7,6 +7,7 @@
 //! sample, 2 (F S) . F + sum kappa c, with S and kappa fixed: the chain rule through the singular
 //! vectors and the multipliers.
 
+use cft_ident_core::explain::Explain;
 use nalgebra::DMatrix;
 
 use cft_ident_core::math::MathError;
@@ -20,17 +21,17 @@ use super::usage::along_period;
 use super::variables::Variables;
 
 /// Step in a position, as a share of half its span.
-const STEP: f64 = 2e-3;
+const STEP_SHARE_OF_SPAN: f64 = 2e-3;
 
 /// Samples of a limit for each of the regressor.
 const FINER: usize = 4;
 
 /// Why a point has no value.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum NoValue {
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Robot(#[from] RobotError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Math(#[from] MathError),
 }
 
@@ -329,9 +330,6 @@ impl<'a> Objective<'a> {
     }
 
     /// Moves the multipliers to what the violations at z ask for, and the weight up.
-    ///
-    /// # Errors
-    /// As [`Self::evaluate`].
     pub fn update(
         &self,
         z: &[f64],
@@ -444,7 +442,7 @@ impl Local<'_> {
         for (i, by) in by.iter_mut().enumerate().take(n) {
             let mut k = state.k;
             if !self.objective.machine.is_uniform(i) {
-                let h = STEP * variables.span[i].1;
+                let h = STEP_SHARE_OF_SPAN * variables.span[i].1;
                 let x = k.x[i];
                 let mut shifted = |steps: f64| {
                     k.x[i] = x + steps * h;

@@ -12,7 +12,7 @@ pub struct Peak {
 }
 
 /// Narrowest part that is still halved, as a share of the whole interval.
-const NARROWEST: f64 = 1e-9;
+const MIN_WIDTH_SHARE: f64 = 1e-9;
 
 /// Highest value of `f` on `[from, to]`, by halving those of `pieces` equal parts that could hold a
 /// higher one, until they could exceed it by `tolerance` at most.
@@ -72,7 +72,7 @@ pub(crate) fn highest_from(
         let top = left.max(right);
         if let Some(most) = curvature {
             let bound = top + most * (b - a) * (b - a) / 8.0;
-            if bound <= peak.value + tolerance || b - a < NARROWEST * h {
+            if bound <= peak.value + tolerance || b - a < MIN_WIDTH_SHARE * h {
                 peak.bound = peak.bound.max(bound);
                 continue;
             }
@@ -91,7 +91,7 @@ pub(crate) fn highest_from(
                 continue;
             }
             // a step, such as that of Coulomb friction: its bend never ends, its two sides are seen
-            if b - a < NARROWEST * h {
+            if b - a < MIN_WIDTH_SHARE * h {
                 continue;
             }
         }

@@ -6,10 +6,10 @@ use super::series::Series;
 use super::usage::{along_period, closely_along_period, roughly_along_period, worst};
 
 /// Steps towards the common factor, and how near to it they end.
-const STEPS: usize = 40;
+const MAX_STEPS: usize = 40;
 const FACTOR_TOLERANCE: f64 = 2e-5;
 /// How near a rough look brings a thorough one to it.
-const BAND: f64 = 2e-3;
+const ROUGH_TOLERANCE: f64 = 2e-3;
 /// What is left to rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -85,8 +85,11 @@ fn fitted(
     }
     if care == Care::Thorough {
         let roughly = |factor| share(Care::Rough, factor);
-        let about = narrowed(&roughly, kept, broken, BAND).0;
-        for tried in [about * (1.0 - BAND), about * (1.0 + BAND)] {
+        let about = narrowed(&roughly, kept, broken, ROUGH_TOLERANCE).0;
+        for tried in [
+            about * (1.0 - ROUGH_TOLERANCE),
+            about * (1.0 + ROUGH_TOLERANCE),
+        ] {
             if kept.0 < tried && tried < broken.0 {
                 let at = (tried, share(care, tried));
                 *(if at.1 <= 1.0 { &mut kept } else { &mut broken }) = at;
@@ -110,7 +113,7 @@ fn narrowed(
     mut broken: (f64, f64),
     near: f64,
 ) -> (f64, f64) {
-    for step in 0..STEPS {
+    for step in 0..MAX_STEPS {
         if broken.0 - kept.0 < near || kept.1 > 1.0 - near {
             break;
         }

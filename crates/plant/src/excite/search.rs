@@ -79,11 +79,11 @@ const SECOND: [Round; 8] = [
 /// Rounds after torques and volts have been looked at between the samples.
 const LAST: [Round; 3] = [round(128.0, 80), round(192.0, 80), round(256.0, 80)];
 /// Excess between samples, as a share of the limit, that is left to the repair.
-const EXCESS: f64 = 2e-3;
+const MAX_EXCESS_SHARE: f64 = 2e-3;
 /// One start in so many gets the second part.
 const FINALISTS: usize = 4;
 /// Samples of the period per harmonic in the search.
-const SAMPLES: usize = 12;
+const SAMPLES_PER_HARMONIC: usize = 12;
 
 impl Task {
     /// Evaluations that the search will take at most.
@@ -124,7 +124,7 @@ pub fn design(
         task.harmonics,
         task.offsets.clone(),
     );
-    let samples = (SAMPLES * task.harmonics).max(25);
+    let samples = (SAMPLES_PER_HARMONIC * task.harmonics).max(25);
     let objective = Objective::new(
         machine,
         &task.criterion,
@@ -176,7 +176,7 @@ pub fn design(
             };
             effort.step(&objective, search, &SECOND);
             keep_better(search);
-            if let Some(tightened) = objective.tightened(&search.z, EXCESS) {
+            if let Some(tightened) = objective.tightened(&search.z, MAX_EXCESS_SHARE) {
                 effort.step(&tightened, search, &LAST);
                 keep_better(search);
             }

@@ -13,7 +13,7 @@ use super::variables::Variables;
 /// Standard deviation of the offsets about the middle, in half spans.
 const SPREAD: f64 = 0.2;
 /// A motion is drawn this many times too large, so that its repair lets it fill the limits.
-const BEYOND: f64 = 10.0;
+const START_EXCESS: f64 = 10.0;
 /// Random motions whose torques stand for usual ones, their seed and the samples of each.
 const USUAL: usize = 16;
 const USUAL_SEED: u64 = 0;
@@ -42,7 +42,7 @@ pub(super) fn random_motion(
             series.b[i][l] = variables.speed[i] * normal();
         }
     }
-    let large = series.scaled(BEYOND);
+    let large = series.scaled(START_EXCESS);
     repaired(machine, channels, &large, &variables.fixed, Care::Rough)
         .unwrap_or_else(|| series.scaled(0.0))
 }

@@ -11,8 +11,7 @@ use super::series::{Kinematics, Series};
 
 /// How far a highest share may be off the one found.
 const TOLERANCE: f64 = 1e-7;
-/// First parts of a period for what is not a trigonometric polynomial: friction turns round within
-/// milliseconds.
+/// First parts of a period for what is not a trigonometric polynomial: friction turns round within milliseconds.
 const PARTS: usize = 1024;
 /// The same where a motion is only prepared.
 const ROUGH_PARTS: usize = 96;

@@ -5,7 +5,7 @@ use super::series::Series;
 
 /// Length of one unit of a search variable, in half spans and speed limits: the first step of a search
 /// is one unit long at most.
-const UNIT: f64 = 0.05;
+const UNIT_OF_SPAN: f64 = 0.05;
 
 /// A map from search variables to the coefficients of a series.
 ///
@@ -77,12 +77,12 @@ impl Variables {
         let mut next = || z.next().copied().unwrap_or(0.0);
         for i in 0..self.coordinates() {
             let (middle, half) = self.span[i];
-            out.offset[i] = self.fixed[i].unwrap_or_else(|| middle + UNIT * half * next());
+            out.offset[i] = self.fixed[i].unwrap_or_else(|| middle + UNIT_OF_SPAN * half * next());
             for a in &mut out.a[i] {
-                *a = UNIT * self.speed[i] * next();
+                *a = UNIT_OF_SPAN * self.speed[i] * next();
             }
             for b in &mut out.b[i] {
-                *b = UNIT * self.speed[i] * next();
+                *b = UNIT_OF_SPAN * self.speed[i] * next();
             }
         }
     }
@@ -93,9 +93,9 @@ impl Variables {
         for i in 0..self.coordinates() {
             let (middle, half) = self.span[i];
             if self.fixed[i].is_none() {
-                z.push((series.offset[i] - middle) / (UNIT * half));
+                z.push((series.offset[i] - middle) / (UNIT_OF_SPAN * half));
             }
-            let speed = UNIT * self.speed[i];
+            let speed = UNIT_OF_SPAN * self.speed[i];
             z.extend(series.a[i].iter().chain(&series.b[i]).map(|x| x / speed));
         }
         z
@@ -107,11 +107,11 @@ impl Variables {
         let rows = by_coefficients.chunks_exact(1 + 2 * self.harmonics);
         for (i, row) in rows.enumerate() {
             if self.fixed[i].is_none() {
-                out[at] = UNIT * row[0] * self.span[i].1;
+                out[at] = UNIT_OF_SPAN * row[0] * self.span[i].1;
                 at += 1;
             }
             for g in &row[1..] {
-                out[at] = UNIT * g * self.speed[i];
+                out[at] = UNIT_OF_SPAN * g * self.speed[i];
                 at += 1;
             }
         }

@@ -68,16 +68,11 @@ impl CftTruth {
         outcome
     }
 
-    /// # Errors
-    /// As [`Plant::check`].
     pub fn check(&self) -> Result<(), SimulateError> {
         self.plant()?.check()
     }
 
     /// The plant: of 12 parameters where the ten others are 0.
-    ///
-    /// # Errors
-    /// As [`Plant::new`].
     pub fn plant(&self) -> Result<Plant<4>, SimulateError> {
         let printed = self.theta[PRINTED..].iter().all(|x| *x == 0.0);
         let (structure, count) = match printed {
@@ -126,9 +121,6 @@ fn excitation_of(series: Fourier<4>) -> Reference<4> {
 }
 
 /// The effects on a CFT robot.
-///
-/// # Errors
-/// As [`Effects::build`].
 pub fn effects(
     truth: &CftTruth,
     specs: &[EffectSpec],
@@ -137,9 +129,6 @@ pub fn effects(
 }
 
 /// Runs a reference with the default gains, from the settled start.
-///
-/// # Errors
-/// As [`run`].
 pub fn follow(
     truth: &CftTruth,
     specs: &[EffectSpec],

@@ -149,7 +149,8 @@ fn points<const J: usize>(
                     k + 1,
                     point.position.len(),
                     mechanism.joints()
-                ),
+                )
+                .into(),
             });
         };
         list.push((point.t - first, pose));

@@ -114,7 +114,7 @@ const PROPORTIONAL: f64 = 0.2 - 0.75 * INTEGRAL;
 const SHRINK_AT_MOST: f64 = 0.2;
 const GROW_AT_MOST: f64 = 5.0;
 /// A step shorter than this fraction of the interval means a discontinuity or divergence.
-const SHORTEST: f64 = 1e-9;
+const MIN_STEP_SHARE: f64 = 1e-9;
 /// More trial steps than this within one interval mean the same.
 const MOST_STEPS: u64 = 200_000;
 
@@ -162,7 +162,7 @@ impl DormandPrince {
             let last = pieces <= 1.0;
             let h = if last { remaining } else { remaining / pieces };
             trials += 1;
-            if h < SHORTEST * span || trials > MOST_STEPS {
+            if h < MIN_STEP_SHARE * span || trials > MOST_STEPS {
                 return Err(SimulateError::Diverged { t });
             }
             let (next, error) = self.attempt(system, t, h, y, &mut k);

@@ -2,8 +2,7 @@
 
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 
-/// Rate at which a viscous-Coulomb joint comes to rest within its steep part: half a sample at 1 kHz
-/// \[1/s\].
+/// Rate at which a viscous-Coulomb joint comes to rest within its steep part: half a sample at 1 kHz \[1/s\].
 const REST_RATE: f64 = 2000.0;
 
 /// Friction law of a simulated joint.

@@ -9,7 +9,7 @@ use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::robot_file::CoordinateLimits;
 
 /// Half a travel where no limits are known \[m or rad\].
-const REACH: f64 = 1.0;
+const HALF_TRAVEL: f64 = 1.0;
 
 /// A robot of n joints that n motors drive, in vectors with room for J >= n. What is beyond n is 0 in every
 /// vector, and without limits.
@@ -31,9 +31,6 @@ pub struct Mechanism<const J: usize> {
 
 impl<const J: usize> Mechanism<J> {
     /// A robot with the limits and encoders that are known without its file.
-    ///
-    /// # Errors
-    /// [`SimulateError::TooManyJoints`].
     pub fn new(robot: Robot) -> Result<Self, SimulateError> {
         let n = robot.joints();
         if n > J {
@@ -61,9 +58,6 @@ impl<const J: usize> Mechanism<J> {
 
     /// The robot of a file: `[limits] position` where it has them, and `[noise.joint] position_resolution`
     /// where the encoders are not known without it.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
     pub fn of(file: &RobotFile) -> Result<Self, SimulateError> {
         let mut mechanism = Self::new(file.robot())?;
         let known = mechanism.robot.transmission().encoder_steps().is_some();
@@ -102,7 +96,7 @@ impl<const J: usize> Mechanism<J> {
         if low.is_finite() && high.is_finite() {
             (low, high)
         } else {
-            (-REACH, REACH)
+            (-HALF_TRAVEL, HALF_TRAVEL)
         }
     }
 
@@ -155,9 +149,6 @@ impl<const J: usize> Mechanism<J> {
     }
 
     /// Joint speeds at the pose q of the motors' speeds.
-    ///
-    /// # Errors
-    /// [`SimulateError::Robot`] where the pose is singular.
     pub(crate) fn joint_speeds(
         &self,
         q: &[f64; J],

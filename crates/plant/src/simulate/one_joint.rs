@@ -5,6 +5,7 @@ use super::mechanism::Mechanism;
 use super::reference::{
     LadderPlan, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
 };
+use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::Robot;
 use cft_ident_files::config::trajectory::SingleJointMove;
 
@@ -14,8 +15,7 @@ const SPEED_SHARE: f64 = 0.95;
 const MARGIN: f64 = 0.05;
 /// Ratio of the fastest to the slowest plateau, where nothing is known of the speeds that matter.
 const SPEED_RATIO: f64 = 300.0;
-/// Strokes per second^2 that the acceleration stands for where nothing bounds it: a full one takes about a
-/// second.
+/// Strokes per second^2 that the acceleration stands for where nothing bounds it: a full one takes about a second.
 const STROKES: f64 = 8.0;
 
 /// What moves in a one-joint experiment.
@@ -29,9 +29,6 @@ pub enum Mover {
 
 impl Mover {
     /// The joint or motor's coordinate of that name.
-    ///
-    /// # Errors
-    /// [`SimulateError::UnknownJoint`].
     pub fn named(robot: &Robot, name: &str) -> Result<Self, SimulateError> {
         let mut known = robot.joint_names().to_vec();
         let joints = known.len();
@@ -99,9 +96,6 @@ impl OneJointMove {
     }
 
     /// The ladder of a file.
-    ///
-    /// # Errors
-    /// [`SimulateError::UnknownJoint`].
     pub fn of(
         file: &SingleJointMove,
         robot: &Robot,
@@ -146,7 +140,8 @@ impl OneJointMove {
                     range.1,
                     room.range.0,
                     room.range.1
-                ),
+                )
+                .into(),
             });
         }
         let ladder = self.ladder(m, range, &room)?;
@@ -200,10 +195,9 @@ impl OneJointMove {
         if !(known.0.is_finite() && known.1.is_finite()) {
             let name = self.mover.name(&m.robot);
             return Err(SimulateError::Reference {
-                what: format!(
-                    "the travel of {name} is not known; write `[limits.{name}] position = [low, high]` into \
-                     the robot file"
-                ),
+                what: ErrorText::new(format!("the travel of {name} is not known")).remedy(format!(
+                    "write `[limits.{name}] position = [low, high]` into the robot file"
+                )),
             });
         }
         let frame = match self.mover {

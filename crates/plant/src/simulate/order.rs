@@ -1,5 +1,6 @@
 //! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
 
+use cft_ident_core::explain::ErrorText;
 use std::ops::ControlFlow;
 
 use super::SimulateError;
@@ -73,8 +74,7 @@ pub trait Rows {
         ControlFlow::Continue(())
     }
 
-    /// Takes the next rows, one after the other, each with a number for every name of the header; whether to
-    /// go on.
+    /// Takes the next rows, one after the other, each with a number for every name of the header; whether to go on.
     fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()>;
 }
 
@@ -117,9 +117,6 @@ pub fn simulate(order: &Order) -> Result<SimulatedLog, SimulateError> {
 }
 
 /// Simulates what is ordered, from initial conditions where they are given.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn simulate_from(
     order: &Order,
     initial: Option<&InitialConditions>,
@@ -152,9 +149,6 @@ pub fn simulate_from(
 
 /// Simulates what is ordered and hands the rows on block by block, so that memory does not grow with the log;
 /// only a log with a fault of the data is simulated as a whole first.
-///
-/// # Errors
-/// As [`simulate`], and [`SimulateError::Stopped`] where the rows are wanted no more.
 pub fn simulate_rows(
     order: &Order,
     initial: Option<&InitialConditions>,
@@ -306,13 +300,16 @@ fn drive<const J: usize>(
     }
     let Experiment::Volts { times, volts } = experiment else {
         return Err(SimulateError::Reference {
-            what: "there is neither a reference nor a series of volts".to_owned(),
+            what: "there is neither a reference nor a series of volts"
+                .to_owned()
+                .into(),
         });
     };
     let n = mechanism.joints();
     if !volts.len().is_multiple_of(n) {
         return Err(SimulateError::Volts {
-            what: format!("the robot has {n} motors, and the rows do not divide into {n} volts"),
+            what: format!("the robot has {n} motors, and the rows do not divide into {n} volts")
+                .into(),
         });
     }
     let rows = volts.chunks_exact(n);
@@ -360,9 +357,7 @@ fn built_effects(
         Some(fault) if !joint_channels => Err(SimulateError::EffectPlace {
             effect: fault.to_owned(),
             place: "this log".to_owned(),
-            why: "the robot file's [log] has the motors' channels alone, and faults of the data sit in joint \
-                  channels; let [log] read those"
-                .to_owned(),
+            why: ErrorText::new("the robot file's [log] has the motors' channels alone, and faults of the data sit in joint channels").remedy("let [log] read those"),
         }),
         _ => Ok((effects, values)),
     }

@@ -6,6 +6,7 @@
 use super::SimulateError;
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
+use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::dynamics::Dynamics;
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::JointFriction;
@@ -91,7 +92,8 @@ impl<const J: usize> Plant<J> {
                     _ => "a serial robot",
                 };
                 return Err(SimulateError::Unsupported {
-                    what: format!("{what} has no parameters of its own; give a model with -m"),
+                    what: ErrorText::new(format!("{what} has no parameters of its own"))
+                        .remedy("give a model with -m"),
                 });
             }
         };
@@ -118,7 +120,7 @@ impl<const J: usize> Plant<J> {
         let n = self.joints();
         let m = &self.mechanism;
         if n == 1 {
-            // the inertia of a single joint is a parameter, told by its name
+            // the inertia of a single joint is a parameter, reported by its name
             self.check_joint(0)?;
         }
         let finite = self.theta().iter().all(|x| x.is_finite());

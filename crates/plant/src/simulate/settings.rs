@@ -38,17 +38,11 @@ const NUMBERS_OF_JOINT: usize = 13;
 
 impl<const J: usize> Settings<J> {
     /// Rows of the log.
-    ///
-    /// # Errors
-    /// [`SimulateError::TooLong`] where no file could hold them, before any is made.
     pub(super) fn samples(&self) -> Result<usize, SimulateError> {
         self.at_most(MOST_ROWS)
     }
 
     /// Rows of a log that is wanted as a whole.
-    ///
-    /// # Errors
-    /// [`SimulateError::TooLong`] where they would not fit into memory, before any is made.
     pub(super) fn samples_in_memory(&self) -> Result<usize, SimulateError> {
         self.at_most((MOST_NUMBERS / (NUMBERS_OF_JOINT * J + 2) as f64).floor())
     }

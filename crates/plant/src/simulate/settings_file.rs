@@ -10,9 +10,6 @@ use super::settings::Settings;
 use cft_ident_files::config::robot_file::{self, RobotFile};
 
 /// Gains of `[control]` over the usual ones.
-///
-/// # Errors
-/// [`SimulateError::Parameter`] when there are not as many gains as motors.
 pub(super) fn control<const J: usize>(
     file: &RobotFile,
     plant: &Plant<J>,
@@ -43,9 +40,6 @@ pub(super) fn control<const J: usize>(
 }
 
 /// Rate, saturation and sensors of `[control]`, `[limits]` and `[sensors]`; duration and seed are left as they are by default.
-///
-/// # Errors
-/// [`SimulateError::Parameter`] when there are not as many noise levels as joints, or both kinds.
 pub(super) fn settings<const J: usize>(
     file: &RobotFile,
     mechanism: &Mechanism<J>,

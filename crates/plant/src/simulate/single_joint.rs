@@ -26,9 +26,6 @@ pub struct SingleJointTruth {
 }
 
 /// The effects on a single joint.
-///
-/// # Errors
-/// As [`Effects::build`].
 pub fn effects(
     truth: &SingleJointTruth,
     specs: &[EffectSpec],
@@ -38,9 +35,6 @@ pub fn effects(
 
 impl SingleJointTruth {
     /// The plant.
-    ///
-    /// # Errors
-    /// As [`Plant::new`].
     pub fn plant(&self) -> Result<Plant<1>, SimulateError> {
         let mut mechanism = Mechanism::new(Robot::single_joint(self.name.clone(), self.kind))?;
         ([mechanism.lower[0], mechanism.upper[0]]) = [self.limits.0, self.limits.1];

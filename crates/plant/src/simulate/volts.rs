@@ -1,6 +1,7 @@
 //! Volts that are played back without a controller.
 
 use super::SimulateError;
+use cft_ident_core::explain::ErrorText;
 
 /// Volts over time, each row kept until the next (zero-order hold) and the last for as long as the others on average;
 /// zero before and after.
@@ -15,25 +16,31 @@ impl<const J: usize> VoltSeries<J> {
     /// [`SimulateError::Volts`] when the series is empty, its times do not increase, its lengths differ
     /// or a number is not finite.
     pub fn new(times: Vec<f64>, volts: Vec<[f64; J]>) -> Result<Self, SimulateError> {
-        let reject = |what: String| Err(SimulateError::Volts { what });
+        let reject = |what: ErrorText| Err(SimulateError::Volts { what });
         if times.len() != volts.len() || times.is_empty() {
-            return reject(format!(
-                "{} times and {} rows of volts; give as many of each, at least one",
-                times.len(),
-                volts.len()
-            ));
+            return reject(
+                ErrorText::new(format!(
+                    "{} times and {} rows of volts",
+                    times.len(),
+                    volts.len()
+                ))
+                .remedy("give as many of each, at least one"),
+            );
         }
         if let Some(k) = times.windows(2).position(|t| t[1] <= t[0]) {
-            return reject(format!(
-                "time does not increase from {} s to {} s at row {}",
-                times[k],
-                times[k + 1],
-                k + 2
-            ));
+            return reject(
+                format!(
+                    "time does not increase from {} s to {} s at row {}",
+                    times[k],
+                    times[k + 1],
+                    k + 2
+                )
+                .into(),
+            );
         }
         let numbers = times.iter().chain(volts.as_flattened());
         if numbers.into_iter().any(|x| !x.is_finite()) {
-            return reject("a time or a voltage is not finite".to_owned());
+            return reject("a time or a voltage is not finite".to_owned().into());
         }
         Ok(Self { times, volts })
     }

@@ -89,16 +89,16 @@ mod tests {
 
     #[test]
     fn a_long_command_is_folded_between_its_options() {
-        let told = command_lines(
+        let lines = command_lines(
             "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 -o separate.csv",
             7,
         );
         assert_eq!(
-            told,
+            lines,
             "       cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 \\\n         \
              -o separate.csv\n"
         );
-        assert!(told.lines().all(|line| line.len() <= WIDTH));
+        assert!(lines.lines().all(|line| line.len() <= WIDTH));
         assert_eq!(command_lines("cft-ident new", 2), "  cft-ident new\n");
     }
 

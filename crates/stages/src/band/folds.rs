@@ -8,9 +8,9 @@ use cft_ident_core::robot::model::{JointFriction, Model};
 
 /// Samples that are looked at together.
 const PIECE: usize = 16_384;
-/// Share of what all blocks tell that holds a model to itself: no direction is left without it that one
+/// Share of the information of all blocks that holds a model to itself: no direction is left without it that one
 /// block alone determines.
-const HOLD: f64 = 0.01;
+const HOLD_SHARE: f64 = 0.01;
 
 /// Blocks of the same number of samples, one behind the other through all logs.
 #[derive(Debug, Clone, PartialEq)]
@@ -165,9 +165,9 @@ pub fn without_each(
             None => DVector::zeros(u),
         }
     };
-    let all = solve(&(&h * (1.0 + HOLD)), &g);
+    let all = solve(&(&h * (1.0 + HOLD_SHARE)), &g);
     let models = each.iter().map(|(of_h, of_g)| {
-        let step = solve(&(&h * (1.0 + HOLD) - of_h), &(&g - of_g)) - &all;
+        let step = solve(&(&h * (1.0 + HOLD_SHARE) - of_h), &(&g - of_g)) - &all;
         moved(model, &layout, &step)
     });
     Ok(models.collect())

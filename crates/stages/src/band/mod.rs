@@ -74,7 +74,7 @@ pub struct Reach<'a> {
 }
 
 /// Share by which a motion may go beyond what was seen before it is reported.
-const SLACK: f64 = 0.05;
+const BEYOND_SEEN_SHARE: f64 = 0.05;
 
 impl<'a> Reach<'a> {
     pub fn new(held: &'a [HeldOut]) -> Self {
@@ -96,9 +96,9 @@ impl<'a> Reach<'a> {
             seen[2] = seen[2].min(q[j]);
             seen[3] = seen[3].max(q[j]);
             let [low, high] = held.positions_seen;
-            let room = SLACK * (high - low);
-            let out = v[j].abs() > (1.0 + SLACK) * held.speed_seen
-                || tau[j].abs() > (1.0 + SLACK) * held.torque_seen
+            let room = BEYOND_SEEN_SHARE * (high - low);
+            let out = v[j].abs() > (1.0 + BEYOND_SEEN_SHARE) * held.speed_seen
+                || tau[j].abs() > (1.0 + BEYOND_SEEN_SHARE) * held.torque_seen
                 || q[j] < low - room
                 || q[j] > high + room;
             self.beyond[j] += u64::from(out);
@@ -115,7 +115,7 @@ impl<'a> Reach<'a> {
             let [speed, torque, low, high] = self.seen[j];
             let mut parts = Vec::new();
             let mut more = |what: &str, x: f64, seen: f64| {
-                if x > (1.0 + SLACK) * seen {
+                if x > (1.0 + BEYOND_SEEN_SHARE) * seen {
                     let [x, seen] = [x, seen].map(|x| number::significant(x, 3));
                     parts.push(format!("{what} up to {x}, where {seen} was seen"));
                 }
@@ -123,7 +123,7 @@ impl<'a> Reach<'a> {
             more("speeds", speed, held.speed_seen);
             more("torques", torque, held.torque_seen);
             let [from, to] = held.positions_seen;
-            let room = SLACK * (to - from);
+            let room = BEYOND_SEEN_SHARE * (to - from);
             if low < from - room || high > to + room {
                 let [low, high, from, to] =
                     [low, high, from, to].map(|x| number::significant(x, 3));

@@ -45,7 +45,7 @@ const PIECES: usize = 30;
 /// Fewest pieces from which an interval is drawn.
 const FEWEST: usize = 12;
 /// Rows of a piece, at least.
-const SHORTEST: usize = 10;
+const MIN_PIECE_ROWS: usize = 10;
 /// Seed of the bootstrap.
 const SEED: u64 = 19_890_901;
 
@@ -63,7 +63,7 @@ pub fn differences(
 ) -> Result<ErrorDifferences, MotionError> {
     let n = models[0].model.robot.joints();
     let total: usize = stretches.iter().map(|s| filters.of(s).rows(s.len())).sum();
-    let length = total.div_ceil(PIECES).max(SHORTEST);
+    let length = total.div_ceil(PIECES).max(MIN_PIECE_ROWS);
     let mut pieces: Vec<Vec<PieceSquares>> = Vec::new();
     for stretch in stretches {
         let parallel = filters.of(stretch);

@@ -1,6 +1,7 @@
 //! Two runs of one command side by side, by the JSON documents that they wrote: parameters in standard
 //! deviations of their difference, errors, and the verdicts that changed.
 
+use cft_ident_core::explain::Explain;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
@@ -13,19 +14,22 @@ use cft_ident_core::verdict::Verdict;
 const COMMANDS: [&str; 5] = ["friction", "lsq", "validate", "diagnose", "identify"];
 
 /// Documents that cannot be compared.
-#[derive(Debug, Error, PartialEq, Eq)]
+#[derive(Debug, Explain, Error, PartialEq, Eq)]
 pub enum DiffError {
     /// No document of this tool.
-    #[error("{file} is no JSON document of a run; write one with --json FILE")]
+    #[explain("{file} is no JSON document of a run", "write one with --json FILE")]
     NoDocument { file: String },
     /// A command without parameters, errors and verdicts.
-    #[error(
-        "{file} is a document of `{command}`, which estimates nothing; give two of {}",
-        COMMANDS.join(", ")
+    #[explain(
+        "{file} is a document of `{command}`, which estimates nothing",
+        format!("give two of {}", COMMANDS.join(", "))
     )]
     NothingEstimated { file: String, command: String },
     /// Two commands.
-    #[error("the documents are those of `{a}` and of `{b}`; give two of one command")]
+    #[explain(
+        "the documents are those of `{a}` and of `{b}`",
+        "give two of one command"
+    )]
     TwoCommands { a: String, b: String },
 }
 

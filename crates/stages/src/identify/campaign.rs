@@ -71,9 +71,6 @@ pub struct Campaigned {
 /// Runs a campaign. Friction is fitted again beside an effect, so the diagnosis has the one-joint logs
 /// too; the validation logs are held out of it. `ended` receives each stage's result as it is there,
 /// so that what was finished can be kept whatever follows.
-///
-/// # Errors
-/// Those of the stages and of `ended`.
 pub fn identify<E: From<IdentifyError>>(
     machine: &LoggedRobot,
     logs: &RoleLogs,

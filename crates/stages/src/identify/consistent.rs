@@ -151,9 +151,6 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
 }
 
 /// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached.
-///
-/// # Errors
-/// [`FitError`].
 pub(super) fn consistent(
     machine: &LoggedRobot,
     estimated: &Estimated,
@@ -249,9 +246,6 @@ impl ConsistentLinks {
 
 /// Puts beside the parameters of a model the physically consistent ones nearest to them in the metric of their
 /// covariance: for a model whose rows are gone. Nothing where it holds no covariance of inertial parameters.
-///
-/// # Errors
-/// [`cft_ident_core::inertia::solution::FitError`].
 pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
     let Some(covariance) = &model.covariance else {
         model.forget_consistent();
@@ -269,9 +263,6 @@ pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
 }
 
 /// The same in the metric of an information matrix of these unknowns, inertial ones among them or not.
-///
-/// # Errors
-/// [`cft_ident_core::inertia::solution::FitError`].
 pub(super) fn project_by(
     model: &mut ModelFile,
     unknowns: &[String],

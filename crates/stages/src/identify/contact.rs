@@ -15,15 +15,12 @@ use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::{RowFault, escape};
 
 /// A parameter moves with rows when it does so by so many standard deviations; twice as many leave out a
-/// doubtful fit, half as many tell of chance.
-const MOVES: f64 = 4.0;
+/// doubtful fit, half as many report what is chance.
+const MOVED_DEVIATIONS: f64 = 4.0;
 /// Room on both sides of a stretch that is to be left out \[s\]: the filters carry it so far.
 const ROOM_S: f64 = 0.1;
 
 /// Stretches of these logs in which something pushes the robot, one sentence each.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub(super) fn contacts(
     machine: &LoggedRobot,
     logs: &[Log],
@@ -41,9 +38,6 @@ pub(super) fn contacts(
 
 impl Passes<'_> {
     /// The stretches that the first reading found, one sentence each.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub(super) fn contacts(&self) -> Result<Vec<String>, IdentifyError> {
         let shown = |(log, jump): &(usize, Jump)| {
             let log = &self.logs[*log];
@@ -79,9 +73,6 @@ fn sentence(machine: &LoggedRobot, log: &Log, jump: &Jump, first: f64) -> String
 }
 
 /// What a fit says with the rows that were bridged as they were logged, where that is another thing.
-///
-/// # Errors
-/// Logs that cannot be read.
 pub(super) fn hangs_on_bridged(
     machine: &LoggedRobot,
     logs: &[Log],
@@ -105,7 +96,7 @@ pub(super) fn hangs_on_bridged(
         let (a, b) = (now.theta.get(i)?, other.theta.get(i)?);
         let both = std(&now).hypot(std(&other));
         let known = now.determined[i] && other.determined[i];
-        (known && (a - b).abs() > MOVES * both).then(|| {
+        (known && (a - b).abs() > MOVED_DEVIATIONS * both).then(|| {
             let value = |x: f64, std: f64| {
                 format!(
                     "{} +- {}",

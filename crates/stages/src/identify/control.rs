@@ -21,14 +21,14 @@ pub enum Progress<'a> {
 }
 
 type Stop = dyn Fn() -> bool + Send + Sync;
-type Tell = dyn Fn(Progress) + Send + Sync;
+type Listener = dyn Fn(Progress) + Send + Sync;
 
 /// Cancellation and progress as callbacks, called from any thread; by default nothing stops a stage
 /// and nobody is informed.
 #[derive(Clone, Default)]
 pub struct Control {
     stop: Option<Arc<Stop>>,
-    tell: Option<Arc<Tell>>,
+    listener: Option<Arc<Listener>>,
 }
 
 impl Control {
@@ -38,9 +38,9 @@ impl Control {
         self
     }
 
-    /// The same, with its progress told to `tell`.
-    pub fn told_to(mut self, tell: impl Fn(Progress) + Send + Sync + 'static) -> Self {
-        self.tell = Some(Arc::new(tell));
+    /// The same, with its progress reported to `listener`.
+    pub fn reporting_to(mut self, listener: impl Fn(Progress) + Send + Sync + 'static) -> Self {
+        self.listener = Some(Arc::new(listener));
         self
     }
 
@@ -50,9 +50,6 @@ impl Control {
     }
 
     /// [`Control::stopped`] as an error.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Interrupted`].
     pub fn check(&self) -> Result<(), IdentifyError> {
         match self.stopped() {
             true => Err(IdentifyError::Interrupted),
@@ -62,18 +59,18 @@ impl Control {
 
     /// Begins work; it ends when the guard is dropped.
     pub(super) fn begin(&self, work: &str, steps: Option<u64>) -> Work {
-        self.tell(Progress::Begin(work, steps));
+        self.report(Progress::Begin(work, steps));
         Work {
             control: self.clone(),
         }
     }
     pub(super) fn note(&self, text: &str) {
-        self.tell(Progress::Note(text));
+        self.report(Progress::Note(text));
     }
 
-    pub(super) fn tell(&self, progress: Progress) {
-        if let Some(tell) = &self.tell {
-            tell(progress);
+    pub(super) fn report(&self, progress: Progress) {
+        if let Some(listener) = &self.listener {
+            listener(progress);
         }
     }
 }
@@ -91,17 +88,17 @@ pub(super) struct Work {
 
 impl Work {
     pub(super) fn advance(&self, steps: u64) {
-        self.control.tell(Progress::Advance(steps));
+        self.control.report(Progress::Advance(steps));
     }
 
     pub(super) fn doing(&self, what: &str) {
-        self.control.tell(Progress::Doing(what));
+        self.control.report(Progress::Doing(what));
     }
 }
 
 impl Drop for Work {
     fn drop(&mut self) {
-        self.control.tell(Progress::End);
+        self.control.report(Progress::End);
     }
 }
 
@@ -115,7 +112,7 @@ mod tests {
         let said = Arc::new(Mutex::new(Vec::new()));
         let heard = Arc::clone(&said);
         let control =
-            Control::default().told_to(move |p| heard.lock().unwrap().push(format!("{p:?}")));
+            Control::default().reporting_to(move |p| heard.lock().unwrap().push(format!("{p:?}")));
         let work = control.begin("reading", Some(2));
         work.advance(2);
         drop(work);

@@ -1,5 +1,6 @@
 //! What the torque residual still holds, and the effects behind it.
 
+use cft_ident_core::explain::Explain;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -205,7 +206,7 @@ pub fn diagnose(
     )?;
     let work = control.begin("search for effects", None);
     let tell = |heard: Heard| {
-        control.tell(match heard {
+        control.report(match heard {
             Heard::Begin(part, steps) => Progress::Begin(part, Some(steps)),
             Heard::Step => Progress::Advance(1),
             Heard::End => Progress::End,
@@ -279,13 +280,12 @@ pub fn diagnose(
 
 /// Channels that are no torques, as a fault: gains that differ look like friction and loads.
 fn without_gains(machine: &LoggedRobot) -> Option<DataFault> {
-    let error = machine.check_gains().err()?.to_string();
-    let (effect, remedy) = error.split_once("; ").unwrap_or((&error, ""));
+    let problem = machine.check_gains().err()?.explanation();
     Some(DataFault {
         kind: "gains".to_owned(),
         channel: Some("torque".to_owned()),
-        effect: effect.to_owned(),
-        remedy: remedy.to_owned(),
+        effect: problem.what,
+        remedy: problem.remedies.join("; "),
     })
 }
 
@@ -309,7 +309,7 @@ fn refused(
 }
 
 /// How many times as firm as its covariance a friction that is held stands against the data.
-const HELD: f64 = 1e6;
+const HELD_FIRMNESS: f64 = 1e6;
 
 /// What the search is about; it takes the stretches of the logs. `before` is the model `file` with the friction
 /// that is known without these logs.
@@ -328,7 +328,7 @@ fn case(
     let rate = filters.row_rate_hz();
     let alone = moved_alone(&given, &in_memory.stretches, &roles);
     // what is held is known so many times better than these data can say; its own spread stays that of its covariance
-    let firm = if hold { HELD } else { 1.0 };
+    let firm = if hold { HELD_FIRMNESS } else { 1.0 };
     let prior = ParameterPrior {
         information: information(before, &given, &open, hold, &alone),
         centre: refined(before, name)?,

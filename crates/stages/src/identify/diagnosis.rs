@@ -15,7 +15,7 @@ use super::next_motion::separating_command;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
-    Dependence, Errors, FoundEffect, FrictionChange, JointChange, LeftCandidate, LogRole, Signal,
+    Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, LogRole, Signal,
     SplitErrors, StepStatus,
 };
 use cft_ident_core::motion::Summary;
@@ -27,11 +27,11 @@ pub struct DiagnosisResult {
     /// Effects that gain on blocks left out, in the order in which they were found.
     pub steps: Vec<DiagnosisStep>,
     /// Errors of the model as it was given.
-    pub before: Option<ErrorsBySide>,
+    pub before: Option<SplitErrors>,
     /// Errors of the judge's model, before held-out data had a say: the figure without bias.
-    pub after: Option<ErrorsBySide>,
+    pub after: Option<SplitErrors>,
     /// Errors of the model that is written, where held-out data took an effect out of it: selected, and so optimistic.
-    pub written: Option<ErrorsBySide>,
+    pub written: Option<SplitErrors>,
     /// Whether held-out data took an effect out of what is written.
     pub holdout_had_a_say: bool,
     /// What the parts of the data are.
@@ -138,13 +138,6 @@ pub struct ChangeResult {
     pub certainty: f64,
 }
 
-/// Errors on the logs that were fitted and on held-out data.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct ErrorsBySide {
-    pub train: Errors,
-    pub holdout: Option<Errors>,
-}
-
 /// What is left of a joint's torque.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct UnexplainedResult {
@@ -201,15 +194,6 @@ fn by_key<S: Serializer, T: Serialize>(
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     serializer.collect_map(list.iter().map(|(key, value)| (key, value)))
-}
-
-impl From<&SplitErrors> for ErrorsBySide {
-    fn from(pair: &SplitErrors) -> Self {
-        ErrorsBySide {
-            train: pair.train.clone(),
-            holdout: pair.holdout.clone(),
-        }
-    }
 }
 
 impl DataFault {
@@ -284,9 +268,9 @@ impl Diagnosed {
         DiagnosisResult {
             verdict: self.verdict(),
             steps: d.steps.iter().map(|s| self.step(machine, s)).collect(),
-            before: Some((&d.before).into()),
-            after: Some((&d.after).into()),
-            written: d.selected.as_ref().map(ErrorsBySide::from),
+            before: Some(d.before.clone()),
+            after: Some(d.after.clone()),
+            written: d.selected.clone(),
             holdout_had_a_say: d.holdout_had_a_say(),
             blocks: Some(BlocksResult {
                 parts: d.parts,

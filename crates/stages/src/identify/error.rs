@@ -8,6 +8,7 @@ use crate::open_loop::AxisError;
 use cft_ident_core::diagnose::DiagnoseError;
 use cft_ident_core::effect::EffectError;
 use cft_ident_core::effect::formula::FormulaError;
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::friction::excitation::FrictionError;
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::motion::{MotionError, RunError};
@@ -16,25 +17,26 @@ use cft_ident_logs::inspect::LogFault;
 use cft_ident_logs::log::{LogError, did_you_mean, escape};
 
 /// An error of a stage. Its text reads `what is wrong; what to do`.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum IdentifyError {
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Log(#[from] LogError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Config(#[from] ConfigError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Fit(#[from] FitError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Reduced(#[from] ReducedError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Track(#[from] TrackError),
-    #[error("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
-    #[error("no log is given")]
+    #[explain("no log is given")]
     NoLog,
     /// Rows that would count twice, or be fitted and held out.
-    #[error(
-        "{second} ({second_role}) holds rows that {first} ({first_role}) holds: deviations come out too small, or what was fitted is no holdout; give each row once, spans as in LOG@0..70% and LOG@70..100%"
+    #[explain(
+        "{second} ({second_role}) holds rows that {first} ({first_role}) holds: deviations come out too small, or what was fitted is no holdout",
+        "give each row once, spans as in LOG@0..70% and LOG@70..100%"
     )]
     SameRows {
         first: String,
@@ -43,16 +45,25 @@ pub enum IdentifyError {
         second_role: &'static str,
     },
     /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
-    #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
+    #[explain(
+        format!(
+            "{log}: column `{}` {}",
+            fault.channel.as_deref().map(escape).unwrap_or_default(),
+            fault.effect
+        ),
+        &fault.remedy
+    )]
     Refused { log: String, fault: Box<LogFault> },
     /// A robot whose last link has no place for a body.
-    #[error(
-        "{model}: a body on this robot shows in too few numbers to be told by itself; look for it with `cft-ident diagnose --keep`"
+    #[explain(
+        "{model}: a body on this robot shows in too few numbers to be told by itself",
+        "look for it with `cft-ident diagnose --keep`"
     )]
     NoPayload { model: String },
     /// Positions where a joint of the robot cannot stand.
-    #[error(
-        "positions of {joint} run over {positions} {unit}, and its limits are {limits}: this is a log of another robot, or in another unit or with another zero; give the log of this robot, or correct [log.joint] or [limits] of its file"
+    #[explain(
+        "positions of {joint} run over {positions} {unit}, and its limits are {limits}: this is a log of another robot, or in another unit or with another zero",
+        "give the log of this robot, or correct [log.joint] or [limits] of its file"
     )]
     OtherRobotLog {
         joint: String,
@@ -61,53 +72,67 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// The motion of a log, or the processing that a robot file asks for.
-    #[error("{of}: {error}{}", .left_out.as_ref().map(|shown| format!("; {shown}")).unwrap_or_default())]
+    #[explain(left_out.iter().fold(error.explanation().of(of), ErrorText::remedy))]
     Motion {
         of: String,
         error: MotionError,
         /// What was left out of the log before, and why.
         left_out: Option<Box<str>>,
     },
-    #[error(
-        "{log}: more than {most} rows; the friction filter passes over a one-joint log many times and holds it in memory; give a span of it, such as FILE@0..600s: minutes are enough for friction"
+    #[explain(
+        "{log}: more than {most} rows",
+        "the friction filter passes over a one-joint log many times and holds it in memory",
+        "give a span of it, such as FILE@0..600s: minutes are enough for friction"
     )]
     TooManyRows { log: String, most: usize },
-    #[error(
-        "{log}: {samples} samples are more than the {most} that are held in memory; choose spans of the logs, as in LOG@0..20%"
+    #[explain(
+        "{log}: {samples} samples are more than the {most} that are held in memory",
+        "choose spans of the logs, as in LOG@0..20%"
     )]
     TooManySamples {
         log: String,
         samples: usize,
         most: usize,
     },
-    #[error(
-        "the robot has no joint `{joint}`; {}its joints are {known}", did_you_mean(.joint, .known)
+    #[explain(
+        "the robot has no joint `{joint}`",
+        format!("{}its joints are {known}", did_you_mean(joint, known))
     )]
     NoJoint { joint: String, known: String },
-    #[error("{logs}: {error}")]
+    #[explain(error.explanation().of(logs))]
     Friction { logs: String, error: FrictionError },
-    #[error(
-        "{estimator} is linear, and the double-tanh law of friction is not; take `--estimator oe`, which refines the law with the inertias; or give the friction with -m, or set `law = \"viscous-coulomb\"`"
+    #[explain(
+        "{estimator} is linear, and the double-tanh law of friction is not",
+        "take `--estimator oe`, which refines the law with the inertias",
+        "or give the friction with -m, or set `law = \"viscous-coulomb\"`"
     )]
     LawIsNotLinear { estimator: &'static str },
-    #[error(
-        "these data determine none of the parameters; excite every joint with more speed and acceleration"
+    #[explain(
+        "these data determine none of the parameters",
+        "excite every joint with more speed and acceleration"
     )]
     NothingDetermined,
-    #[error(
-        "these data determine nothing: the noise is as large as the torque, {} of which is left at every joint; move faster, or filter more by a lower `cutoff_hz` in [filter]", cft_ident_core::number::percent(*.left)
+    #[explain(
+        format!(
+            "these data determine nothing: the noise is as large as the torque, {} of which is left at every joint",
+            cft_ident_core::number::percent(*left)
+        ),
+        "move faster, or filter more by a lower `cutoff_hz` in [filter]"
     )]
     OnlyNoise { left: f64 },
-    #[error(
-        "{model}: its data determine none of its parameters, so that nothing can be said of effects beside it; fit it to data that determine it"
+    #[explain(
+        "{model}: its data determine none of its parameters, so that nothing can be said of effects beside it",
+        "fit it to data that determine it"
     )]
     NothingIdentified { model: String },
-    #[error(
-        "{log}: rows are poses and no motion: {rate_hz:.3} Hz, and positions leap from row to row; this tool needs a log in time: record the way from pose to pose too, at 100 Hz or more"
+    #[explain(
+        "{log}: rows are poses and no motion: {rate_hz:.3} Hz, and positions leap from row to row",
+        "this tool needs a log in time: record the way from pose to pose too, at 100 Hz or more"
     )]
     Poses { log: String, rate_hz: f64 },
-    #[error(
-        "{joint}: the model makes a torque of {torque:.4} {unit} at {t:.3} s of {log}, where no more than {measured:.4} {unit} was measured anywhere: it does not hold there; see what its parameters were fitted to, and the clock and units of this log"
+    #[explain(
+        "{joint}: the model makes a torque of {torque:.4} {unit} at {t:.3} s of {log}, where no more than {measured:.4} {unit} was measured anywhere: it does not hold there",
+        "see what its parameters were fitted to, and the clock and units of this log"
     )]
     Impossible {
         joint: String,
@@ -118,8 +143,11 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// Channels of several joints in a unit that is no torque.
-    #[error(
-        "{robot}: the torques of {joints} are logged in {unit}, and nothing says what torque that is at each joint: gains differ from joint to joint, and masses and inertias need them; give `torque_scale` (N or Nm per {unit} at the joint: torque constant times gear ratio) in [log.joint.NAME]; or let `lsq` find them from a log with a known payload, `--fit-gains LOG:mass=KG`; or go on with one gain for all joints, and a model in {unit}, by `--as-declared`"
+    #[explain(
+        "{robot}: the torques of {joints} are logged in {unit}, and nothing says what torque that is at each joint: gains differ from joint to joint, and masses and inertias need them",
+        "give `torque_scale` (N or Nm per {unit} at the joint: torque constant times gear ratio) in [log.joint.NAME]",
+        "or let `lsq` find them from a log with a known payload, `--fit-gains LOG:mass=KG`",
+        "or go on with one gain for all joints, and a model in {unit}, by `--as-declared`"
     )]
     WithoutGains {
         robot: String,
@@ -127,41 +155,49 @@ pub enum IdentifyError {
         unit: &'static str,
     },
     /// No axis that is fitted to its motion.
-    #[error(
-        "--open-loop fits single axes whose robot file says `law = \"viscous-coulomb\"` and `fitted_with_inertias = true` in [friction]; fit this robot without it"
+    #[explain(
+        "--open-loop fits single axes whose robot file says `law = \"viscous-coulomb\"` and `fitted_with_inertias = true` in [friction]",
+        "fit this robot without it"
     )]
     NotByMotion,
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     ByMotion(#[from] AxisError),
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Gains(#[from] GainError),
-    #[error("{model}: {error}; {}correct the [[effect]] table, or take it out", near(.error))]
+    #[explain(
+        error.explanation().of(model),
+        format!("{}correct the [[effect]] table, or take it out", near(error))
+    )]
     Effect { model: String, error: EffectError },
     /// A formula of the user's own that is none on this robot.
-    #[error("{0}; correct the [[candidate]] table")]
+    #[explain(_0.explanation(), "correct the [[candidate]] table")]
     Formula(FormulaError),
     /// A log without a temperature that a formula takes.
-    #[error("{log}: `{effect}` takes the temperature of {joint}, and none is known: {why}")]
+    #[explain(why.clone().of(format!("{log}: `{effect}` takes the temperature of {joint}, and none is known")))]
     NoTemperature {
         log: String,
         effect: String,
         joint: String,
-        why: String,
+        why: Box<ErrorText>,
     },
     /// A candidate whose name the given model has for something else.
-    #[error(
-        "candidate `{name}`: {model} has an effect of that name with another [[candidate]] table; give the candidate another name, or leave it as it is there"
+    #[explain(
+        "candidate `{name}`: {model} has an effect of that name with another [[candidate]] table",
+        "give the candidate another name, or leave it as it is there"
     )]
     CandidateOfModel { name: String, model: String },
     /// A model that nothing was set aside for.
-    #[error(
-        "{model}: holds no [[held_out]] and [excesses], so that it is not known how large external torques are where nothing touches the robot; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside; or give a log of the robot moving freely by `--unloaded LOG`"
+    #[explain(
+        "{model}: holds no [[held_out]] and [excesses], so that it is not known how large external torques are where nothing touches the robot",
+        "fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside",
+        "or give a log of the robot moving freely by `--unloaded LOG`"
     )]
     NothingHeldOut { model: String },
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Diagnose(DiagnoseError),
-    #[error(
-        "{first} and {second} are models of different robots: the joints are {ours} in the first and {theirs} in the second; give two models that were identified on one robot"
+    #[explain(
+        "{first} and {second} are models of different robots: the joints are {ours} in the first and {theirs} in the second",
+        "give two models that were identified on one robot"
     )]
     OtherRobot {
         first: String,
@@ -223,14 +259,6 @@ impl IdentifyError {
         }
     }
 
-    /// What to do, where the text does not say it.
-    pub fn remedy(&self) -> Option<&str> {
-        match self {
-            Self::Refused { fault, .. } => Some(&fault.remedy),
-            _ => None,
-        }
-    }
-
     /// The motion of a log.
     pub(super) fn motion(of: &str, error: MotionError) -> Self {
         Self::Motion {
@@ -250,11 +278,11 @@ impl IdentifyError {
 }
 
 /// What stops the reading of a log.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum ReadError {
-    #[error(transparent)]
+    #[explain(_0.explanation())]
     Log(#[from] LogError),
-    #[error("interrupted")]
+    #[explain("interrupted")]
     Interrupted,
 }
 

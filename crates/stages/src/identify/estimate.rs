@@ -76,7 +76,7 @@ impl Account {
     }
 
     /// Says something of every joint.
-    fn tell(&mut self, machine: &LoggedRobot, of: impl Fn(usize) -> JointAccount) {
+    fn record(&mut self, machine: &LoggedRobot, of: impl Fn(usize) -> JointAccount) {
         let names = machine.robot.joint_names().iter().enumerate();
         self.joints = names
             .map(|(j, joint)| JointAccount {
@@ -146,9 +146,6 @@ type Found = (Fit, BlockFactors, Solver);
 
 /// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
 /// (18), which is then refined.
-///
-/// # Errors
-/// Every [`IdentifyError`] of logs that are read, and of a fit.
 pub fn estimate(
     passes: &mut Passes,
     columns: RegressorColumns,
@@ -308,7 +305,7 @@ fn refinement(
     account.law_refined = refined.columns.known.iter().any(Option::is_some);
     account.status = refined.ending;
     account.iterations = refined.iterations;
-    account.tell(passes.machine, |j| JointAccount {
+    account.record(passes.machine, |j| JointAccount {
         relative_error_before: Some(refined.before[j].all),
         ..JointAccount::default()
     });
@@ -333,7 +330,7 @@ fn robust_regression(
     } = robust::irls(&mut |weigher| passes.read(PositionFilter::Declared, columns, weigher))?;
     account.status = status;
     account.iterations = iterations;
-    account.tell(passes.machine, |j| JointAccount {
+    account.record(passes.machine, |j| JointAccount {
         scale: Some(scale[j]),
         down_weighted: Some(down_weighted[j]),
         ..JointAccount::default()
@@ -366,7 +363,7 @@ fn instrumental(
         Ok::<_, IdentifyError>(sums)
     })?;
     if let Some(SimulatedLoop { gains, .. }) = account.simulated.clone() {
-        account.tell(passes.machine, |j| JointAccount {
+        account.record(passes.machine, |j| JointAccount {
             proportional: gains.proportional.get(j).copied(),
             derivative: gains.derivative.get(j).copied(),
             ..JointAccount::default()

@@ -22,7 +22,7 @@ use cft_ident_core::robot::Robot;
 /// Half of the torques: the least that a dead channel leaves.
 const DEAD_CHANNEL_SHARE: f64 = 0.5;
 /// Periods of the cut-off about the ends of a stretch whose filtered rows hold both kinds.
-const ENDS: f64 = 1.0;
+const END_PERIODS: f64 = 1.0;
 
 /// Rows of one joint: those with torques, those without.
 struct JointRows {
@@ -33,9 +33,6 @@ struct JointRows {
 }
 
 /// Whether the joints move, where their torques are `off` (joint, from, to \[s\]), as they do without.
-///
-/// # Errors
-/// Those of the log; a log without a stretch that can be filtered is an answer: no.
 pub(super) fn moves_freely(
     robot: &Robot,
     settings: &FilterSettings,
@@ -60,7 +57,7 @@ pub(super) fn moves_freely(
         })
         .collect();
     let mut row = vec![0.0; unknowns + 1];
-    let near = ENDS / settings.cutoff_hz;
+    let near = END_PERIODS / settings.cutoff_hz;
     let run = motion::run(
         &mut |block| open.read(block),
         n,

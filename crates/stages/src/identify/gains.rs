@@ -235,7 +235,7 @@ fn factor(machine: &LoggedRobot, fit: &GainFit, payload: Option<&PayloadLog>, j:
 }
 
 /// Two deviations: what lies within them of zero shows nothing.
-const SHOWN: f64 = 0.5;
+const MAX_RELATIVE_STD: f64 = 0.5;
 
 /// Whether the logs fix the gains, with the sign that is declared.
 fn judged(
@@ -248,7 +248,7 @@ fn judged(
     let n = names.len();
     let spread = |j: usize| relative[(j, j)].sqrt();
     let open: Vec<usize> = (0..n)
-        .filter(|&j| !(fit.determined[j] && spread(j) <= SHOWN))
+        .filter(|&j| !(fit.determined[j] && spread(j) <= MAX_RELATIVE_STD))
         .collect();
     let listed = |joints: &[usize]| {
         let names: Vec<&str> = joints.iter().map(|j| names[*j].as_str()).collect();

@@ -12,7 +12,7 @@ use cft_ident_files::config::robot_file::ModelKind;
 use cft_ident_files::config::serial_section::LinkSection;
 
 /// Normalised condition number from which a fit has a direction that its rows hardly determine.
-const CONDITION: f64 = 1e4;
+const MAX_CONDITION: f64 = 1e4;
 /// Nearness to a multiple of pi/12 \[rad\], and to 0 \[m\]: what calibrations correct by, and rounding.
 const ROUNDING: [f64; 2] = [0.02, 2e-3];
 
@@ -85,8 +85,7 @@ fn parameters<'n>(file: &RobotFile, plain: impl Iterator<Item = &'n Nearly>) -> 
     file.robot().parameters().len()
 }
 
-/// What of the geometry makes a parameter that the rows cannot tell, where the condition number is that
-/// of such a one.
+/// What of the geometry makes a parameter that the rows do not show, where the condition number is that of such a one.
 pub(super) fn geometry(
     machine: &LoggedRobot,
     condition: Option<f64>,
@@ -94,7 +93,7 @@ pub(super) fn geometry(
 ) -> Vec<Finding> {
     let file = &machine.file;
     let open = |u: &&FittedUnknown| u.joint.is_none() && u.verdict == Verdict::NotIdentifiable;
-    let poor = condition.is_none_or(|condition| condition > CONDITION);
+    let poor = condition.is_none_or(|condition| condition > MAX_CONDITION);
     if file.robot.model != ModelKind::Serial || !poor || !unknowns.iter().any(|u| open(&u)) {
         return Vec::new();
     }

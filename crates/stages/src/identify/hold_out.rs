@@ -22,11 +22,11 @@ const MOST_ROWS: u64 = 150_000;
 /// Rows along which external torques are observed: rare excesses take more.
 const MOST_OBSERVED: u64 = 1_500_000;
 /// Pieces of a log that is longer.
-const PIECES: f64 = 12.0;
+const PIECES_OF_LONG_LOG: f64 = 12.0;
 /// Errors of each joint that quantiles are formed from.
 const MOST_ERRORS: usize = 40_000;
 /// Time before a block from which its observer runs, in periods of the cut-off.
-const LEAD: f64 = 12.0;
+const LEAD_PERIODS: f64 = 12.0;
 
 /// What is kept of it in a model file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -54,7 +54,7 @@ impl Pieces {
     fn of_each(most: u64, logs: &[Provenance]) -> Vec<Self> {
         let rows: u64 = logs.iter().map(|log| log.samples).sum();
         let share = (most as f64 / rows.max(1) as f64).min(1.0);
-        let length = |log: &Provenance| log.duration_s / PIECES;
+        let length = |log: &Provenance| log.duration_s / PIECES_OF_LONG_LOG;
         let each = logs.iter().map(|log| Self {
             length_s: length(log),
             share,
@@ -71,9 +71,6 @@ impl Pieces {
 
 /// Sets blocks of the logs that a model was fitted to aside, one after the other. `inputs` are those logs, and `machine`
 /// has the position cut-offs of the fit: the model without a block is then fitted as the model was.
-///
-/// # Errors
-/// Logs that are too short for it, and interruption.
 pub(super) fn hold_out(
     machine: &LoggedRobot,
     (file, model): (&ModelFile, &AugmentedModel),
@@ -84,9 +81,6 @@ pub(super) fn hold_out(
 }
 
 /// The same of logs that the model has nothing from.
-///
-/// # Errors
-/// Those of [`hold_out`].
 pub(super) fn on_other_logs(
     machine: &LoggedRobot,
     (file, model): (&ModelFile, &AugmentedModel),
@@ -106,9 +100,6 @@ pub(super) fn on_other_logs(
 }
 
 /// Logs smoothed by these settings; of long ones pieces all along them.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub(super) fn read_pieces(
     machine: &LoggedRobot,
     settings: &FilterSettings,
@@ -365,7 +356,7 @@ impl Watched {
             observer: Observer::new(model.clone(), settings)?,
             uncertain: uncertain.clone(),
             every: 1.0 / (KEPT * settings.cutoff_hz),
-            lead: LEAD / settings.cutoff_hz,
+            lead: LEAD_PERIODS / settings.cutoff_hz,
             next: f64::NEG_INFINITY,
             begins: true,
             done: false,

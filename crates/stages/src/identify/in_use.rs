@@ -13,7 +13,7 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 /// Bandwidth of the position loop that a lag is reported for \[Hz\]: that of a usual industrial arm.
 pub const BANDWIDTH_HZ: f64 = 5.0;
 /// Lever below which a torque is reported as it is \[m\].
-const LEVER: f64 = 0.05;
+const MIN_LEVER_M: f64 = 0.05;
 
 /// What the error of one joint means in use.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -82,7 +82,7 @@ pub fn levers(machine: &LoggedRobot, q: &[f64]) -> (Vec<Option<f64>>, String) {
             .map(|x| x * x)
             .sum::<f64>()
             .sqrt();
-        (lever >= LEVER).then_some(lever)
+        (lever >= MIN_LEVER_M).then_some(lever)
     };
     (links.map(lever).collect(), name)
 }

@@ -184,7 +184,7 @@ impl FrictionBefore {
             let (Some(covered), speed) = (self.priors[j].speeds_covered, fastest[j]) else {
                 continue;
             };
-            if speed <= BEYOND * covered[1] || self.left_out[j] {
+            if speed <= MAX_SPEED_RATIO * covered[1] || self.left_out[j] {
                 continue;
             }
             let law = columns.known[j]
@@ -257,9 +257,6 @@ fn refined_by(mut priors: Vec<FrictionPrior>, inputs: &[Provenance]) -> Vec<Fric
 
 /// The model as it was before a diagnosis of the logs `given`: with the friction that is known without them. With it what
 /// a refined model keeps of that.
-///
-/// # Errors
-/// A model without a joint's friction.
 pub(super) fn before_these(
     (name, file): (&str, &ModelFile),
     given: &[Provenance],
@@ -290,7 +287,7 @@ pub(super) fn before_these(
 }
 
 /// A speed over the greatest of the one-joint logs up to which their law is not continued.
-const BEYOND: f64 = 1.1;
+const MAX_SPEED_RATIO: f64 = 1.1;
 
 /// Covariance of the unknowns of a linear fit and of the friction that it took as known: cov(theta, theta_f) = S
 /// Sigma_f, with S = d theta / d theta_f.

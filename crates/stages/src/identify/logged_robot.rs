@@ -25,7 +25,7 @@ use cft_ident_logs::inspect::{Gate, LogFault};
 use cft_ident_logs::log::{Block, Layout, LogError, Reader, RowFault, escape};
 
 /// Share of a period of the cut-off for which rows may be missing: interpolation is at the noise there.
-const BRIDGED: f64 = 0.125;
+const BRIDGED_PERIODS: f64 = 0.125;
 
 /// The same processing with a narrower position filter.
 pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
@@ -154,9 +154,6 @@ impl LoggedRobot {
     }
 
     /// Speed up to which each joint rests, by the log in which it moves most [m/s or rad/s].
-    ///
-    /// # Errors
-    /// A log that cannot be read or is refused, and interruption.
     pub(super) fn rest_speeds(
         &self,
         logs: &[Log],
@@ -166,9 +163,6 @@ impl LoggedRobot {
     }
 
     /// Greatest speed of every joint in these logs [m/s or rad/s].
-    ///
-    /// # Errors
-    /// Those of [`Self::rest_speeds`].
     pub(super) fn fastest(
         &self,
         logs: &[Log],
@@ -204,9 +198,6 @@ impl LoggedRobot {
     }
 
     /// First and last time of a log, by its own clock [s].
-    ///
-    /// # Errors
-    /// Those of [`Self::rest_speeds`].
     pub(super) fn bounds(&self, log: &Log, control: &Control) -> Result<[f64; 2], IdentifyError> {
         let look = self.first_look(log, &self.file.layout(), control)?;
         let zero = look.gate.origin().seconds();
@@ -214,18 +205,12 @@ impl LoggedRobot {
     }
 
     /// Time of the first row that is read of a log, as its rows have it [s].
-    ///
-    /// # Errors
-    /// Those of [`Self::rest_speeds`].
     pub(super) fn first_row(&self, log: &Log, control: &Control) -> Result<f64, IdentifyError> {
         let look = self.first_look(log, &self.file.layout(), control)?;
         Ok(look.bounds[0])
     }
 
     /// Whether numbers of these logs are bridged.
-    ///
-    /// # Errors
-    /// Those of [`Self::rest_speeds`].
     pub(super) fn bridges(&self, logs: &[Log], control: &Control) -> Result<bool, IdentifyError> {
         for log in logs {
             let look = self.first_look(log, &self.file.layout(), control)?;
@@ -271,9 +256,6 @@ impl LoggedRobot {
     }
 
     /// The fault for which a fit refuses a log, where it has one.
-    ///
-    /// # Errors
-    /// A log that cannot be read, and interruption.
     pub fn fault(&self, log: &Log, control: &Control) -> Result<Option<LogFault>, IdentifyError> {
         let look = self.look(log, &self.file.layout(), control)?;
         Ok(look.gate.refusal().cloned())
@@ -358,9 +340,6 @@ impl LoggedRobot {
     }
 
     /// Opens a log for its positions alone: it needs no torque channels.
-    ///
-    /// # Errors
-    /// A log that cannot be read or is refused, and interruption.
     pub fn open_positions<'a>(
         &self,
         log: &Log,
@@ -392,9 +371,6 @@ impl LoggedRobot {
     }
 
     /// Opens a log as it was logged, in SI units: motors' channels stay what they are.
-    ///
-    /// # Errors
-    /// A log that cannot be read or is refused, and interruption.
     pub(super) fn open_channels<'a>(
         &self,
         log: &Log,
@@ -404,9 +380,6 @@ impl LoggedRobot {
     }
 
     /// Opens a log with every torque at the time and pose of its row.
-    ///
-    /// # Errors
-    /// A log that cannot be read or is refused, and interruption.
     pub fn open<'a>(
         &'a self,
         log: &Log,
@@ -455,7 +428,7 @@ impl LoggedRobot {
             // a factor that is declared is meant
             bridge_s: match f.gap_factor {
                 Some(_) => 0.0,
-                None => BRIDGED / f.cutoff_hz.unwrap_or(plain.cutoff_hz),
+                None => BRIDGED_PERIODS / f.cutoff_hz.unwrap_or(plain.cutoff_hz),
             },
             q_trim_s: f.position_trim_s,
             trim_s: f.trim_s,
@@ -465,8 +438,7 @@ impl LoggedRobot {
         }
     }
 
-    /// Travel of a joint by its machine, else by the file's limits; a turn, or a metre, where neither
-    /// has one.
+    /// Travel of a joint by its machine, else by the file's limits; a turn, or a metre, where neither has one.
     fn range(&self, j: usize, name: &str) -> f64 {
         if let Some(range) = self.robot.transmission().full_travel(j) {
             return range;

@@ -263,7 +263,7 @@ pub fn lsq(
         .iter()
         .map(left)
         .fold(f64::INFINITY, f64::min);
-    if !unknowns.iter().any(|u| known(&u)) && least > NOISE {
+    if !unknowns.iter().any(|u| known(&u)) && least > NOISE_ONLY_SHARE {
         return Err(IdentifyError::OnlyNoise { left: least });
     }
     let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
@@ -345,7 +345,7 @@ fn share_uncertainty(estimated: &mut Estimated, gains: &CurrentGains) -> Result<
 
 /// Share of the torque that a fit leaves of every joint where noise is as large as the torque: noise alone leaves 0.7 of
 /// the sum of two that are equal.
-const NOISE: f64 = 0.7;
+const NOISE_ONLY_SHARE: f64 = 0.7;
 /// The essential unknowns, and the relative residual of each joint with those alone.
 fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyError> {
     let (fit, basis) = (&estimated.fit, &estimated.basis);

@@ -21,9 +21,6 @@ pub fn refined(file: &ModelFile, name: &str) -> Result<AugmentedModel, IdentifyE
 }
 
 /// The same of a file that may hold friction alone, with inertias of 0 then: for what asks for no torque.
-///
-/// # Errors
-/// Those of [`refined`].
 pub fn refined_or_friction(file: &ModelFile, name: &str) -> Result<AugmentedModel, IdentifyError> {
     with_effects(file, name, file.model_or_friction(name)?)
 }
@@ -54,9 +51,6 @@ fn with_effects(
 }
 
 /// The laws of a user's own effects on a robot.
-///
-/// # Errors
-/// [`IdentifyError::Formula`] for a formula that is none on this robot.
 pub(super) fn own_laws(
     candidates: &[CandidateSection],
     robot: &Robot,
@@ -89,14 +83,14 @@ pub(super) fn own_laws(
 pub(super) fn in_file(
     effect: &Added,
     machine: &LoggedRobot,
-    told: &[EffectNumber],
+    numbers: &[EffectNumber],
 ) -> EffectSection {
     EffectSection {
         name: effect.name().to_owned(),
         joint: effect.place.name(&machine.robot),
         shrinkage: None,
         accepted_by_user: false,
-        parameters: told
+        parameters: numbers
             .iter()
             .map(|t| {
                 let parameter = EffectParameter {

@@ -12,7 +12,7 @@ use cft_ident_logs::inspect::Cutter;
 use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader};
 
 /// A velocity column is off by more than filters and steps make of it.
-const OFF: f64 = 0.1;
+const VELOCITY_SCALE_TOLERANCE: f64 = 0.1;
 
 /// A log that is being read.
 pub struct OpenLog<'a> {
@@ -27,9 +27,6 @@ pub struct OpenLog<'a> {
 
 impl OpenLog<'_> {
     /// The next block, without the rows that are marked bad; false at the end.
-    ///
-    /// # Errors
-    /// [`ReadError`].
     pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
         loop {
             if self.control.stopped() {
@@ -85,7 +82,7 @@ impl OpenLog<'_> {
     fn velocities(&self) -> Option<String> {
         let names = &self.layout().joints;
         let off = |(j, factor): (usize, &Option<f64>)| {
-            let factor = factor.filter(|x| (x - 1.0).abs() > OFF)?;
+            let factor = factor.filter(|x| (x - 1.0).abs() > VELOCITY_SCALE_TOLERANCE)?;
             Some((names.get(j)?.as_str(), factor))
         };
         let off: Vec<(&str, f64)> = self
@@ -97,7 +94,7 @@ impl OpenLog<'_> {
             .collect();
         let known = self.look.velocities.iter().flatten().count();
         let (first, others) = off.split_first()?;
-        let alike = |(_, x): &(&str, f64)| (x / first.1 - 1.0).abs() < OFF;
+        let alike = |(_, x): &(&str, f64)| (x / first.1 - 1.0).abs() < VELOCITY_SCALE_TOLERANCE;
         let each: Vec<String> = off
             .iter()
             .map(|(j, x)| format!("{j} {}", number::significant(*x, 3)))

@@ -18,9 +18,6 @@ const WINDOW_S: f64 = 0.25;
 
 /// Simulates the motion of logs from their torques, in windows that begin at measured states; without a length
 /// single axes run from the begin of each stretch to its end, and other robots in windows of 0.25 s.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub fn open_loop(
     machine: &LoggedRobot,
     refined: &AugmentedModel,
@@ -47,9 +44,6 @@ pub fn open_loop(
 
 /// The free run of a model on logs, which are these inputs; nothing where torques are in no SI unit, where a log is
 /// reduced, or where the logs are too short.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub fn free_run(
     machine: &LoggedRobot,
     refined: &AugmentedModel,

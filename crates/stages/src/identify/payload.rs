@@ -40,9 +40,9 @@ const BLOCK_S: f64 = 0.25;
 /// Rounds of the joints' weights and of the gains, which multiply the body too.
 const ROUNDS: usize = 4;
 /// Share of the largest singular value (columns scaled) below which a direction is not excited.
-const NOTHING: f64 = 1e-7;
+const UNEXCITED_SHARE: f64 = 1e-7;
 /// Share of a number in a direction that is not excited from which on it is open.
-const PART: f64 = 1e-3;
+const OPEN_PART: f64 = 1e-3;
 
 /// Filtered rows of every joint, and the sums that say what the model's own parameters do to a fit of them.
 struct Rows {
@@ -349,11 +349,11 @@ fn inverse(normal: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), IdentifyE
     let mut out = DMatrix::zeros(u, u);
     for k in 0..u {
         let v = parts.v.column(k);
-        if parts.s[k] > NOTHING * NOTHING * parts.s[0] {
+        if parts.s[k] > UNEXCITED_SHARE * UNEXCITED_SHARE * parts.s[0] {
             out += v * v.transpose() / parts.s[k];
         } else {
             for (open, part) in open.iter_mut().zip(v.iter()) {
-                *open |= part.abs() > PART;
+                *open |= part.abs() > OPEN_PART;
             }
         }
     }

@@ -11,7 +11,7 @@ use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
 use cft_ident_logs::log::Provenance;
 
 /// Standard deviations by which two readings contradict each other: as many as a change between logs needs.
-const FAR: f64 = 3.0;
+const CONTRADICTION_DEVIATIONS: f64 = 3.0;
 
 /// What a log says of the mass on the last link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -100,7 +100,7 @@ impl Number95 {
         let [Some(own), Some(std)] = [self.value, self.std] else {
             return false;
         };
-        (value - own).abs() > FAR * std
+        (value - own).abs() > CONTRADICTION_DEVIATIONS * std
     }
 }
 

@@ -27,9 +27,9 @@ use cft_ident_logs::log::Block;
 const MOST_ROWS: usize = 120_000;
 const LEAST_ROWS: usize = 20_000;
 /// A declared cut-off is reported as wrong where it costs more than this many times the best one ..
-const WRONG: f64 = 1.3;
+const WRONG_CUTOFF_COST_RATIO: f64 = 1.3;
 /// .. and more than this part of the residual.
-const TOLD: f64 = 0.5;
+const MIN_COST_SHARE_OF_RESIDUAL: f64 = 0.5;
 
 /// Position cut-off of one joint, and what its friction loses by it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -122,7 +122,10 @@ impl PositionCutoff {
     /// `residual` \[unit\].
     fn wrong(&self, best: f64, residual: f64) -> Option<String> {
         let total = self.smear.hypot(self.noise);
-        if !self.declared || total <= TOLD * residual || total <= WRONG * best {
+        if !self.declared
+            || total <= MIN_COST_SHARE_OF_RESIDUAL * residual
+            || total <= WRONG_CUTOFF_COST_RATIO * best
+        {
             return None;
         }
         let hz = |x: f64| format!("{} Hz", number::significant(x, 3));
@@ -171,9 +174,6 @@ type Open<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
 impl LoggedRobot {
     /// The same robot with the position cut-offs that its logs call for. `laws` is the friction of each joint, none
     /// where it is not known.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn with_position_cutoffs(
         &self,
         logs: &[Log],
@@ -187,9 +187,6 @@ impl LoggedRobot {
     /// The processing of each log by the position cut-offs that it calls for itself: a slow log must not narrow those
     /// of a quick one. A joint that rests in it gets the cut-off of all logs, which are those of `together`: the
     /// widest would let the rounding of its encoder through.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn settings_of_each(
         &self,
         logs: &[Log],
@@ -214,9 +211,6 @@ impl LoggedRobot {
 
     /// The same for logs that `open` opens, in which each joint rests up to its `rest_speed`; nothing is read where
     /// cut-offs are declared.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn with_cutoffs_along(
         &self,
         logs: &[Log],
@@ -231,9 +225,6 @@ impl LoggedRobot {
     }
 
     /// What each log calls for. `laws` is the friction of each joint, none where it is not known.
-    ///
-    /// # Errors
-    /// A log that cannot be used, and interruption.
     pub(super) fn own_settings(
         &self,
         logs: &[Log],

@@ -20,9 +20,6 @@ use cft_ident_files::config::robot_file::FrictionLawKind;
 
 impl ReducedLogs {
     /// Reads a file.
-    ///
-    /// # Errors
-    /// Those of [`Self::from_bytes`], and a file that cannot be read.
     pub fn load(path: &Path) -> Result<Self, IdentifyError> {
         let bytes = cft_ident_logs::log::bytes(path)?;
         Ok(Self::from_bytes(&path.to_string_lossy(), &bytes)?)

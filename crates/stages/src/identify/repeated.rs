@@ -9,9 +9,6 @@ use cft_ident_logs::log::{Layout, Provenance, escape, sha256, shares_rows};
 pub(super) type Role<'a> = (&'static str, &'a [Log]);
 
 /// Refuses two logs with the same rows, within a role and between roles.
-///
-/// # Errors
-/// [`IdentifyError::SameRows`] for the first two.
 pub(super) fn each_row_once(machine: &LoggedRobot, roles: &[Role]) -> Result<(), IdentifyError> {
     let all: Vec<(&str, &Log)> = roles
         .iter()

@@ -32,9 +32,6 @@ pub struct CheckedSetup {
 
 /// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
 /// logs are passed over: they hold no rows to look at, and were checked when they were made.
-///
-/// # Errors
-/// Logs that cannot be read or are refused, and interruption.
 pub fn check_setup(
     machine: &LoggedRobot,
     logs: &[Log],
@@ -110,9 +107,6 @@ fn known(machine: &LoggedRobot) -> KnownBeforehand {
 }
 
 /// A bounded number of rows of logs, as the robot file declares them.
-///
-/// # Errors
-/// Logs that cannot be read or are refused, and interruption.
 fn sampled(
     machine: &LoggedRobot,
     logs: &[Log],

@@ -5,16 +5,16 @@ use cft_ident_logs::log::{Block, Conversion};
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against a motion.
 const SPACING_S: f64 = 0.02;
 /// Share of a time that is as good as all of it.
-const ROUNDED: f64 = 0.999;
+const FULL_TIME_SHARE: f64 = 0.999;
 /// Speed up to which a joint rests, over its rms speed.
-const RESTING: f64 = 0.01;
+const RESTING_SPEED_SHARE: f64 = 0.01;
 /// Speed that is rounding and no motion [m/s or rad/s]: a joint of one position rests.
-const ROUNDING: f64 = 1e-9;
+const ROUNDING_SPEED: f64 = 1e-9;
 
 /// Steps from which on rows may be poses [s]: no machine is logged in motion so slowly.
 const POSE_S: f64 = 0.2;
 /// Correlation from which on a velocity column follows the position.
-const FOLLOWS: f64 = 0.9;
+const MIN_VELOCITY_CORRELATION: f64 = 0.9;
 
 /// Sums of a joint's velocity column v and the derivative d of its position.
 #[derive(Debug, Clone, Copy, Default)]
@@ -115,7 +115,7 @@ impl SpeedMeter {
             }
             let step = self.last.map_or(f64::INFINITY, |last| t - last);
             // times are rounded, and otherwise where the clock's zero lies
-            let short = ROUNDED * SPACING_S;
+            let short = FULL_TIME_SHARE * SPACING_S;
             // a step back is a fault of the clock, and another begin
             if (0.0..short).contains(&step) {
                 continue;
@@ -164,7 +164,8 @@ impl SpeedMeter {
     /// follow that.
     pub(super) fn velocities(&self) -> Vec<Option<f64>> {
         let factor = |p: &Pair| {
-            let follows = p.vd.abs() > FOLLOWS * (p.vv * p.dd).sqrt() && p.dd > 0.0;
+            let follows =
+                p.vd.abs() > MIN_VELOCITY_CORRELATION * (p.vv * p.dd).sqrt() && p.dd > 0.0;
             follows.then(|| p.vd / p.dd)
         };
         self.pairs.iter().map(factor).collect()
@@ -198,7 +199,7 @@ impl SpeedMeter {
             true => (square / self.seconds).sqrt(),
             false => 0.0,
         };
-        let rests = |square| (RESTING * rms(square)).max(ROUNDING);
+        let rests = |square| (RESTING_SPEED_SHARE * rms(square)).max(ROUNDING_SPEED);
         self.squares.iter().map(rests).collect()
     }
 }

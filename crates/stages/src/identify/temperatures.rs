@@ -4,6 +4,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::effect::{AugmentedModel, Law};
+use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::motion::Stretch;
 use cft_ident_logs::log::{Instant, LogError, Temperatures};
 
@@ -50,7 +51,10 @@ pub(super) fn none_on(stream: &str, model: &AugmentedModel) -> IdentifyError {
         log: stream.to_owned(),
         effect,
         joint: model.model.robot.joint_names()[joint].clone(),
-        why: "rows that arrive on a stream carry none; watch the log as a file".to_owned(),
+        why: Box::new(
+            ErrorText::new("rows that arrive on a stream carry none")
+                .remedy("watch the log as a file"),
+        ),
     }
 }
 
@@ -71,9 +75,6 @@ impl LoggedRobot {
 
     /// Puts the temperatures of a log beside its stretches. A column that it lacks is reported alone: whether anything
     /// takes it is for [`Self::check_temperatures`].
-    ///
-    /// # Errors
-    /// A temperature that is no number, or a log that cannot be read.
     pub(super) fn put_temperatures(
         &self,
         log: &Log,
@@ -95,9 +96,6 @@ impl LoggedRobot {
     }
 
     /// Refuses logs, read as these stretches, without the temperatures that the effects of a model take.
-    ///
-    /// # Errors
-    /// [`IdentifyError::NoTemperature`].
     pub fn check_temperatures(
         &self,
         model: &AugmentedModel,
@@ -124,9 +122,6 @@ impl LoggedRobot {
     }
 
     /// The temperatures of a log for a model that takes some, without its rows.
-    ///
-    /// # Errors
-    /// [`IdentifyError::NoTemperature`], and those of [`Self::temperatures`].
     pub(super) fn temperatures_for(
         &self,
         model: &AugmentedModel,
@@ -147,18 +142,19 @@ impl LoggedRobot {
     fn no_temperature(&self, log: &Log, effect: &str, joint: usize) -> IdentifyError {
         let name = &self.robot.joint_names()[joint];
         let why = match (self.temperatures(log, Instant::default()), log) {
-            (Err(error), _) => error.to_string(),
-            (Ok(_), Log::Arrays(_)) => "give it with the log's other arrays".to_owned(),
+            (Err(error), _) => error.explanation(),
+            (Ok(_), Log::Arrays(_)) => "give it with the log's other arrays".into(),
             (Ok(_), _) => format!(
                 "name its column, `[log.joint.{name}] temperature = \"COLUMN\"` in the robot or model file, or leave {name} \
                  out of the formula and of the `joints` of its [[candidate]] table"
-            ),
+            )
+            .into(),
         };
         IdentifyError::NoTemperature {
             log: log.name(),
             effect: effect.to_owned(),
             joint: name.clone(),
-            why,
+            why: Box::new(why),
         }
     }
 }

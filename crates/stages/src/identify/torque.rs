@@ -46,9 +46,6 @@ pub struct FeedForward {
 /// Torques along a log of positions by a model, `refined` being what its `file` stands for. `row` gets
 /// the time of each sample \[s\], the torque of every joint, their standard deviations and, where the file holds what
 /// it takes, half the widths of their 95 % bands \[N or Nm\], and the instant from which time is counted.
-///
-/// # Errors
-/// A log that cannot be used.
 pub fn torque(
     machine: &LoggedRobot,
     (file, refined): (&ModelFile, &AugmentedModel),

@@ -20,11 +20,11 @@ use cft_ident_logs::log::Provenance;
 /// Probability at which changes are reported of a robot that has none, all its parameters together, at one look. A robot is
 /// looked at after each of its logs, and payloads follow no normal law: over fifty logs there are more
 /// (`examples/study_track`).
-const ALARMS: f64 = 0.0002;
+const FALSE_ALARM_PROBABILITY: f64 = 0.0002;
 /// The same of robots of a fleet that are alike.
-const DIFFERENCES: f64 = 0.01;
+const FALSE_DIFFERENCE_PROBABILITY: f64 = 0.01;
 /// A time between two logs over the usual one from which on the clock is doubted.
-const JUMP: f64 = 1000.0;
+const CLOCK_JUMP_STEPS: f64 = 1000.0;
 
 /// One robot, and its logs or models.
 #[derive(Debug, Clone)]
@@ -119,9 +119,6 @@ pub struct FleetDifference {
 }
 
 /// Follows the parameters of robots.
-///
-/// # Errors
-/// Sources that cannot be ordered or belong to other robots, and interruption.
 pub fn track(robots: &[RobotSources], control: &Control) -> Result<Tracked, IdentifyError> {
     if robots.iter().all(|r| r.sources.is_empty()) {
         return Err(TrackError::Empty.into());
@@ -238,9 +235,9 @@ fn jump(robot: &RobotSources, places: &[usize], times: &[f64]) -> Option<String>
     let (at, far) = far.map(|(at, far)| (at, *far))?;
     steps.sort_by(f64::total_cmp);
     let usual = steps[steps.len() / 2];
-    (steps.len() > 2 && usual > 0.0 && far > JUMP * usual).then(|| {
+    (steps.len() > 2 && usual > 0.0 && far > CLOCK_JUMP_STEPS * usual).then(|| {
         format!(
-            "{}: the clock jumps by {far:.0} s between {} and {}, {JUMP} times the usual time between logs or more; if it was set there, give numbers of seconds that run on",
+            "{}: the clock jumps by {far:.0} s between {} and {}, {CLOCK_JUMP_STEPS} times the usual time between logs or more; if it was set there, give numbers of seconds that run on",
             robot.name,
             robot.sources[places[at]].name(),
             robot.sources[places[at + 1]].name()
@@ -302,7 +299,7 @@ fn followed(
         })
         .collect::<Result<_, _>>()?;
     let groups = groups(&found);
-    let level = ALARMS / groups.len().max(1) as f64;
+    let level = FALSE_ALARM_PROBABILITY / groups.len().max(1) as f64;
     let (mut parameters, mut changes) = (Vec::new(), Vec::new());
     for keys in &groups {
         let of_key = |key: &&OneEstimate| -> Vec<LogEstimate> {
@@ -370,7 +367,7 @@ fn correlation(found: &[Source], keys: &[&OneEstimate]) -> Option<Vec<f64>> {
 
 /// Sizes of a joint's friction that are less than so many deviations from none are not named in a change that others
 /// show.
-const SHOWN: f64 = 2.0;
+const MIN_SHOWN_DEVIATIONS: f64 = 2.0;
 
 /// Changes of one parameter of those that are followed together.
 fn changed(
@@ -382,7 +379,7 @@ fn changed(
     let clear = |c: &ParameterChange| (c.size / c.std).abs();
     let shown = |(i, change): &(usize, &ParameterChange)| {
         let all = together.iter().map(|course| clear(&course.changes[*i]));
-        clear(change) >= all.fold(0.0, f64::max).min(SHOWN)
+        clear(change) >= all.fold(0.0, f64::max).min(MIN_SHOWN_DEVIATIONS)
     };
     let changes = course.changes.iter().enumerate().filter(shown);
     let reported = changes.map(|(_, c)| {
@@ -457,7 +454,7 @@ fn compared(robots: &[TrackedRobot]) -> Vec<FleetDifference> {
             }
         }
     }
-    apart(&levels, DIFFERENCES)
+    apart(&levels, FALSE_DIFFERENCE_PROBABILITY)
         .into_iter()
         .map(|one| {
             let key = &first.parameters[one.level.parameter];

@@ -94,9 +94,6 @@ pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
 ///
 /// Band and rows are of positions that came through the filter by which the band was found: where these logs call for
 /// another, they are read again.
-///
-/// # Errors
-/// Logs that cannot be used.
 pub fn validate(
     machine: &LoggedRobot,
     (refined, file): (&AugmentedModel, Option<&ModelFile>),
@@ -159,9 +156,9 @@ pub fn validate(
 }
 
 /// Share of its travel by which a joint of the same robot may stand beyond its limits: stops give way, zeros drift.
-const BEYOND: f64 = 0.1;
+const BEYOND_LIMITS_SHARE: f64 = 0.1;
 /// Share of the rows beyond from which on it is no spike.
-const ROWS: f64 = 0.01;
+const ROWS_BEYOND_SHARE: f64 = 0.01;
 
 /// Where joints stand along logs, beside where they can.
 struct Places {
@@ -176,7 +173,7 @@ impl Places {
     fn new(machine: &LoggedRobot) -> Self {
         let limits = machine.robot.joint_names().iter().map(|joint| {
             let [low, high] = machine.file.limits.get(joint)?.position?;
-            let room = BEYOND * (high - low);
+            let room = BEYOND_LIMITS_SHARE * (high - low);
             Some([low - room, high + room])
         });
         let limits: Vec<Option<[f64; 2]>> = limits.collect();
@@ -202,7 +199,7 @@ impl Places {
 
     /// The refusal of positions where a joint of this robot cannot stand.
     fn refused(&self, machine: &LoggedRobot) -> Option<IdentifyError> {
-        let far = |j: &usize| self.beyond[*j] as f64 > ROWS * self.rows as f64;
+        let far = |j: &usize| self.beyond[*j] as f64 > ROWS_BEYOND_SHARE * self.rows as f64;
         let j = (0..self.limits.len()).find(far)?;
         let joint = machine.robot.joint_names().get(j)?;
         let shown = |range: [f64; 2]| range.map(|x| number::significant(x, 4)).join("..");
@@ -216,7 +213,7 @@ impl Places {
 }
 
 /// A torque of so many times the largest that was measured is of a model that does not hold.
-const IMPOSSIBLE: f64 = 10.0;
+const IMPOSSIBLE_TORQUE_RATIO: f64 = 10.0;
 
 /// The largest torques of every joint, measured and reconstructed, and when.
 struct Beyond {
@@ -253,8 +250,9 @@ impl Beyond {
     ) -> Option<IdentifyError> {
         let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
         let rms = |j: usize| errors.joints.get(j).map_or(0.0, |e| e.rmse);
-        let mut off =
-            pairs.filter(|(j, (m, r))| **m > 0.0 && r.0 > IMPOSSIBLE * **m && rms(*j) > **m);
+        let mut off = pairs.filter(|(j, (m, r))| {
+            **m > 0.0 && r.0 > IMPOSSIBLE_TORQUE_RATIO * **m && rms(*j) > **m
+        });
         let (j, (measured, (torque, t))) = off.next()?;
         let names: Vec<String> = logs.iter().map(Log::name).collect();
         Some(IdentifyError::Impossible {
@@ -281,9 +279,6 @@ pub fn not_a_validation(errors: &TorqueErrors) -> Option<String> {
 }
 
 /// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
-///
-/// # Errors
-/// [`ReducedError::NeedsLog`] with the joint and both cut-offs.
 fn smoothed_alike(machine: &LoggedRobot, logs: &[Log]) -> Result<(), IdentifyError> {
     let parts: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
     let Some(first) = parts.first().filter(|_| machine.finds_cutoffs()) else {

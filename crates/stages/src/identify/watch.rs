@@ -73,7 +73,7 @@ pub struct WatchedJoint {
 
 /// Share of the greatest torque of a joint from which on a threshold hardly shows anything: a push that needs half of
 /// what the drive gives is a crash.
-const BLIND: f64 = 0.5;
+const BLIND_SHARE: f64 = 0.5;
 
 /// What was seen along a log or a stream.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -269,7 +269,7 @@ pub fn watch(
                 JointKind::Prismatic => Some(least),
                 JointKind::Revolute => levers[j].map(|lever| least / lever),
             },
-            blind: least > BLIND * held.torque_seen,
+            blind: least > BLIND_SHARE * held.torque_seen,
         }
     });
     let joints: Vec<WatchedJoint> = joints.collect();

@@ -12,9 +12,9 @@ const USUAL_CLUSTERS: usize = 40;
 /// Levels to try: shares of the samples below.
 const LEVELS: [f64; 6] = [0.995, 0.99, 0.98, 0.96, 0.93, 0.9];
 /// Peaks that are kept at most.
-const PEAKS: usize = 256;
+const MAX_PEAKS: usize = 256;
 /// Share of the external torques' mean square that the parameters' deviation leaves at least.
-const LEFT: f64 = 0.04;
+const MIN_VARIANCE_SHARE: f64 = 0.04;
 /// Samples that a deviation of its own takes.
 const MIN_SAMPLES: usize = 40;
 
@@ -114,7 +114,7 @@ impl Quiet {
                     (sum + square, own + square - s.variance(j), n + 1)
                 });
                 // what the parameters' deviation leaves, of which something always is there
-                (own.max(LEFT * sum), count)
+                (own.max(MIN_VARIANCE_SHARE * sum), count)
             };
             let (all, count) = squares(None);
             let all = (all / count as f64).sqrt().max(f64::MIN_POSITIVE);
@@ -187,7 +187,7 @@ impl Quiet {
 fn largest(peaks: &[f64]) -> Vec<f64> {
     let mut peaks = peaks.to_vec();
     peaks.sort_by(|a, b| b.total_cmp(a));
-    peaks.truncate(PEAKS);
+    peaks.truncate(MAX_PEAKS);
     peaks
 }
 

@@ -11,7 +11,7 @@ use cft_ident_core::robot::friction::sign;
 /// Share of the external torque's power that an explanation takes away, at least.
 const LEAST_SHARE: f64 = 0.5;
 /// Rows that a number takes, at least.
-const ROWS: f64 = 10.0;
+const MIN_ROWS_PER_NUMBER: f64 = 10.0;
 
 /// A number of an explanation.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -121,7 +121,7 @@ impl Explainer {
     /// The explanation that takes away most, where one takes away enough.
     pub fn explanation(&self) -> Option<Explanation> {
         let all: f64 = self.power.iter().sum();
-        if all <= 0.0 || self.rows < ROWS {
+        if all <= 0.0 || self.rows < MIN_ROWS_PER_NUMBER {
             return None;
         }
         let n = self.friction.len() as f64;

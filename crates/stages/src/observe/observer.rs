@@ -72,9 +72,6 @@ pub(super) struct Late {
 
 impl Observer {
     /// An observer by a model; `settings` are those of its robot.
-    ///
-    /// # Errors
-    /// [`MotionError::Setting`].
     pub fn new(model: AugmentedModel, settings: &FilterSettings) -> Result<Self, MotionError> {
         Ok(Self {
             motion: CausalMotion::new(model.model.robot.joints(), settings)?,
@@ -113,9 +110,6 @@ impl Observer {
 
     /// Takes rows and hands out the external torques that they determine, none before the sampling step is known
     /// (256 rows) and filters have settled. With `last`, all that is left.
-    ///
-    /// # Errors
-    /// [`MotionError`].
     pub fn push(
         &mut self,
         rows: &Block,

@@ -1,6 +1,7 @@
 //! What a fit to the motion of one axis has: how long its windows are, and which friction it adds, both by blocks of
 //! the logs that are set aside one after the other and simulated from begin to end.
 
+use cft_ident_core::explain::Explain;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -27,21 +28,23 @@ const MIN_WINDOW_SAMPLES: usize = 20;
 const ALL: usize = usize::MAX;
 
 /// Why no fit is made.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum AxisError {
     /// Blocks that are set aside hold no window.
-    #[error(
-        "windows of {window_s} s do not fit into a quarter of the logs, which is set aside to check the fit ({} s): give longer logs, or --open-loop=SECONDS with fewer seconds",
-        number::significant(*block_s, 3)
+    #[explain(
+        format!(
+            "windows of {window_s} s do not fit into a quarter of the logs, which is set aside to check the fit ({} s): give longer logs, or --open-loop=SECONDS with fewer seconds",
+            number::significant(*block_s, 3)
+        )
     )]
     TooShort { window_s: f64, block_s: f64 },
     /// The motion that the model of the torques makes is none.
-    #[error(
+    #[explain(
         "the motion simulated from the torques goes astray with the numbers that least squares finds: look at mass and viscous friction, which must be above 0, with `lsq` without --open-loop"
     )]
     Astray,
     /// Somebody stopped it.
-    #[error("interrupted")]
+    #[explain("interrupted")]
     Stopped,
 }
 
@@ -93,9 +96,6 @@ pub struct AxisFit {
 
 /// Fits a model of one axis to its motion, in windows of `window` seconds or of a length that blocks set aside choose.
 /// `offset` says whether the constant torque is fitted; `stop` is asked now and then.
-///
-/// # Errors
-/// [`AxisError`].
 pub fn fit_axis(
     start: &AugmentedModel,
     stretches: &[Stretch],
@@ -245,13 +245,19 @@ impl Trial<'_> {
         model: &AugmentedModel,
         columns: &Columns,
         (spans, length): (&[RunSpan], f64),
-        told: bool,
+        with_covariance: bool,
     ) -> Result<Option<Fitted>, AxisError> {
         if (self.stop)() {
             return Err(AxisError::Stopped);
         }
         let windows = windows(self.stretches, spans, length);
-        Ok(fit(model, self.stretches, &windows, columns, told))
+        Ok(fit(
+            model,
+            self.stretches,
+            &windows,
+            columns,
+            with_covariance,
+        ))
     }
 
     /// Error on each block of a fit to the others, and the model of a fit to all that began at `near`; none where a motion

@@ -29,7 +29,7 @@ pub(super) const POSITIONS: usize = 50;
 /// Most steps that are tried.
 const MAX_STEPS: usize = 40;
 /// Share of the cost below which a step brings nothing.
-const SETTLED: f64 = 1e-4;
+const MIN_COST_DECREASE: f64 = 1e-4;
 const DAMPING: StepControl = StepControl::damping(6.0, 4.0, [1e-6, 1e8]);
 
 /// A span of a stretch: its number, first sample and the one after the last.
@@ -169,14 +169,14 @@ struct At {
     slopes: DMatrix<f64>,
 }
 
-/// Fits the free numbers, from those that the model has; none where the first motion goes astray. `told` says that
+/// Fits the free numbers, from those that the model has; none where the first motion goes astray. `with_covariance` says that
 /// the covariance is wanted for itself.
 pub(super) fn fit(
     start: &AugmentedModel,
     stretches: &[Stretch],
     windows: &[RunSpan],
     columns: &Columns,
-    told: bool,
+    with_covariance: bool,
 ) -> Option<Fitted> {
     let along = |x: &[f64]| errors(&with_numbers(start, x), stretches, windows, POSITIONS);
     let free = &columns.free;
@@ -223,7 +223,7 @@ pub(super) fn fit(
         if gain.is_nan() || gain <= 0.0 {
             return Ok(Trial::Rejected);
         }
-        if gain < SETTLED * before {
+        if gain < MIN_COST_DECREASE * before {
             // nearly those of the point before, and nothing moves by them any more
             let slopes = at.slopes.clone();
             return Ok(Trial::Last(At { x, errors, slopes }));
@@ -232,10 +232,10 @@ pub(super) fn fit(
     });
     let Ok((mut at, ending, steps)) = found;
     // differences to both sides where deviations hang on them
-    if told {
+    if with_covariance {
         at.slopes = slopes(&at.x, &at.errors, true)?;
     }
-    let covariance = match told {
+    let covariance = match with_covariance {
         true => covariance(&at, stretches, windows, free),
         false => DMatrix::zeros(0, 0),
     };

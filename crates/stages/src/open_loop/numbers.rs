@@ -9,9 +9,9 @@ use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::JointFriction;
 
 /// A difference of a number makes this share of the torque's rms.
-const SHARE: f64 = 1e-3;
+const STEP_TORQUE_SHARE: f64 = 1e-3;
 /// Samples along which columns of torque are looked at.
-const ROWS: usize = 4000;
+const MAX_SAMPLES: usize = 4000;
 
 /// Inertial parameters, viscous and Coulomb friction of each joint, offsets, then shape and coefficients of each
 /// effect.
@@ -65,7 +65,7 @@ pub(super) struct Columns {
 pub(super) fn columns(model: &AugmentedModel, stretches: &[Stretch], held: &[bool]) -> Columns {
     let x = numbers(model);
     let total: usize = stretches.iter().map(Stretch::len).sum();
-    let every = total.div_ceil(ROWS).max(1);
+    let every = total.div_ceil(MAX_SAMPLES).max(1);
     let along = |x: &[f64]| -> Vec<f64> {
         let model = with_numbers(model, x);
         let torques = stretches.iter().map(|s| model.torques(s).hat);
@@ -93,7 +93,7 @@ pub(super) fn columns(model: &AugmentedModel, stretches: &[Stretch], held: &[boo
         let column: Vec<f64> = column.map(|(b, a)| (b - a) / difference).collect();
         let own: f64 = column.iter().map(|c| c * c).sum();
         if own > 0.0 && !held[i] {
-            steps[i] = SHARE * (power / own).sqrt();
+            steps[i] = STEP_TORQUE_SHARE * (power / own).sqrt();
             table.column_mut(i).copy_from_slice(&column);
         }
     }

@@ -25,9 +25,6 @@ pub struct EffectRows {
 }
 
 /// The rows of an effect along some logs.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub(super) fn effect(
     replay: &Replay,
     model: &AugmentedModel,
@@ -112,10 +109,10 @@ fn near(mut rows: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     let mut sum = 0.0;
     let reach = by_way.iter().find(|[_, square]| {
         sum += square;
-        sum >= AT_WORK * whole
+        sum >= AT_WORK_SHARE * whole
     });
     if let Some([reach, _]) = reach.filter(|[reach, _]| *reach > 0.0) {
-        rows.retain(|row| row[0].abs() <= BEYOND * reach);
+        rows.retain(|row| row[0].abs() <= PICTURE_FACTOR * reach);
     }
     rows
 }
@@ -223,7 +220,7 @@ impl OfSignal {
                     .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
                         [low.min(*q), high.max(*q)]
                     });
-                let ways = ways(&s.q[joint], REVERSAL * (high - low));
+                let ways = ways(&s.q[joint], REVERSAL_SHARE_OF_TRAVEL * (high - low));
                 let signed = ways.iter().zip(&s.v[joint]);
                 signed.map(|(way, v)| way * v.signum()).collect()
             }
@@ -241,7 +238,7 @@ impl OfSignal {
 }
 
 /// Way back that counts as a reversal, over the travel of a stretch.
-const REVERSAL: f64 = 5e-4;
+const REVERSAL_SHARE_OF_TRAVEL: f64 = 5e-4;
 /// Part of an effect's squared torque that lies within a way, and how much farther a picture reaches.
-const AT_WORK: f64 = 0.6;
-const BEYOND: f64 = 4.0;
+const AT_WORK_SHARE: f64 = 0.6;
+const PICTURE_FACTOR: f64 = 4.0;

@@ -28,9 +28,6 @@ pub struct FrictionRows {
 }
 
 /// The friction of every joint that has any, over the rows of all logs.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub(super) fn friction(
     replay: &Replay,
     file: &ModelFile,

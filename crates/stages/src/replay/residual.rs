@@ -28,9 +28,6 @@ pub struct ResidualEvidence {
 }
 
 /// The residual of the first model, and of the second where there is one, along some logs.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub(super) fn residual(
     replay: &Replay,
     logs: &[usize],

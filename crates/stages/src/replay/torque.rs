@@ -32,9 +32,6 @@ pub struct TorqueSeries {
 }
 
 /// The torques of `logs`, each as it was filtered, which the errors are of, and as it was logged.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub(super) fn torque(
     replay: &Replay,
     logs: &[usize],

@@ -105,7 +105,7 @@ impl Forces {
         }
     }
 
-    pub fn told(&self) -> Value {
+    pub fn summary(&self) -> Value {
         let direction = |d: usize| {
             let each = (0..DURATIONS.len()).map(|i| {
                 json!({

@@ -83,7 +83,7 @@ impl Machine {
             let model = found.model(&machine, None);
             scored.score(&model, &unseen);
         }
-        Some(scored.told(machine.robot.joint_names()))
+        Some(scored.summary(machine.robot.joint_names()))
     }
 }
 
@@ -195,9 +195,9 @@ impl Scored {
         }
     }
 
-    pub fn told(&self, joints: &[String]) -> Value {
+    pub fn summary(&self, joints: &[String]) -> Value {
         let pulses = joints.iter().zip(&self.pulses);
-        let pulses = pulses.map(|(joint, of)| json!({"joint": joint, "smallest": of.told()}));
+        let pulses = pulses.map(|(joint, of)| json!({"joint": joint, "smallest": of.summary()}));
         json!({
             "coverage": self.band.iter().map(|b| b[1] / b[0]).collect::<Vec<_>>(),
             "samples": self.band.iter().map(|b| b[0]).collect::<Vec<_>>(),
@@ -206,7 +206,7 @@ impl Scored {
             "alarms": self.alarms,
             "watched_s": self.watched_s,
             "pulses": pulses.collect::<Vec<_>>(),
-            "forces": self.forces.told(),
+            "forces": self.forces.summary(),
         })
     }
 }

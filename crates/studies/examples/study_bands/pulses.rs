@@ -100,7 +100,7 @@ impl Pulses {
         }
     }
 
-    pub fn told(&self) -> Value {
+    pub fn summary(&self) -> Value {
         let each = DURATIONS.iter().zip(&self.smallest).zip(&self.delays);
         let each = each.map(|((seconds, sizes), delays)| {
             json!({"seconds": seconds, "size": quantile(sizes, 0.95), "delay_s": quantile(delays, 0.5)})

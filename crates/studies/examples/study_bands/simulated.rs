@@ -50,7 +50,7 @@ impl Campaign {
         let log = minute(&self.machine, seed);
         let mut scored = Scored::new(4);
         scored.score(&self.model, &[log]);
-        scored.told(self.machine.robot.joint_names())
+        scored.summary(self.machine.robot.joint_names())
     }
 }
 

@@ -78,14 +78,14 @@ fn summary(name: &str, rows: &[Value]) -> Value {
         false => percent(quantile(x.to_vec(), 1.0)),
     };
     let right = plateaus.iter().filter(|x| **x <= ASKED).count();
-    let told = cases.iter().filter(|c| c["missed"] == true).count();
+    let missed = cases.iter().filter(|c| c["missed"] == true).count();
     let terms = cases.iter().filter(|c| c["terms"] == true).count();
     json!({
         "case": name,
         "rows": quantile(numbers("rows"), 0.5),
         "within 3 % at every plateau": format!("{right} of {}", plateaus.len()),
         "refused": refused,
-        "misses a plateau, and says so": told,
+        "misses a plateau, and says so": missed,
         "as many terms as the plant": format!("{terms} of {}", plateaus.len()),
         "largest error at a plateau": most(&plateaus),
         "largest error of a curve": most(&curve),

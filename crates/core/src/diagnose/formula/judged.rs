@@ -77,7 +77,7 @@ impl PreparedCase<'_> {
         if let Some((name, joint)) = missing.next() {
             return Err(DiagnoseError::Accept {
                 name: format!("{name}:{}", joint.as_deref().unwrap_or("JOINT")),
-                why: "no formula was found there: see `formulas` in the JSON document".to_owned(),
+                why: "no formula was found there: see `formulas` in the JSON document".into(),
             });
         }
         let accepted = match accepted.is_empty() {

@@ -105,7 +105,7 @@ fn a_force_that_the_model_lacks_leaves_innovations_beyond_their_bounds() {
     );
     let nis = e.unwrap().nis;
     assert!(nis.mean > 2.0 * nis.upper_95, "{nis:?}");
-    // what single innovations cannot tell
+    // what single innovations do not show
     assert!((0.8..1.2).contains(&nis.per_sample), "{nis:?}");
 }
 

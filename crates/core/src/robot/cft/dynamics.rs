@@ -125,8 +125,7 @@ impl Pose {
     }
 }
 
-/// M in the velocities (v1, v2, v4, w), upper part as
-/// [M12, M1phi, M1psi, M22, M2phi, M2psi, P, X, R] with M11 apart.
+/// M in the velocities (v1, v2, v4, w), upper part as [M12, M1phi, M1psi, M22, M2phi, M2psi, P, X, R] with M11 apart.
 fn inertia_in_angles(p: &Pose, k: &Coefficients) -> [f64; 9] {
     let Pose {
         s2,

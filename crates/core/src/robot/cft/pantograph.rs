@@ -166,9 +166,6 @@ pub fn joint_velocities(q: &[f64; 4], xd: &[f64; 4]) -> Result<[f64; 4], RobotEr
 }
 
 /// Joint accelerations at the pose q, joint velocities v, of the accelerations xdd of x_c1..x_c4.
-///
-/// # Errors
-/// As [`joint_velocities`].
 #[inline]
 pub fn joint_accelerations(
     q: &[f64; 4],
@@ -195,9 +192,6 @@ fn solve_references(q: &[f64; 4], x: f64, y: f64) -> Result<(f64, f64), RobotErr
 }
 
 /// d(q4, q5)/d(x_r, y_r), in rad/m; its determinant is 1/(L4 Delta_J) with Delta_J = L4 sin q5.
-///
-/// # Errors
-/// [`RobotError::Singular`] where |sin q5| is below 1e-9.
 #[inline]
 pub(crate) fn inverse_reference_jacobian(q: &[f64; 4]) -> Result<[[f64; 2]; 2], RobotError> {
     let (s4, c4) = q[2].sin_cos();

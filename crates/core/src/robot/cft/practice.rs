@@ -26,8 +26,7 @@ pub const FRICTION: [f64; 20] = [
 const SLOWEST: [f64; 4] = [0.0015, 0.005, 0.005, 0.005];
 /// Largest voltage of the amplifiers \[V\].
 const AMPLIFIER: f64 = 10.0;
-/// Least sin q5 of a designed motion: links 4 and 5 stay 12 degrees off the line. Inside Table 5 it is
-/// above 0.6.
+/// Least sin q5 of a designed motion: links 4 and 5 stay 12 degrees off the line. Inside Table 5 it is above 0.6.
 const CLEARANCE: f64 = 0.2;
 /// Top speed of every motor: 4000 revolutions per minute \[rad/s\].
 const MOTOR_SPEED: f64 = 4000.0 * std::f64::consts::TAU / 60.0;

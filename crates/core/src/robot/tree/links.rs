@@ -6,6 +6,7 @@
 //! Denavit-Hartenberg row (Craig 1986) and a URDF joint are both of this form.
 
 use super::space::{Rotation, Vector, about, of_roll_pitch_yaw, product};
+use crate::explain::Explain;
 use crate::robot::joint::JointKind;
 
 /// Most independent joints: what a state keeps on the stack.
@@ -80,29 +81,39 @@ impl Link {
 }
 
 /// Why links make no tree that can be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
 pub enum TreeError {
-    #[error("the chain has no moving link; give at least one revolute or prismatic joint")]
+    #[explain(
+        "the chain has no moving link",
+        "give at least one revolute or prismatic joint"
+    )]
     Empty,
-    #[error("the chain has {links} moving links; at most {MOST_LINKS} are supported")]
+    #[explain(
+        "the chain has {links} moving links",
+        "at most {MOST_LINKS} are supported"
+    )]
     TooManyLinks { links: usize },
-    #[error("the chain has {joints} independent joints; 1 to {MOST_JOINTS} are supported")]
+    #[explain(
+        "the chain has {joints} independent joints",
+        "1 to {MOST_JOINTS} are supported"
+    )]
     TooManyJoints { joints: usize },
-    #[error(
-        "link `{link}` comes before the link that it hangs on; list links from the base outward"
+    #[explain(
+        "link `{link}` comes before the link that it hangs on",
+        "list links from the base outward"
     )]
     Order { link: String },
-    #[error("the axis of link `{link}` is {axis:?}, whose length is not 1")]
+    #[explain("the axis of link `{link}` is {axis:?}, whose length is not 1")]
     Axis { link: String, axis: Vector },
-    #[error("link `{link}` is driven by independent joint {joint}, of which there are {joints}")]
+    #[explain("link `{link}` is driven by independent joint {joint}, of which there are {joints}")]
     Joint {
         link: String,
         joint: usize,
         joints: usize,
     },
-    #[error("independent joint {joint} drives no link; leave it out")]
+    #[explain("independent joint {joint} drives no link", "leave it out")]
     Idle { joint: usize },
-    #[error("link `{link}` holds a number that is not finite")]
+    #[explain("link `{link}` holds a number that is not finite")]
     NotFinite { link: String },
 }
 

@@ -59,9 +59,6 @@ pub fn walk(
 
 /// Adds to `tau` what links whose standard parameters `body` gives ask of every independent joint: their forces and
 /// moments once a link, in place of ten columns for each joint that moves it.
-///
-/// # Panics
-/// As [`walk`].
 #[inline]
 pub(crate) fn torques(
     tree: &Tree,

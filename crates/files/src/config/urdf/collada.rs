@@ -18,12 +18,9 @@ type Affine = (Rotation, Vector);
 
 /// The vertices of the scene \[m\]. The unit of the file counts; `up_axis` does not, for RViz and MoveIt pass over it, and
 /// URDFs are written to look right there.
-///
-/// # Errors
-/// What the file lacks, and what it holds that is not known.
 pub(super) fn vertices(text: &str) -> Result<Vec<Vector>, String> {
     let text = xml::without_comments(text);
-    let tree = xml::Tree::parse(&text).map_err(|e| format!("line {}: {}", e.line, e.message))?;
+    let tree = xml::Tree::parse(&text).map_err(|e| format!("line {}: {}", e.line, e.problem))?;
     let root = tree.root();
     if root.name() != "COLLADA" {
         return Err("has no <COLLADA>".to_owned());

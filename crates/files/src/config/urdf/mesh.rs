@@ -21,9 +21,6 @@ const COUNT: usize = HEAD + 4;
 const TRIANGLE: usize = 50;
 
 /// Vertices of the mesh that a URDF in `folder` names, in units of the file \[m\]; what is read is taken from `left`.
-///
-/// # Errors
-/// What is wrong, and with which file.
 pub(super) fn read(named: &str, folder: &Path, left: &mut u64) -> Result<Vec<Vector>, String> {
     let places = places(named.trim(), folder);
     let Some(path) = places.iter().find(|path| path.is_file()) else {

@@ -120,16 +120,13 @@ impl UrdfChain {
         let tree = xml::Tree::parse(&text).map_err(|wrong| ConfigError::Syntax {
             file: file.to_owned(),
             line: wrong.line,
-            message: wrong.message,
+            problem: wrong.problem,
         })?;
         let place = Place { file, angles };
         tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)
     }
 
     /// Reads a URDF file.
-    ///
-    /// # Errors
-    /// Those of [`Self::parse`]; [`ConfigError::Read`] where the file cannot be read.
     pub fn load(path: &Path, tip: Option<&str>) -> Result<Self, ConfigError> {
         Self::load_with(path, tip, Angles::Meant)
     }

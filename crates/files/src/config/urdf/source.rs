@@ -30,7 +30,7 @@ pub fn replaced(file: &str, text: &str, with: &Replacement) -> Result<String, Co
     let tree = xml::Tree::parse(&plain).map_err(|wrong| ConfigError::Syntax {
         file: file.to_owned(),
         line: wrong.line,
-        message: wrong.message,
+        problem: wrong.problem,
     })?;
     let root = tree.root();
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();

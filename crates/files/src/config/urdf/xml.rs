@@ -3,6 +3,7 @@
 //! The reader keeps its nodes in one table, so that no nesting exhausts the stack. It refuses
 //! entities other than the five of XML, and document types, which could define some.
 
+use cft_ident_core::explain::ErrorText;
 use std::borrow::Cow;
 
 use roxmltree::{Document, Error, Node, ParsingOptions};
@@ -10,7 +11,7 @@ use roxmltree::{Document, Error, Node, ParsingOptions};
 use cft_ident_logs::log::escape;
 
 /// Deepest nesting of elements. A URDF needs about ten levels.
-const DEEPEST: usize = 64;
+const MAX_DEPTH: usize = 64;
 /// Most elements. The largest robots with all their meshes have some thousands.
 const MOST_ELEMENTS: usize = 200_000;
 /// Most elements and texts between them.
@@ -48,7 +49,7 @@ pub(super) fn without_comments(text: &str) -> Cow<'_, str> {
 #[derive(Debug)]
 pub(super) struct Malformed {
     pub line: usize,
-    pub message: String,
+    pub problem: ErrorText,
 }
 
 /// A text that was read.
@@ -69,17 +70,19 @@ impl<'t> Tree<'t> {
     /// Reads a text [`without_comments`].
     pub(super) fn parse(text: &'t str) -> Result<Self, Malformed> {
         let last = 1 + text.matches('\n').count();
-        let refused = |message: &str| Malformed {
+        let refused = |problem: ErrorText| Malformed {
             line: last,
-            message: message.to_owned(),
+            problem,
         };
         let long = |(start, _)| tag_end(text, start) - start > LONGEST_TAG;
         if text.match_indices('<').any(long) {
-            return Err(refused("a tag of more than 64 kB; no robot needs that"));
+            return Err(refused(
+                ErrorText::new("a tag of more than 64 kB").remedy("no robot needs that"),
+            ));
         }
         if text.matches("xmlns").count() > MOST_NAMESPACES {
             return Err(refused(
-                "more than 1000 namespaces; delete what is not used",
+                ErrorText::new("more than 1000 namespaces").remedy("delete what is not used"),
             ));
         }
         let options = ParsingOptions {
@@ -106,17 +109,17 @@ impl<'t> Tree<'t> {
             }
             open.push(node);
             elements += 1;
-            let message = if open.len() > DEEPEST {
-                format!("elements are nested more than {DEEPEST} deep; no robot needs that")
+            let problem = if open.len() > MAX_DEPTH {
+                ErrorText::new(format!("elements are nested more than {MAX_DEPTH} deep"))
+                    .remedy("no robot needs that")
             } else if elements > MOST_ELEMENTS {
-                format!(
-                    "more than {MOST_ELEMENTS} elements; leave out what is no link and no joint"
-                )
+                ErrorText::new(format!("more than {MOST_ELEMENTS} elements"))
+                    .remedy("leave out what is no link and no joint")
             } else {
                 continue;
             };
             let line = self.line(node);
-            return Err(Malformed { line, message });
+            return Err(Malformed { line, problem });
         }
         Ok(())
     }
@@ -199,45 +202,43 @@ fn malformed(text: &str, last: usize, error: &Error) -> Malformed {
     let (before, after) = here.split_at(split.map_or(here.len(), |(at, _)| at));
     let line_of = |byte: usize| 1 + text[..byte].matches('\n').count();
     let said = escape(&error.to_string());
-    let (line, message) = match error {
-        Error::NoRootNode => (last, "no element at all; give a URDF file".to_owned()),
+    let (line, what, remedy) = match error {
+        Error::NoRootNode => (last, "no element at all".to_owned(), "give a URDF file"),
         Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
             let begins = |tag: &str| tag.starts_with(|c: char| c.is_alphabetic() || c == '_');
             let mut tags = text.match_indices('<').map(|(at, _)| at);
             let root = tags.find(|at| begins(&text[at + 1..])).unwrap_or(0);
             let (name, line) = (escape(name(&text[root..])), line_of(root));
             let inside = format!("the text ends inside <{name}> of line {line}");
-            (last, format!("{inside}; the file is cut off"))
+            (last, inside, "the file is cut off")
         }
         Error::DtdDetected => {
             let line = line_of(text.find("<!DOCTYPE").unwrap_or(0));
-            let what = "a document type, which could define entities; delete it";
-            (line, what.to_owned())
+            let what = "a document type, which could define entities";
+            (line, what.to_owned(), "delete it")
         }
         Error::NodesLimitReached => {
             let what = format!("more than {MOST_NODES} elements and texts");
-            (
-                last,
-                format!("{what}; leave out what is no link and no joint"),
-            )
+            (last, what, "leave out what is no link and no joint")
         }
         Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
             let name = escape(name(after));
-            (row, format!("`<{name}>` {MACRO}; {EXPAND}"))
+            (row, format!("`<{name}>` {MACRO}"), EXPAND)
         }
         Error::UnknownEntityReference(..)
         | Error::MalformedEntityReference(_)
         | Error::InvalidAttributeValue(_)
         | Error::DuplicatedAttribute(..) => {
             let tag = escape(name(before.rsplit('<').next().unwrap_or_default()));
-            (row, format!("<{tag}>: {said}; correct the attribute"))
+            (row, format!("<{tag}>: {said}"), "correct the attribute")
         }
         _ => {
             let what = format!("no well-formed XML: {said}");
-            (row, format!("{what}; correct it, or export it anew"))
+            (row, what, "correct it, or export it anew")
         }
     };
-    Malformed { line, message }
+    let problem = ErrorText::new(what).remedy(remedy);
+    Malformed { line, problem }
 }
 
 /// The name at the beginning of a tag.

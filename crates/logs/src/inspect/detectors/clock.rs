@@ -6,7 +6,7 @@ use crate::inspect::fault::Episodes;
 /// A step longer than this many median ones is a gap (as `motion::FilterSettings::gap_factor`).
 pub(in crate::inspect) const GAP: f64 = 2.5;
 /// A step within this share of the median is even.
-const EVEN: f64 = 0.10;
+const EVEN_STEP_TOLERANCE: f64 = 0.10;
 /// Long steps that are kept until the median is known.
 const MAX_LONG_STEPS: usize = 1 << 16;
 
@@ -140,9 +140,10 @@ impl LogClock {
         ClockFacts {
             dt,
             jitter: 0.5 * (high - low) / dt,
-            uneven: self
-                .steps
-                .share_outside((1.0 - EVEN) * dt, (1.0 + EVEN) * dt),
+            uneven: self.steps.share_outside(
+                (1.0 - EVEN_STEP_TOLERANCE) * dt,
+                (1.0 + EVEN_STEP_TOLERANCE) * dt,
+            ),
             gaps: gaps.copied().collect(),
             least: self.steps.quantile(0.0),
             largest: self.steps.quantile(1.0),

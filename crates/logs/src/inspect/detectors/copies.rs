@@ -1,7 +1,7 @@
 //! Channels that hold the same numbers.
 
 /// Share of the rows that must be equal.
-const SHARE: f64 = 0.999;
+const EQUAL_ROWS_SHARE: f64 = 0.999;
 /// Rows in which a channel changes before its equality means anything.
 const CHANGES: u64 = 50;
 
@@ -71,7 +71,8 @@ impl Copies {
             for second in first + 1..self.channels {
                 let Some(pair) = pairs.next() else { break };
                 let most = pair.equal.max(pair.opposite);
-                if pair.changed >= CHANGES && most as f64 >= SHARE * pair.changed as f64 {
+                if pair.changed >= CHANGES && most as f64 >= EQUAL_ROWS_SHARE * pair.changed as f64
+                {
                     found.push(CopiedChannel {
                         first,
                         second,

@@ -9,13 +9,12 @@ use super::histogram::Histogram;
 use crate::inspect::fault::Episodes;
 use cft_ident_core::math::rank;
 
-/// Time over which a speed is formed [s]: long against the steps of an encoder, short against the
-/// motion of a robot.
+/// Time over which a speed is formed [s]: long against the steps of an encoder, short against the motion of a robot.
 const SPACING_S: f64 = 0.02;
 /// Rows at most that it spans.
-const LONGEST: usize = 4096;
+const MAX_SPAN_ROWS: usize = 4096;
 /// A joint moves where its speed is above this share of the largest.
-const MOVING: f64 = 0.02;
+const MOVING_SPEED_SHARE: f64 = 0.02;
 
 /// Speeds in a row that one wrong position alone cannot make.
 const IN_A_ROW: u32 = 4;
@@ -82,7 +81,7 @@ impl Excitation {
     /// For rows `dt` apart [s] of a joint that may be so fast.
     pub(in crate::inspect) fn new(dt: f64, limit: Option<f64>) -> Self {
         let spacing = if dt > 0.0 {
-            ((SPACING_S / dt).round() as usize).clamp(1, LONGEST)
+            ((SPACING_S / dt).round() as usize).clamp(1, MAX_SPAN_ROWS)
         } else {
             1
         };
@@ -150,7 +149,7 @@ impl Excitation {
                 *sum += x * y;
             }
         }
-        if direction != 0.0 && v.abs() > MOVING * self.speeds.quantile(1.0) {
+        if direction != 0.0 && v.abs() > MOVING_SPEED_SHARE * self.speeds.quantile(1.0) {
             self.reversals += u64::from(direction == -self.direction);
             self.direction = direction;
         }
@@ -195,7 +194,9 @@ impl Excitation {
         moves: bool,
     ) -> JointMotion {
         let speed_max = self.speeds.quantile(1.0);
-        let moving = self.speeds.share_outside(0.0, MOVING * speed_max);
+        let moving = self
+            .speeds
+            .share_outside(0.0, MOVING_SPEED_SHARE * speed_max);
         JointMotion {
             joint: joint.to_owned(),
             channel: channel.to_owned(),

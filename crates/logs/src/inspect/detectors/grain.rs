@@ -3,16 +3,15 @@
 use super::windows::Window;
 
 /// Steps up to this many grains are looked at.
-const FINEST: f64 = 64.0;
+const MAX_GRAINS: f64 = 64.0;
 /// Share of the steps that must be whole grains.
-const SHARE: f64 = 0.995;
+const WHOLE_GRAINS_SHARE: f64 = 0.995;
 /// Order of the difference that shows noise: it takes slow motion away.
 const ORDER: usize = 8;
 /// The factor by which it makes white noise larger: sqrt(binomial(16, 8)).
-const GAIN: f64 = 113.446;
+const WHITE_NOISE_GAIN: f64 = 113.446;
 
-/// The step of a channel's numbers, where they have one: all differences from row to row are
-/// multiples of it.
+/// The step of a channel's numbers, where they have one: all differences from row to row are multiples of it.
 pub(in crate::inspect) fn step<'w>(
     windows: impl Iterator<Item = &'w Window> + Clone,
     channel: usize,
@@ -41,7 +40,7 @@ pub(in crate::inspect) fn step<'w>(
     });
     let (mut whole, mut looked_at, mut sum, mut grains) = (0u64, 0u64, 0.0, 0.0);
     for (difference, size) in differences() {
-        if difference <= rounding(size) || difference > FINEST * least {
+        if difference <= rounding(size) || difference > MAX_GRAINS * least {
             continue;
         }
         looked_at += 1;
@@ -54,7 +53,7 @@ pub(in crate::inspect) fn step<'w>(
             grains += count;
         }
     }
-    let enough = looked_at >= 20 && whole as f64 >= SHARE * looked_at as f64;
+    let enough = looked_at >= 20 && whole as f64 >= WHOLE_GRAINS_SHARE * looked_at as f64;
     // A flag has two levels and no grain.
     (enough && high - low > 2.5 * least).then(|| sum / grains)
 }
@@ -69,7 +68,7 @@ pub(in crate::inspect) fn noise<'w>(
     for window in windows {
         for rows in window.columns[channel].windows(ORDER + 1) {
             if rows.windows(2).all(|pair| pair[0] != pair[1]) {
-                sizes.push(eighth_difference(rows).abs() / GAIN);
+                sizes.push(eighth_difference(rows).abs() / WHITE_NOISE_GAIN);
             }
         }
     }

@@ -5,7 +5,7 @@ const PER_OCTAVE: usize = 32;
 /// Magnitudes below 2^LOWEST count as 0.
 const LOWEST: i32 = -70;
 const OCTAVES: usize = 120;
-/// Mantissa bits that tell the bins of an octave apart.
+/// Mantissa bits that number the bins of an octave.
 const SHIFT: u32 = 52 - PER_OCTAVE.trailing_zeros();
 
 /// Counts of magnitudes in bins that are 1/32 of an octave wide, so that a quantile is right to

@@ -7,7 +7,7 @@ use super::flat::Flat;
 use crate::inspect::fault::Episodes;
 
 /// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
-const LONGEST: usize = 20;
+const MAX_RUN_ROWS: usize = 20;
 /// Rows in motion that repeat, from which samples may have been held.
 const MIN_HELD_ROWS: u64 = 50;
 /// Runs that are kept.
@@ -15,9 +15,9 @@ const MAX_RUNS: usize = 1 << 18;
 /// Long runs that are kept.
 const LONG_RUNS: usize = 4096;
 /// Usual smallest steps that a joint goes from row to row where it moves.
-const MOVES: f64 = 3.0;
+const MIN_STEPS_IN_MOTION: f64 = 3.0;
 /// An edge is abrupt where its step is so many times the usual bends of the channel.
-const ABRUPT: f64 = 6.0;
+const ABRUPT_BENDS: f64 = 6.0;
 
 /// Rows that repeat the positions of the row before them.
 #[derive(Debug, Clone)]
@@ -115,7 +115,7 @@ impl Repeats {
 
     /// The next row belongs to another stretch.
     pub(in crate::inspect) fn part(&mut self) {
-        if self.rows > LONGEST {
+        if self.rows > MAX_RUN_ROWS {
             self.end(&vec![f64::NAN; self.joints]);
         }
         self.previous.fill(f64::NAN);
@@ -125,7 +125,7 @@ impl Repeats {
 
     #[cold]
     fn end(&mut self, next: &[f64]) {
-        let long = self.rows > LONGEST;
+        let long = self.rows > MAX_RUN_ROWS;
         let full = match long {
             true => self.frozen.len() == LONG_RUNS || !self.identical,
             false => self.runs.len() == MAX_RUNS,
@@ -174,8 +174,8 @@ impl Repeats {
                 let largest = largest.fold(0.0, |most, step| f64::from(step.abs()).max(most));
                 let step = flat.steps.quantile_not_zero(0.05);
                 let bend = flat.bends.quantile_not_zero(0.99);
-                let moves = step > 0.0 && largest > MOVES * step;
-                moves && (alive || largest > ABRUPT * bend)
+                let moves = step > 0.0 && largest > MIN_STEPS_IN_MOTION * step;
+                moves && (alive || largest > ABRUPT_BENDS * bend)
             })
         };
         let mut episodes = Episodes::default();

@@ -12,10 +12,10 @@
 use super::histogram::Histogram;
 
 /// Rows of the median.
-const WIDTH: usize = 7;
-const HALF_WIDTH: usize = WIDTH / 2;
+const MEDIAN_ROWS: usize = 7;
+const HALF_WIDTH: usize = MEDIAN_ROWS / 2;
 /// Rows to each side that are remembered of a spike.
-const REACH: usize = 5;
+const REACH_ROWS: usize = 5;
 /// Rows to each side in which a spike must stand alone.
 const AROUND: usize = 25;
 /// Differences that are remembered.
@@ -25,21 +25,21 @@ const CHANGE: usize = 9;
 /// Spikes that are kept, the highest.
 const MAX_SPIKES: usize = 16_384;
 /// A row may be a spike where it is off by so many times what nine rows of ten are.
-const SUSPECT: f64 = 3.0;
-const MOST_ROWS: f64 = 0.9;
+const SUSPECT_FACTOR: f64 = 3.0;
+const SUSPECT_QUANTILE: f64 = 0.9;
 /// Share of the rows by which a spike is measured.
-const NEARLY_ALL: f64 = 0.995;
+const SPIKE_QUANTILE: f64 = 0.995;
 /// A spike is so many times what nearly all other rows differ from their neighbours.
 pub(in crate::inspect) const SPIKE: f64 = 8.0;
 /// One of a torque, and one of many, has at least this share of the channel's deviation.
 pub(in crate::inspect) const SPIKE_SHARE: f64 = 0.1;
 /// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
 /// smooth motion it does in the next rows too.
-const SPEED_CHANGES: f64 = 6.0;
+const MIN_RATIO_TO_USUAL: f64 = 6.0;
 const MIN_RATIO_TO_NEIGHBOURS: f64 = 3.0;
 
 /// Rows of two sources by turns: the squared steps over two rows are less than this share of those over one.
-const ALTERNATES: f64 = 0.5;
+const MAX_TWO_ROW_SHARE: f64 = 0.5;
 
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +48,7 @@ pub(in crate::inspect) struct Spike {
     /// Difference from the median of its neighbours.
     pub(in crate::inspect) height: f64,
     /// Times and numbers of the rows about, itself in the middle.
-    around: [[f64; 2]; 2 * REACH + 1],
+    around: [[f64; 2]; 2 * REACH_ROWS + 1],
 }
 
 impl Spike {
@@ -56,8 +56,8 @@ impl Spike {
     /// where there are none.
     pub(in crate::inspect) fn bridge(&self, bad: &dyn Fn(f64) -> bool) -> Option<f64> {
         let good = |row: &&[f64; 2]| !bad(row[0]);
-        let before = self.around[..REACH].iter().rev().filter(good).take(2);
-        let after = self.around[REACH + 1..].iter().filter(good).take(2);
+        let before = self.around[..REACH_ROWS].iter().rev().filter(good).take(2);
+        let after = self.around[REACH_ROWS + 1..].iter().filter(good).take(2);
         let nodes: Vec<[f64; 2]> = before.chain(after).copied().collect();
         cubic(&nodes, self.t)
     }
@@ -130,7 +130,7 @@ impl Spikes {
         self.times[k % RING] = t;
         self.positions[k % RING] = position;
         self.count += 1;
-        if self.count < WIDTH {
+        if self.count < MEDIAN_ROWS {
             return;
         }
         let [before, last] = [k - 2, k - 1].map(|k| self.values[k % RING]);
@@ -159,7 +159,7 @@ impl Spikes {
 
     /// The next row belongs to another stretch.
     pub(in crate::inspect) fn part(&mut self) {
-        if self.count >= WIDTH {
+        if self.count >= MEDIAN_ROWS {
             let last = self.count - 1 - HALF_WIDTH;
             for row in self.judged.max(HALF_WIDTH)..=last {
                 self.judge(row, last);
@@ -171,12 +171,12 @@ impl Spikes {
 
     /// Brings the suspicion up to date with what was seen so far.
     pub(in crate::inspect) fn settle(&mut self) {
-        self.suspect = SUSPECT * self.differences_seen.quantile(MOST_ROWS);
+        self.suspect = SUSPECT_FACTOR * self.differences_seen.quantile(SUSPECT_QUANTILE);
     }
 
     /// What nearly all rows differ from their neighbours.
     pub(in crate::inspect) fn nearly_all(&self) -> f64 {
-        self.differences_seen.quantile(NEARLY_ALL)
+        self.differences_seen.quantile(SPIKE_QUANTILE)
     }
 
     /// The same, but where more rows are spikes than that leaves out, those are set
@@ -186,7 +186,7 @@ impl Spikes {
         let rows = self.differences_seen.total().max(1) as f64;
         let apart = |aside: usize| {
             let rest = 1.0 - aside as f64 / rows;
-            self.differences_seen.quantile(NEARLY_ALL * rest)
+            self.differences_seen.quantile(SPIKE_QUANTILE * rest)
         };
         let mut aside = self.found.len();
         loop {
@@ -198,7 +198,7 @@ impl Spikes {
             }
             aside = higher;
         }
-        let hidden = aside as f64 > (1.0 - NEARLY_ALL) * rows;
+        let hidden = aside as f64 > (1.0 - SPIKE_QUANTILE) * rows;
         apart(if hidden { aside } else { 0 })
     }
 
@@ -209,7 +209,7 @@ impl Spikes {
 
     /// Whether every other row belongs together more than neighbours do: of noise, both differ alike.
     pub(in crate::inspect) fn alternates(&self) -> bool {
-        self.steps[2] < ALTERNATES * self.steps[1]
+        self.steps[2] < MAX_TWO_ROW_SHARE * self.steps[1]
     }
 
     /// Change of the joint's speed at a row, less half of those six rows before and after.
@@ -237,7 +237,7 @@ impl Spikes {
         let to = (row + AROUND).min(self.count - 1 - CHANGE);
         let beside = (from..=to).filter(|k| k.abs_diff(row) >= reach);
         let largest = beside.map(|k| self.change(k).abs()).fold(0.0, f64::max);
-        self.change(row).abs() > (SPEED_CHANGES * usual).max(MIN_RATIO_TO_NEIGHBOURS * largest)
+        self.change(row).abs() > (MIN_RATIO_TO_USUAL * usual).max(MIN_RATIO_TO_NEIGHBOURS * largest)
     }
 
     /// Looks whether a row stands alone among those up to `last`.
@@ -273,7 +273,7 @@ impl Spikes {
         }
         // as far as the cubic reaches, there are rows
         let around = std::array::from_fn(|i| {
-            let at = (row + i - REACH) % RING;
+            let at = (row + i - REACH_ROWS) % RING;
             [self.times[at], self.values[at]]
         });
         self.found.push(Spike {
@@ -287,8 +287,8 @@ impl Spikes {
     /// where it is as good as on it, or rows are missing.
     fn off_cubic(&self, row: usize, height: f64) -> Option<f64> {
         let quiet = |k: &usize| self.differences[k % RING].abs() <= 0.25 * height.abs();
-        let before = (row.saturating_sub(AROUND)..(row + 1).saturating_sub(REACH - 1)).rev();
-        let after = row + REACH - 1..self.count.min(row + AROUND);
+        let before = (row.saturating_sub(AROUND)..(row + 1).saturating_sub(REACH_ROWS - 1)).rev();
+        let after = row + REACH_ROWS - 1..self.count.min(row + AROUND);
         let nodes = before
             .filter(quiet)
             .take(2)
@@ -309,7 +309,7 @@ impl Spikes {
 
 /// Median of seven numbers.
 #[inline]
-fn median(mut x: [f64; WIDTH]) -> f64 {
+fn median(mut x: [f64; MEDIAN_ROWS]) -> f64 {
     // Exchanges that leave the middle one in its place (Devillard 1998).
     const EXCHANGES: [(usize, usize); 13] = [
         (0, 5),

@@ -14,8 +14,7 @@ const AROUND: usize = 25;
 const OWN: usize = 4;
 /// Rows to each side by which it is seen that the new level stays.
 const LEVEL: usize = 5;
-/// Share of a leap's height that the rows next to it tell, and those beyond three rows, where the motion
-/// may have bent.
+/// Share of a leap's height that the rows next to it tell, and those beyond three rows, where the motion may have bent.
 const NEXT: [f64; 2] = [0.5, 1.5];
 const BEYOND: [f64; 2] = [0.25, 2.0];
 /// Rows that are remembered.
@@ -25,7 +24,7 @@ const MIN_ROWS_AT_REST: usize = 6;
 /// Leaps that are kept, the highest.
 const MAX_LEAPS: usize = 4096;
 /// Largest heights that may be leaps, over those of 99 % of the rows.
-const SUSPECT: f64 = 3.0;
+const SUSPECT_FACTOR: f64 = 3.0;
 
 /// A leap of a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,7 +123,7 @@ impl Leaps {
 
     /// Brings the suspicion up to date with what was seen so far.
     pub(in crate::inspect) fn settle(&mut self) {
-        self.suspect = SUSPECT * self.heights_seen.quantile(0.99);
+        self.suspect = SUSPECT_FACTOR * self.heights_seen.quantile(0.99);
     }
 
     #[inline]

@@ -5,8 +5,8 @@ const LONG_STEP_SHARE: f64 = 0.5;
 /// Long steps that are kept.
 const MAX_LONG_STEPS: usize = 1024;
 /// Usual steps that a range is longer than.
-const COUNTS: f64 = 16.0;
-/// By how much the ranges that several steps tell may differ, as a share.
+const MIN_STEPS_PER_RANGE: f64 = 16.0;
+/// By how much the ranges by several steps may differ, as a share.
 const RANGE_AGREEMENT: f64 = 0.02;
 /// By how much a range may be off one that is usual, as a share.
 const USUAL_RANGE_TOLERANCE: f64 = 0.02;
@@ -124,7 +124,7 @@ impl Turns {
         let fits = spread <= RANGE_AGREEMENT * median && travel <= (1.0 + RANGE_AGREEMENT) * range;
         let sure = known.is_some() || ranges.len() >= 3;
         // A joint at rest goes to and fro between two counts.
-        (fits && sure && range > COUNTS * step).then_some(Wrapped {
+        (fits && sure && range > MIN_STEPS_PER_RANGE * step).then_some(Wrapped {
             range,
             times: ranges.len() as u64,
             from: first.t,

@@ -10,22 +10,22 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Rows that are used at most.
-const ROWS: usize = 1 << 14;
+const MAX_ROWS: usize = 1 << 14;
 /// Trial delays on each side of 0, in steps of the positions' clock.
 const TRIALS: usize = 40;
 /// Columns of the fit: acceleration, speed, a soft and a sharp step of friction, sine, cosine, 1.
 const COLUMNS: usize = 7;
 /// Of them the first ones, that only take power.
-const PASSIVE: usize = 4;
+const PASSIVE_COLUMNS: usize = 4;
 /// Share of the torque that the motion must explain.
-const EXPLAINED: f64 = 0.5;
+const MIN_EXPLAINED_SHARE: f64 = 0.5;
 /// Least share of each direction in the squared speed: one way at one speed, a torque that depends
 /// on position cannot be distinguished from any delay.
-const BOTH_WAYS: f64 = 0.1;
+const MIN_SHARE_EACH_WAY: f64 = 0.1;
 /// Share of the gain over no delay that another minimum may reach.
-const SECOND_BEST: f64 = 0.5;
+const MAX_GAIN_OF_SECOND_BEST: f64 = 0.5;
 /// Stretches of the jackknife: the most, and the least that give a deviation.
-const STRETCHES: std::ops::RangeInclusive<usize> = 3..=8;
+const JACKKNIFE_STRETCHES: std::ops::RangeInclusive<usize> = 3..=8;
 
 /// Rows from which a delay is estimated.
 #[derive(Debug, Default)]
@@ -64,7 +64,7 @@ struct Sums {
 impl DelayEstimator {
     /// Adds a row; those beyond the first some thousands are not needed.
     pub fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
-        if self.t.len() == ROWS || q.len() != tau.len() || q.is_empty() {
+        if self.t.len() == MAX_ROWS || q.len() != tau.len() || q.is_empty() {
             return;
         }
         let finite = q.iter().chain(tau).all(|value| value.is_finite());
@@ -108,7 +108,7 @@ impl DelayEstimator {
         let dt = *steps.get(steps.len() / 2)?;
         let half = ((0.01 / dt).round() as usize).clamp(1, 25);
         let stretches = self.stretches(TRIALS + 2 * half + 2);
-        if !(dt > 0.0 && STRETCHES.contains(&stretches.len())) {
+        if !(dt > 0.0 && JACKKNIFE_STRETCHES.contains(&stretches.len())) {
             return None;
         }
         let sums: Vec<Vec<Sums>> = (0..self.joints)
@@ -140,12 +140,12 @@ impl DelayEstimator {
             }
             from = end;
         }
-        if whole.len() >= *STRETCHES.start() {
-            let stride = whole.len().div_ceil(*STRETCHES.end());
+        if whole.len() >= *JACKKNIFE_STRETCHES.start() {
+            let stride = whole.len().div_ceil(*JACKKNIFE_STRETCHES.end());
             return whole.into_iter().step_by(stride).collect();
         }
         let pieces = |range: std::ops::Range<usize>| {
-            let most = STRETCHES.end().div_ceil(whole.len());
+            let most = JACKKNIFE_STRETCHES.end().div_ceil(whole.len());
             let count = (range.len() / (4 * edge)).clamp(1, most);
             let step = range.len() / count;
             (0..count).map(move |i| range.start + i * step..range.start + (i + 1) * step)
@@ -187,7 +187,10 @@ impl DelayEstimator {
             .flat_map(|m| &m[1])
             .map(|v| v.min(0.0).powi(2));
         let back = back.sum::<f64>() / (v_rms * v_rms * rows as f64);
-        if v_rms == 0.0 || a_rms == 0.0 || !(BOTH_WAYS..=1.0 - BOTH_WAYS).contains(&back) {
+        if v_rms == 0.0
+            || a_rms == 0.0
+            || !(MIN_SHARE_EACH_WAY..=1.0 - MIN_SHARE_EACH_WAY).contains(&back)
+        {
             return None;
         }
         let sums = motions.iter().map(|[q, v, a, tau]| {
@@ -269,9 +272,10 @@ impl Sums {
             return None;
         }
         // the columns of each subset of the passive ones, with those of any sign
-        let subsets: Vec<(Vec<usize>, Cholesky<f64, Dyn>)> = (0..1usize << PASSIVE)
+        let subsets: Vec<(Vec<usize>, Cholesky<f64, Dyn>)> = (0..1usize << PASSIVE_COLUMNS)
             .filter_map(|subset| {
-                let taken = |column: &usize| *column >= PASSIVE || subset >> column & 1 == 1;
+                let taken =
+                    |column: &usize| *column >= PASSIVE_COLUMNS || subset >> column & 1 == 1;
                 let columns: Vec<usize> = (0..COLUMNS).filter(taken).collect();
                 let factor = self.of_columns(&columns).cholesky()?;
                 Some((columns, factor))
@@ -310,7 +314,7 @@ fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
         }
         let Some(left) = sums.left() else { continue };
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        if least > 1.0 - EXPLAINED {
+        if least > 1.0 - MIN_EXPLAINED_SHARE {
             continue;
         }
         any = true;
@@ -331,7 +335,7 @@ fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
         higher(residuals[..*trial].last()) && higher(residuals.get(trial + 1))
     };
     let mut others = (0..residuals.len()).filter(|trial| *trial != least && minimum(trial));
-    if others.any(|other| gain(other) > SECOND_BEST * gain(least)) {
+    if others.any(|other| gain(other) > MAX_GAIN_OF_SECOND_BEST * gain(least)) {
         return None;
     }
     let [before, middle, after] = [residuals[least - 1], residuals[least], residuals[least + 1]];
@@ -346,7 +350,7 @@ fn explained(columns: &[usize], factor: &Cholesky<f64, Dyn>, right: &[f64; COLUM
     let x = factor.solve(&right);
     let explained = right.dot(&x);
     [1.0, -1.0].map(|sign| {
-        let drives = |(column, x): (&usize, &f64)| *column < PASSIVE && sign * x < 0.0;
+        let drives = |(column, x): (&usize, &f64)| *column < PASSIVE_COLUMNS && sign * x < 0.0;
         match columns.iter().zip(&x).any(drives) {
             true => 0.0,
             false => explained,

@@ -18,15 +18,15 @@ use crate::log::{Block, LogError, escape, list, source};
 use cft_ident_core::number::{beyond, is_usable};
 
 /// Messages at the beginning in which topics are looked for.
-const LOOKED_AT: u64 = 4000;
+const SEARCHED_MESSAGES: u64 = 4000;
 /// Numbers from which a message is the state of a machine by itself.
 const STATE: usize = 4;
 /// Columns that are read without a robot file.
 const COLUMNS: usize = 1024;
 /// Rows that wait for messages of other topics at most.
-const WAITING: usize = 1 << 14;
+const MAX_WAITING_ROWS: usize = 1 << 14;
 /// A step longer than this many usual ones is a dropout.
-const DROPOUT: f64 = 2.5;
+const DROPOUT_STEPS: f64 = 2.5;
 
 /// The numbers of one topic.
 struct Source {
@@ -81,17 +81,11 @@ pub(in crate::log) fn of_topics(layout: &Layout) -> bool {
 
 impl JoinedTopics {
     /// The channels of a robot, `/topic:path` each.
-    ///
-    /// # Errors
-    /// A file that cannot be read; a channel without a topic, or whose topic is not there.
     pub(in crate::log) fn of_robot(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
         Self::of_channels(paths, layout, false)
     }
 
     /// The same where each joint may come in messages of its own, though of one topic.
-    ///
-    /// # Errors
-    /// Those of [`Self::of_robot`].
     pub(super) fn of_parts(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
         Self::of_channels(paths, layout, true)
     }
@@ -148,14 +142,11 @@ impl JoinedTopics {
     }
 
     /// Every number of a topic: of the one that is named, of the first that holds a whole state, else of all.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or without a number.
     pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
         let mut recording = MessageFiles::open(paths, Wanted::default())?;
         let mut found: Vec<(String, Vec<(String, String)>)> = Vec::new();
         let (mut looked, mut unread) = (0, None);
-        while looked < LOOKED_AT
+        while looked < SEARCHED_MESSAGES
             && let Some(message) = recording.next()?
         {
             looked += 1;
@@ -304,7 +295,7 @@ impl JoinedTopics {
             let numbers: Vec<f64> = numbers.map(|v| v.number().unwrap_or(f64::NAN)).collect();
             if at == 0 {
                 self.waiting.push_back((t, numbers, head.number));
-                if self.waiting.len() > WAITING {
+                if self.waiting.len() > MAX_WAITING_ROWS {
                     self.waiting.pop_front();
                     lost = true;
                 }
@@ -374,7 +365,7 @@ impl Source {
         };
         let step = after.since(*before);
         let usual = self.steps.0 / f64::from(self.steps.1.max(1));
-        if step > DROPOUT * usual {
+        if step > DROPOUT_STEPS * usual {
             return false;
         }
         let share = t.since(*before) / step;

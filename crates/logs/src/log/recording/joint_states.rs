@@ -85,10 +85,6 @@ impl fmt::Debug for JointStates {
 
 impl JointStates {
     /// Finds the topics, those of `topic` and of what was recorded at its instants where one is named.
-    ///
-    /// # Errors
-    /// A file that cannot be read; a recording without a `JointState`, or of several machines where no
-    /// topic is named.
     pub(in crate::log) fn open(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
         let Survey {
             mut found,

@@ -69,9 +69,6 @@ pub(super) trait MessageFile: Send {
     fn topics(&self) -> &[Topic];
 
     /// The next message of a wanted topic, its bytes in `data`; `None` at the end.
-    ///
-    /// # Errors
-    /// A disk that cannot be read; a part whose checksum is wrong.
     fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<MessageHead>, LogError>;
 
     /// Where and why the file breaks off, once it has.
@@ -81,9 +78,6 @@ pub(super) trait MessageFile: Send {
 /// Reads the fields that it was made for out of the messages of one topic: what each encoding does.
 pub(super) trait MessageReader: Send {
     /// Reads the fields of one message.
-    ///
-    /// # Errors
-    /// What is wrong with the message, for the user.
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String>;
 
     /// Names that the message which was read last lists: those of its joints, or of its fields.

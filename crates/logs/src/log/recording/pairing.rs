@@ -12,13 +12,13 @@ use crate::log::layout::Layout;
 use crate::log::time::{Instant, Stamped};
 
 /// Rows that wait for their torque at most.
-const WAITING: usize = 1 << 14;
+const MAX_WAITING_ROWS: usize = 1 << 14;
 /// Torques that are kept for positions that come late.
-const KEPT: usize = 1 << 12;
+const MAX_KEPT_TORQUES: usize = 1 << 12;
 /// Steps of the torques' clock from which its pace is known.
-const PACE: usize = 31;
+const PACE_STEPS: usize = 31;
 /// A step longer than this many usual ones is a dropout.
-const DROPOUT: f64 = 2.5;
+const DROPOUT_STEPS: f64 = 2.5;
 
 /// What one message, or one row, holds: as logged, not scaled.
 #[derive(Debug, Clone)]
@@ -60,7 +60,7 @@ pub(super) struct Pairing {
     /// Samples whose memory is used again.
     spare: Vec<Sample>,
     /// The last steps of the torques' clock, and how many there were.
-    steps: [f64; PACE],
+    steps: [f64; PACE_STEPS],
     stepped: usize,
     paired: u64,
     /// Rows without a torque on both sides, and inside dropouts of the torques.
@@ -80,7 +80,7 @@ impl Pairing {
             torques: VecDeque::new(),
             ready: VecDeque::new(),
             spare: Vec::new(),
-            steps: [0.0; PACE],
+            steps: [0.0; PACE_STEPS],
             stepped: 0,
             paired: 0,
             outside: 0,
@@ -106,7 +106,7 @@ impl Pairing {
     pub(super) fn add_positions(&mut self, row: &mut Sample) {
         let spare = self.spare.pop().unwrap_or_default();
         self.waiting.push_back(std::mem::replace(row, spare));
-        if self.waiting.len() > WAITING
+        if self.waiting.len() > MAX_WAITING_ROWS
             && let Some(row) = self.waiting.pop_front()
         {
             self.outside += 1;
@@ -123,10 +123,10 @@ impl Pairing {
                 self.disordered += 1;
                 return;
             }
-            self.steps[self.stepped % PACE] = t.since(*before);
+            self.steps[self.stepped % PACE_STEPS] = t.since(*before);
             self.stepped += 1;
         }
-        let mut numbers = match self.torques.len() > KEPT {
+        let mut numbers = match self.torques.len() > MAX_KEPT_TORQUES {
             true => self.torques.pop_front().map(|(_, old)| old),
             false => None,
         }
@@ -191,13 +191,13 @@ impl Pairing {
     }
 
     fn is_dropout(&self, step: f64) -> bool {
-        let known = self.stepped.min(PACE);
+        let known = self.stepped.min(PACE_STEPS);
         if known < 5 {
             return false;
         }
         let mut steps = self.steps;
         let (_, usual, _) = steps[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
-        step > DROPOUT * *usual
+        step > DROPOUT_STEPS * *usual
     }
 
     /// What the user should know, topics named.

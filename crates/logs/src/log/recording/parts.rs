@@ -12,7 +12,7 @@ use crate::log::{LogError, escape, list, source};
 const OPEN: usize = 16;
 /// Messages of one file that are held back until none of an earlier time can come, and their bytes: some
 /// chunks of the usual size, whose messages may lie there in any order.
-const HELD: usize = 4096;
+const MAX_HELD_MESSAGES: usize = 4096;
 const HELD_BYTES: usize = 4 << 20;
 
 /// A message that was read ahead.
@@ -31,7 +31,7 @@ struct OpenFile {
     /// Memory that is used again.
     spare: Vec<Vec<u8>>,
     ended: bool,
-    /// What ended it, told once the messages before it are handed out.
+    /// What ended it, reported once the messages before it are handed out.
     failed: Option<LogError>,
     head: Option<MessageHead>,
     data: Vec<u8>,
@@ -70,7 +70,7 @@ impl OpenFile {
 
     /// Goes on to the message of the earliest time among those that are held.
     fn advance(&mut self) -> Result<(), LogError> {
-        while !self.ended && self.held.len() < HELD && self.held_bytes < HELD_BYTES {
+        while !self.ended && self.held.len() < MAX_HELD_MESSAGES && self.held_bytes < HELD_BYTES {
             let mut data = self.spare.pop().unwrap_or_default();
             match self.file.next(&mut data) {
                 Err(error) => (self.failed, self.ended) = (Some(error), true),
@@ -192,9 +192,6 @@ impl MessageFiles {
     }
 
     /// The next message; `None` at the end.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or that is damaged.
     pub(super) fn next(&mut self) -> Result<Option<Message<'_>>, LogError> {
         let current = self.current.take();
         if let Some(part) = current.and_then(|index| self.parts.get_mut(index)) {

@@ -307,9 +307,6 @@ impl LogRows for MessageRows {
 
 impl SampleReader {
     /// Reads one message into a sample; `None` where it is left out.
-    ///
-    /// # Errors
-    /// A file that can no longer be read.
     fn read(
         &mut self,
         message: &Message<'_>,

@@ -45,9 +45,6 @@ pub(super) struct Publishers {
 
 impl Publishers {
     /// Whether a message is used. Once a second publisher appears, the whole topic is gone through.
-    ///
-    /// # Errors
-    /// A file that can no longer be read.
     pub(super) fn take(
         &mut self,
         publisher: Publisher,
@@ -142,7 +139,9 @@ impl Seen {
     /// The largest step of each number; infinite where it is no motion that was sampled finely.
     fn fine_steps(&self) -> Vec<f64> {
         let pairs = self.steps.iter().zip(&self.ranges);
-        let fine = |(step, [low, high]): (&f64, &[f64; 2])| match *step <= FINE * (high - low) {
+        let fine = |(step, [low, high]): (&f64, &[f64; 2])| match *step
+            <= MAX_STEP_SHARE_OF_RANGE * (high - low)
+        {
             true => *step,
             false => f64::INFINITY,
         };
@@ -195,7 +194,7 @@ fn judged(
 }
 
 /// Share of its range that a number goes from message to message at most where a motion was sampled finely.
-const FINE: f64 = 0.25;
+const MAX_STEP_SHARE_OF_RANGE: f64 = 0.25;
 /// Messages that wait for the next one of the main publisher at most.
 const MOST_BETWEEN: usize = 4096;
 

@@ -9,9 +9,6 @@ use crate::log::LogError;
 use crate::log::layout::{Channel, Layout};
 
 /// The rows of a robot each of whose joints is found on one topic alone; `None` where one is not.
-///
-/// # Errors
-/// A file that cannot be read.
 pub(in crate::log) fn of_joints(
     paths: &[PathBuf],
     layout: &Layout,

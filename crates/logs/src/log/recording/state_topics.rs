@@ -13,7 +13,7 @@ use super::value::Value;
 use crate::log::{LogError, escape};
 
 /// Messages that are looked at for topics and their names.
-const LOOKED_AT: u64 = 20_000;
+const SEARCHED_MESSAGES: u64 = 20_000;
 /// Messages of one topic that are looked at for its names.
 const OF_TOPIC: u32 = 200;
 /// Names of one topic that become columns, the first ones.
@@ -27,7 +27,7 @@ pub(super) const COLUMNS: &str = "columns";
 /// Topic of times that are no whole nanoseconds.
 pub(super) const TIMES: &str = "/t";
 /// Part of the instants of one topic that another one has too, where one machine wrote both.
-const SHARED: f64 = 0.8;
+const MIN_SHARED_INSTANTS: f64 = 0.8;
 
 /// The arrays of a message, in the order of the columns.
 pub(super) const ARRAYS: [(&str, &str); 3] =
@@ -77,7 +77,7 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
     let mut times = None;
     let mut messages = 0;
     let mut unreadable: Option<(String, String)> = None;
-    while messages < LOOKED_AT
+    while messages < SEARCHED_MESSAGES
         && let Some(message) = recording.next()?
     {
         messages += 1;
@@ -213,8 +213,6 @@ fn probes() -> Vec<Vec<FieldPath>> {
 }
 
 impl FoundTopic {
-    /// # Errors
-    /// What is wrong with the message.
     fn look(&mut self, head: &MessageHead, data: &[u8]) -> Result<(), String> {
         let mut values = [Value::Absent; 8];
         self.probe.read(data, &mut values)?;
@@ -267,7 +265,7 @@ impl FoundTopic {
         let within = |of: &Self| of.instants.iter().filter(|t| both.contains(*t)).count();
         let shared = self.instants.intersection(&other.instants).count();
         let fewer = within(self).min(within(other));
-        fewer > 0 && shared as f64 >= SHARED * fewer as f64
+        fewer > 0 && shared as f64 >= MIN_SHARED_INSTANTS * fewer as f64
     }
 }
 

@@ -125,9 +125,6 @@ impl TopicCandidate {
 }
 
 /// Reads the beginning of a recording, and chooses.
-///
-/// # Errors
-/// No topic with the robot's channels, or several; a file that cannot be read.
 pub(super) fn choose(paths: &[PathBuf], layout: &Layout) -> Result<(Choice, Layout), LogError> {
     let fields = RobotFields::new(layout);
     let found = survey(paths, layout, &fields)?;

@@ -33,9 +33,6 @@ struct JsonTable<R> {
 }
 
 /// Opens a file of JSON objects.
-///
-/// # Errors
-/// A file that is damaged, or whose first object is no row.
 pub(super) fn open(file: &OpenFile) -> io::Result<TableText> {
     let mut table = JsonTable {
         reader: BufReader::new(file.from(0)),

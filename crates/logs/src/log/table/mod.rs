@@ -38,9 +38,6 @@ pub(super) fn begins(path: &Path) -> bool {
 }
 
 /// Opens a table; `more` are the files that go on with it.
-///
-/// # Errors
-/// A file that is damaged, or that holds no numbers in rows.
 pub(super) fn open(
     path: &Path,
     file: &OpenFile,

@@ -56,9 +56,6 @@ fn rows_of(arrays: &[Array]) -> Option<u64> {
 
 impl ArrayTable {
     /// The table that arrays make up, and what is left out of it.
-    ///
-    /// # Errors
-    /// Arrays that hold no numbers in rows.
     pub(super) fn new(arrays: Vec<Array>) -> io::Result<(Self, Vec<String>)> {
         let Some(rows) = rows_of(&arrays) else {
             return Err(unusable("it holds no array of numbers".to_owned()));

@@ -18,7 +18,7 @@ use parquet::schema::types::Type;
 use super::lines::{COLUMNS, Table, TableText, damaged, number, unusable};
 
 /// Time between the last row of an episode and the first of the next [s]: longer than any filter reaches.
-const BETWEEN_EPISODES: f64 = 10.0;
+const BETWEEN_EPISODES_S: f64 = 10.0;
 /// Largest description of a dataset [bytes].
 const DESCRIPTION: u64 = 1 << 24;
 
@@ -87,7 +87,7 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
     if clock.is_some() {
         names.insert(0, "time [s]".to_owned());
         notes.push(format!(
-            "times are frame_index over fps, and episodes follow one another {BETWEEN_EPISODES} s apart"
+            "times are frame_index over fps, and episodes follow one another {BETWEEN_EPISODES_S} s apart"
         ));
     }
     let table = ParquetTable {
@@ -338,7 +338,7 @@ impl Clock {
         if let Some((before, last)) = self.before
             && before != episode
         {
-            self.begins = last + BETWEEN_EPISODES - own;
+            self.begins = last + BETWEEN_EPISODES_S - own;
         }
         let t = self.begins + own;
         self.before = Some((episode, t));

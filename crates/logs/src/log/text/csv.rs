@@ -33,7 +33,7 @@ pub(super) struct TextFile {
     blank: u64,
     /// Bytes and lines before the table.
     before: (u64, u64),
-    told: Vec<String>,
+    notes: Vec<String>,
     /// The rows are those of a table without lines.
     table: bool,
     /// What is known of a stream.
@@ -76,7 +76,7 @@ impl TextFile {
             malformed: 0,
             blank: 0,
             before: found.before,
-            told: [notes, found.told].concat(),
+            notes: [notes, found.notes].concat(),
             table,
             watch,
         };
@@ -118,9 +118,9 @@ impl TextFile {
 
     /// What was taken for what, and what was passed over, one sentence each.
     pub(super) fn in_words(&self) -> Vec<String> {
-        let mut out = match self.told.is_empty() {
+        let mut out = match self.notes.is_empty() {
             true => Vec::new(),
-            false => vec![self.told.join("; ")],
+            false => vec![self.notes.join("; ")],
         };
         if self.blank > 0 {
             out.push(format!(
@@ -170,7 +170,7 @@ impl TextFile {
             let narrow = found < self.header.len();
             let remark = narrow && (0..found).all(|index| self.number(index).is_none());
             if narrow && !self.goes_on()? && (remark || !self.reader.ends_a_line()) {
-                self.told.push(format!(
+                self.notes.push(format!(
                     "line {}, the last one, is cut off or a remark, and is passed over",
                     self.line_at(end)
                 ));

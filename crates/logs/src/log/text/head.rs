@@ -1,4 +1,4 @@
-//! What the first bytes of a file tell: its format, comment sign, delimiter and header.
+//! What the first bytes of a file show: its format, comment sign, delimiter and header.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub(super) struct Head {
     /// Whether the row after the header holds no numbers.
     pub(super) second_row: bool,
     /// What was taken for what, where a log is not the table alone.
-    pub(super) told: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 /// The way out of an HDF5 file or of one of numpy's kinds: every array, by its name.
@@ -175,7 +175,7 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head,
         parting: (delimiter, spaces),
         second_row,
         mut units,
-        mut told,
+        mut notes,
     } = found;
     let (line, number) = (&lines[at].text, lines[at].number);
     let fields = split(line, delimiter, spaces);
@@ -192,7 +192,7 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head,
         },
         units: Vec::new(),
         second_row,
-        told: Vec::new(),
+        notes: Vec::new(),
     };
     if fields.iter().all(|field| table::is_datum(field)) {
         // numpy.savetxt puts the names into a comment.
@@ -211,7 +211,7 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head,
                 let below = all.iter().find(|one| one.0 > *k && is_units(one));
                 if let Some((k, found)) = below {
                     units = found.iter().map(|unit| (*unit).to_owned()).collect();
-                    told.push(format!("units are those of line {}", lines[*k].number));
+                    notes.push(format!("units are those of line {}", lines[*k].number));
                 }
             }
             None if wanted.by_number => out.headerless = true,
@@ -223,6 +223,6 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head,
             }
         }
     }
-    (out.units, out.told) = (units, told);
+    (out.units, out.notes) = (units, notes);
     Ok(out)
 }

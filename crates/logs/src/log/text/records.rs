@@ -126,9 +126,6 @@ impl Records {
     }
 
     /// Reads the next record; false at the end.
-    ///
-    /// # Errors
-    /// Bytes that cannot be read, and a record without an end.
     pub(super) fn read(&mut self, record: &mut Record) -> io::Result<bool> {
         self.begins = self.line;
         if !self.first && self.read_line(record)? {

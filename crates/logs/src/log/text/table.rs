@@ -16,7 +16,7 @@ pub(super) struct Found {
     /// Units in that row.
     pub(super) units: Vec<String>,
     /// What was taken for what.
-    pub(super) told: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 /// Whether a field is a number or a date, and so no name of a column.
@@ -50,7 +50,7 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     let rows: Vec<usize> = (first..lines.len())
         .filter(|k| is_row(&lines[*k]))
         .collect();
-    let mut told = Vec::new();
+    let mut notes = Vec::new();
     let mut parting = None;
     let mut from = 0;
     let separator = lines[first].text.trim().trim_matches('"');
@@ -111,7 +111,7 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     // what a name in quotes goes on with is no row of its own
     let second = found.second.filter(|_| !goes_on(at));
     if row > 0 || asked.is_some() {
-        told.push(format!(
+        notes.push(format!(
             "the table begins at line {number}: {} passed over (`header_line` in [log] of the robot file says another)",
             match number - 1 {
                 1 => "1 line before it is".to_owned(),
@@ -126,9 +126,9 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
         let fields = split(&below.text, sign, spaces);
         if second == Second::Units {
             units = fields.iter().map(|unit| (*unit).to_owned()).collect();
-            told.push(format!("units are those of line {}", below.number));
+            notes.push(format!("units are those of line {}", below.number));
         } else {
-            told.push(format!(
+            notes.push(format!(
                 "line {} holds words and is passed over",
                 below.number
             ));
@@ -139,7 +139,7 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
         parting: found.parting,
         second_row: second.is_some(),
         units,
-        told,
+        notes,
     }
 }
 

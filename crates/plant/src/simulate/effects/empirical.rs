@@ -5,6 +5,7 @@
 //! way since the last reversal it turns with the accepted steps ([`Effect::moved`]). A curve over the load would have
 //! to be solved with the balance of torques, and is refused.
 
+use cft_ident_core::explain::ErrorText;
 use nalgebra::{SMatrix, SVector};
 
 use super::{Beginning, Built, Effect, PlantLaw, PlantRobot, PlantState, Site, sign};
@@ -38,7 +39,8 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
     if signal == 4 {
         return Err(site.refuse(
             ENTRY.name,
-            "a curve over the load is not simulated; use `load-friction` or `drive-efficiency`",
+            ErrorText::new("a curve over the load is not simulated")
+                .remedy("use `load-friction` or `drive-efficiency`"),
         ));
     }
     let knots: [f64; KNOTS] = std::array::from_fn(|i| values[3 + i]);

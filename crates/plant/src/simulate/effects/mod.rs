@@ -288,7 +288,7 @@ impl Effects {
         }
     }
 
-    /// Tells every effect of an accepted step; `true` when one of them changed.
+    /// Informs every effect of an accepted step; `true` when one of them changed.
     pub fn moved(&mut self, motion: &PlantState) -> bool {
         let mut changed = false;
         for (effect, states) in &mut self.list {

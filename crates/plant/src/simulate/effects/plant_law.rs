@@ -34,9 +34,6 @@ impl Built {
 
 impl PlantLaw {
     /// Builds the effect from one number per key.
-    ///
-    /// # Errors
-    /// [`SimulateError::EffectPlace`] where the robot has no place for it, then [`SimulateError::EffectNumber`].
     pub(super) fn built(
         &self,
         site: &Site,

@@ -5,6 +5,7 @@ use crate::simulate::SimulateError;
 use crate::simulate::plant::Plant;
 use crate::simulate::temperature::PlantTemperatures;
 use cft_ident_core::effect::Place;
+use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::cft::geometry::L4;
 use cft_ident_core::robot::cft::pantograph;
 use cft_ident_core::robot::{JointKind, Robot};
@@ -65,7 +66,7 @@ impl Site {
     }
 
     /// Refusal of a kind at this site.
-    pub(super) fn refuse(&self, effect: &str, why: &str) -> SimulateError {
+    pub(super) fn refuse(&self, effect: &str, why: impl Into<ErrorText>) -> SimulateError {
         let place = if self.name.is_empty() {
             "this robot".to_owned()
         } else {
@@ -74,7 +75,7 @@ impl Site {
         SimulateError::EffectPlace {
             effect: effect.to_owned(),
             place,
-            why: why.to_owned(),
+            why: why.into(),
         }
     }
 }

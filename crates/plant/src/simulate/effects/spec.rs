@@ -1,5 +1,6 @@
 //! `NAME[:JOINT][:key=value,...]`: effects as they are asked for and as they came out.
 
+use cft_ident_core::explain::ErrorText;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
@@ -117,7 +118,7 @@ impl EffectSpec {
         sites: &'a Sites,
     ) -> Result<&'a [Site], SimulateError> {
         let whole = sites.whole.as_slice();
-        let refuse = |why: &str| {
+        let refuse = |why: ErrorText| {
             let first = whole.first().or(sites.joints.first());
             first.map_or_else(
                 || SimulateError::UnknownJoint {
@@ -130,16 +131,13 @@ impl EffectSpec {
         let (joints, screws): (&[Site], &[Site]) = match places {
             Places::Joints | Places::JointsOrAll | Places::Pairs => (&sites.joints, &[]),
             Places::Actuators if sites.screws.is_empty() => {
-                return Err(refuse(
-                    "it sits at the screws of the CFT robot, x_r and y_r; a single joint's own \
-                     friction is `nonlinear-viscous`, `asymmetric-friction` or `stribeck`",
-                ));
+                return Err(refuse(ErrorText::new("it sits at the screws of the CFT robot, x_r and y_r").remedy("a single joint's own friction is `nonlinear-viscous`, `asymmetric-friction` or `stribeck`")));
             }
             Places::Actuators => (&[], &sites.screws),
             Places::JointsAndActuators => (&sites.joints, &sites.screws),
             Places::Whole if self.joint.is_some() => {
                 return Err(refuse(
-                    "it concerns all joints together; leave the joint out",
+                    ErrorText::new("it concerns all joints together").remedy("leave the joint out"),
                 ));
             }
             Places::Whole => (whole, &[]),

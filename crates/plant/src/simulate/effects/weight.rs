@@ -2,6 +2,7 @@
 
 use super::{Built, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::weight::ENTRY;
+use cft_ident_core::explain::ErrorText;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
@@ -10,7 +11,8 @@ pub static LAW: PlantLaw = PlantLaw {
         if !site.turns {
             return Err(site.refuse(
                 ENTRY.name,
-                "its lever turns about an axis, and this joint slides; use `torque-offset`",
+                ErrorText::new("its lever turns about an axis, and this joint slides")
+                    .remedy("use `torque-offset`"),
             ));
         }
         Built::plant(Weight {

@@ -1,5 +1,6 @@
 //! Finite Fourier series of eq. (43), entered smoothly from rest and left to it.
 
+use cft_ident_core::explain::ErrorText;
 use std::f64::consts::TAU;
 
 use rand::RngExt;
@@ -74,30 +75,39 @@ impl<const J: usize> Fourier<J> {
     /// [`SimulateError::Reference`] when a number is not finite, the frequency not positive, or a and
     /// b differ in length.
     pub fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: String| Err(SimulateError::Reference { what });
+        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
         if !(self.fundamental > 0.0 && self.fundamental.is_finite()) {
-            return reject(format!(
-                "the fundamental frequency is {} rad/s; it must be positive",
-                self.fundamental
-            ));
+            return reject(
+                ErrorText::new(format!(
+                    "the fundamental frequency is {} rad/s",
+                    self.fundamental
+                ))
+                .remedy("it must be positive"),
+            );
         }
         if !(self.blend >= 0.0 && self.blend.is_finite() && self.start.is_finite()) {
-            return reject(format!(
-                "the blend time {} s or the start phase {} s is no usable time",
-                self.blend, self.start
-            ));
+            return reject(
+                format!(
+                    "the blend time {} s or the start phase {} s is no usable time",
+                    self.blend, self.start
+                )
+                .into(),
+            );
         }
         if self.a.len() != self.b.len() {
-            return reject(format!(
-                "the series has {} coefficients a and {} coefficients b; give as many of each",
-                self.a.len(),
-                self.b.len()
-            ));
+            return reject(
+                ErrorText::new(format!(
+                    "the series has {} coefficients a and {} coefficients b",
+                    self.a.len(),
+                    self.b.len()
+                ))
+                .remedy("give as many of each"),
+            );
         }
         let numbers = self.a.iter().chain(&self.b).flatten().chain(&self.offset);
         for number in numbers {
             if !number.is_finite() {
-                return reject(format!("a coefficient of the series is {number}"));
+                return reject(format!("a coefficient of the series is {number}").into());
             }
         }
         Ok(())

@@ -6,6 +6,7 @@
 //! range (there gravity and inertia show their dependence on position); slow strokes are inserted in
 //! pairs behind them and take the time that is left.
 
+use cft_ident_core::explain::ErrorText;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -40,7 +41,7 @@ pub struct LadderReference {
 /// A sweep must have at least this share of the range at its plateau speed.
 const PLATEAU_SHARE: f64 = 0.25;
 /// Share of the range by which a motion may pass its ends: half of what usual ranges leave to the limits.
-const BEYOND: f64 = 0.02;
+const BEYOND_RANGE_SHARE: f64 = 0.02;
 /// Speeds of the usual ladder.
 const SPEEDS: usize = 10;
 /// Time from zero speed to a slow plateau of the usual ladder \[s\].
@@ -79,9 +80,6 @@ impl LadderPlan {
 
     /// Ladder of ten speeds in equal ratios from `top` (as far as the range lets it) to `lowest`, or of as
     /// many as the time suffices for.
-    ///
-    /// # Errors
-    /// As [`LadderPlan::build`], when the time does not suffice for two speeds.
     pub fn usual(
         range: (f64, f64),
         (lowest, top): (f64, f64),
@@ -110,9 +108,6 @@ impl LadderPlan {
     }
 
     /// [`LadderPlan::build`] with the chance of a seed, or without.
-    ///
-    /// # Errors
-    /// As there.
     pub(crate) fn build_seeded(&self, seed: Option<u64>) -> Result<LadderReference, SimulateError> {
         let mut chance = seed.map(|seed| stream(seed, Purpose::Reference));
         self.build(chance.as_mut())
@@ -147,13 +142,13 @@ impl LadderPlan {
         let shortest = self.lay_out(&order, 0.0, mirrored);
         if shortest.end > self.seconds {
             return Err(SimulateError::Reference {
-                what: format!(
-                    "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s; give more \
-                     seconds, fewer speeds or a smaller range",
+                what: ErrorText::new(format!(
+                    "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s",
                     speeds.len(),
                     shortest.end / passes as f64,
                     self.seconds / passes as f64
-                ),
+                ))
+                .remedy("give more seconds, fewer speeds or a smaller range"),
             });
         }
         let (mut low, mut high) = (0.0, self.seconds);
@@ -169,16 +164,13 @@ impl LadderPlan {
     }
 
     /// Refuses a motion whose reversals are so slow that they take it out of the range.
-    ///
-    /// # Errors
-    /// [`SimulateError::Reference`].
     pub(crate) fn within_range(
         &self,
         ladder: LadderReference,
     ) -> Result<LadderReference, SimulateError> {
         let (low, high) = self.range;
         // pairs of slow strokes between sweeps of two speeds do not end just where they began
-        let hardly = BEYOND * (high - low);
+        let hardly = BEYOND_RANGE_SHARE * (high - low);
         let leaves = |stroke: &&Stroke| {
             let to = stroke.from + stroke.direction * stroke.length();
             !(low - hardly..=high + hardly).contains(&to)
@@ -187,31 +179,28 @@ impl LadderPlan {
             return Ok(ladder);
         };
         Err(SimulateError::Reference {
-            what: format!(
-                "the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]; give a \
-                 shorter turn, a lower speed or a wider range",
-                stroke.speed,
-                self.turn,
-                stroke.length()
-            ),
+            what: ErrorText::new(format!("the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]", stroke.speed, self.turn, stroke.length())).remedy("give a shorter turn, a lower speed or a wider range"),
         })
     }
 
     fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: String| Err(SimulateError::Reference { what });
+        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
         let (low, high) = self.range;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(low.is_finite() && high.is_finite() && high > low) {
-            return reject(format!("the range [{low}, {high}] of the ladder is empty"));
+            return reject(format!("the range [{low}, {high}] of the ladder is empty").into());
         }
         if !(positive(self.acceleration) && positive(self.turn) && positive(self.seconds)) {
-            return reject(format!(
-                "acceleration {}, turn time {} s and duration {} s must be positive",
-                self.acceleration, self.turn, self.seconds
-            ));
+            return reject(
+                format!(
+                    "acceleration {}, turn time {} s and duration {} s must be positive",
+                    self.acceleration, self.turn, self.seconds
+                )
+                .into(),
+            );
         }
         if self.speeds.is_empty() {
-            return reject("the ladder has no speeds; give at least one".to_owned());
+            return reject(ErrorText::new("the ladder has no speeds").remedy("give at least one"));
         }
         let fastest = top_speed(self.range, self.acceleration);
         for &speed in &self.speeds {
@@ -220,7 +209,7 @@ impl LadderPlan {
                     "the speed {speed} does not fit: over the range [{low}, {high}] at an acceleration of {} \
                      the ladder reaches {fastest:.4}",
                     self.acceleration
-                ));
+                ).into());
             }
         }
         Ok(())
@@ -472,7 +461,7 @@ mod tests {
             let mut plan = plan();
             change(&mut plan);
             match plan.build(None).and_then(|built| plan.within_range(built)) {
-                Err(SimulateError::Reference { what }) => what,
+                Err(SimulateError::Reference { what }) => what.to_string(),
                 other => panic!("{other:?}"),
             }
         };

@@ -98,7 +98,7 @@ impl<const J: usize> Path<J> {
         match self {
             Self::Fourier(series) => series.check(),
             Self::Ladder { moving, .. } if *moving >= J => Err(SimulateError::Reference {
-                what: format!("the ladder moves coordinate {moving} of {J}"),
+                what: format!("the ladder moves coordinate {moving} of {J}").into(),
             }),
             _ => Ok(()),
         }

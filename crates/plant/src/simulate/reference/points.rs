@@ -2,6 +2,7 @@
 
 use super::Target;
 use crate::simulate::SimulateError;
+use cft_ident_core::explain::ErrorText;
 
 /// Cubic spline through poses at given times, twice continuously differentiable, at rest at both ends.
 ///
@@ -21,23 +22,26 @@ impl<const J: usize> Points<J> {
     /// [`SimulateError::Reference`] for fewer than two points, times that do not increase, and numbers
     /// that are not finite.
     pub fn new(points: &[(f64, [f64; J])]) -> Result<Self, SimulateError> {
-        let reject = |what: String| Err(SimulateError::Reference { what });
+        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
         if points.len() < 2 {
-            return reject(format!(
-                "the point list has {} points; it needs at least two",
-                points.len()
-            ));
+            return reject(
+                ErrorText::new(format!("the point list has {} points", points.len()))
+                    .remedy("it needs at least two"),
+            );
         }
         for (k, (t, pose)) in points.iter().enumerate() {
             if !t.is_finite() || pose.iter().any(|x| !x.is_finite()) {
-                return reject(format!("point {} of the list is not finite", k + 1));
+                return reject(format!("point {} of the list is not finite", k + 1).into());
             }
             if k > 0 && *t <= points[k - 1].0 {
-                return reject(format!(
-                    "point {} of the list is at {t} s, not after the point before it at {} s",
-                    k + 1,
-                    points[k - 1].0
-                ));
+                return reject(
+                    format!(
+                        "point {} of the list is at {t} s, not after the point before it at {} s",
+                        k + 1,
+                        points[k - 1].0
+                    )
+                    .into(),
+                );
             }
         }
         let times: Vec<f64> = points.iter().map(|p| p.0).collect();

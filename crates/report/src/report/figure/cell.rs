@@ -27,34 +27,34 @@ pub struct Cells {
     pub words: Vec<String>,
 }
 
-/// One picture with a panel of a height [px]; `title` and `told` are what a screen reader says, `draw` is given
+/// One picture with a panel of a height [px]; `title` and `description` are what a screen reader says, `draw` is given
 /// the panel's frame: left, top, width, height [px].
 pub(super) fn cell(
     title: &str,
-    told: &str,
+    description: &str,
     height: f64,
     draw: impl FnOnce(&mut Svg, [f64; 4]),
 ) -> String {
-    below(NAME, [title, told], height, draw)
+    below(NAME, [title, description], height, draw)
 }
 
 /// The same of a panel that bears no name.
 pub(super) fn nameless(
     title: &str,
-    told: &str,
+    description: &str,
     height: f64,
     draw: impl FnOnce(&mut Svg, [f64; 4]),
 ) -> String {
-    below(MARKS, [title, told], height, draw)
+    below(MARKS, [title, description], height, draw)
 }
 
 fn below(
     above: f64,
-    [title, told]: [&str; 2],
+    [title, description]: [&str; 2],
     height: f64,
     draw: impl FnOnce(&mut Svg, [f64; 4]),
 ) -> String {
-    let mut svg = Svg::new(WIDTH, above + height + BELOW, title, told);
+    let mut svg = Svg::new(WIDTH, above + height + BELOW, title, description);
     draw(&mut svg, [LEFT, above, WIDTH - LEFT - RIGHT, height]);
     svg.finish()
 }

@@ -14,7 +14,7 @@ pub struct EffectFigure {
     /// What was found.
     pub title: String,
     /// The finding in a sentence, for those who do not see the picture.
-    pub told: String,
+    pub description: String,
     /// Name and unit of the signal below.
     pub over: (String, String),
     /// What stands at the left, and its unit.
@@ -50,8 +50,8 @@ impl EffectFigure {
             &[(&left, colour::INK, 1.3)],
         ];
         let picture = |(name, clouds): (&str, &[Cloud])| {
-            let told = format!("{name}. {}", self.told);
-            cell::cell(&self.title, &told, HEIGHT, |svg, frame| {
+            let description = format!("{name}. {}", self.description);
+            cell::cell(&self.title, &description, HEIGHT, |svg, frame| {
                 svg.text(
                     [frame[0], frame[1] - 8.0],
                     name,
@@ -108,7 +108,7 @@ mod tests {
         let row = |k: i32| [f64::from(k), f64::from(k % 7), f64::NAN];
         let mut figure = EffectFigure {
             title: "ripple of q1, 2.5 mm pitch".into(),
-            told: "the residual falls from 3 N to 1 N".into(),
+            description: "the residual falls from 3 N to 1 N".into(),
             over: ("position".into(), "m".into()),
             of: ("torque".into(), "N".into()),
             rows: (0..5000).map(row).collect(),

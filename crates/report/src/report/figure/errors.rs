@@ -124,7 +124,7 @@ impl ErrorFigure {
                     }
                     end = end.max(x(high));
                 }
-                let (mut at, words) = (end + 6.0, told(bar));
+                let (mut at, words) = (end + 6.0, in_words(bar));
                 // no number stands on the line of the limit
                 let limit = self.limit.map(x);
                 if let Some(line) =
@@ -162,10 +162,10 @@ impl ErrorFigure {
                 joint.joint,
                 number::percent(before.error),
                 self.names[0],
-                told(joint.after),
+                in_words(joint.after),
                 self.names[1]
             ),
-            None => format!("{} {}", joint.joint, told(joint.after)),
+            None => format!("{} {}", joint.joint, in_words(joint.after)),
         };
         let joints: Vec<String> = self.joints.iter().map(joint).collect();
         let limit = self.limit.map_or(String::new(), |limit| {
@@ -181,7 +181,7 @@ impl ErrorFigure {
 }
 
 /// `5.17 % (4.25..6.11)`.
-fn told(bar: ErrorBar) -> String {
+fn in_words(bar: ErrorBar) -> String {
     match bar.interval_95 {
         Some([low, high]) => format!(
             "{} ({}..{})",

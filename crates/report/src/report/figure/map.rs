@@ -13,7 +13,7 @@ use cft_ident_core::number;
 pub struct MapFigure {
     pub title: String,
     /// The finding in a sentence, for those who do not see the picture.
-    pub told: String,
+    pub description: String,
     /// Name and unit of the signals: below, and at the left of the map.
     pub over: [(String, String); 2],
     /// Unit of the residual.
@@ -52,13 +52,16 @@ impl MapFigure {
         let [first, second] = &self.over;
         let map = cell::cell(
             &self.title,
-            &format!("mean over {} and {}. {}", first.0, second.0, self.told),
+            &format!(
+                "mean over {} and {}. {}",
+                first.0, second.0, self.description
+            ),
             HEIGHT,
             |svg, frame| self.map(svg, frame, most),
         );
         let curve = cell::cell(
             &self.title,
-            &format!("mean over {}. {}", first.0, self.told),
+            &format!("mean over {}. {}", first.0, self.description),
             HEIGHT,
             |svg, frame| self.line(svg, frame),
         );
@@ -207,7 +210,7 @@ mod tests {
     fn cells_are_shaded_by_their_mean_and_those_without_rows_stay_empty() {
         let mut figure = MapFigure {
             title: "what is left of q1".into(),
-            told: "it depends on position with speed".into(),
+            description: "it depends on position with speed".into(),
             over: [
                 ("position".into(), "rad".into()),
                 ("speed".into(), "rad/s".into()),

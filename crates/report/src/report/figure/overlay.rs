@@ -44,7 +44,7 @@ const LABEL: f64 = 250.0;
 const PANEL_HEIGHT_PX: f64 = 180.0;
 const ROWS: usize = 500;
 
-/// Told apart by dashes as well as by colour.
+/// Distinguished by dashes as well as by colour.
 const STROKES: [Stroke; 2] = [
     Stroke::solid(colour::VERMILLION, 1.8),
     Stroke::dashed(colour::BLUE, 1.6, "7 3"),

@@ -1,6 +1,7 @@
 //! A figure as PNG: the SVG drawn in pixels, with the fonts that come with the crate, so that it looks
 //! the same on every machine.
 
+use cft_ident_core::explain::Explain;
 use std::sync::{Arc, OnceLock};
 
 use resvg::tiny_skia::{Pixmap, Transform};
@@ -10,18 +11,20 @@ use resvg::usvg::{Options, Tree};
 const REGULAR_FONT: &[u8] = include_bytes!("font/DejaVuSans.ttf");
 const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
 
-/// Pixels of the picture for one px of the figure: 300 dots an inch where a figure of 760 px is
-/// printed 19 cm wide.
+/// Pixels of the picture for one px of the figure: 300 dots an inch where a figure of 760 px is printed 19 cm wide.
 const SCALE: f32 = 3.0;
 
 /// Why there is no picture.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Explain, thiserror::Error)]
 pub enum PngError {
-    #[error("the figure cannot be read back: {0}; write it as .svg")]
+    #[explain("the figure cannot be read back: {_0}", "write it as .svg")]
     Figure(#[from] resvg::usvg::Error),
-    #[error("a picture of {width} x {height} px does not fit into memory; write it as .svg")]
+    #[explain(
+        "a picture of {width} x {height} px does not fit into memory",
+        "write it as .svg"
+    )]
     Size { width: u32, height: u32 },
-    #[error("the picture cannot be encoded: {0}; write it as .svg")]
+    #[explain("the picture cannot be encoded: {_0}", "write it as .svg")]
     Encoding(String),
 }
 

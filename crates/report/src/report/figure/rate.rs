@@ -23,7 +23,7 @@ pub struct RateFigure {
     pub panels: Vec<RatePanel>,
 }
 
-/// Told apart by dashes as well as by colour.
+/// Distinguished by dashes as well as by colour.
 const STROKES: [Stroke; 4] = [
     Stroke::dashed(colour::SKY, 1.6, "2 3"),
     Stroke::solid(colour::BLUE, 1.8),

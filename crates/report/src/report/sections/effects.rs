@@ -40,7 +40,7 @@ pub fn card(
         .rms
         .map(|rms| format!("{} {unit}", number::significant(rms, 3)));
     let torque = if unit == "N" { "force" } else { "torque" };
-    let told = format!(
+    let description = format!(
         "The residual of {joint} on {data} is {without} rms with this {torque} left out and the rest as it is, and {with} with it."
     );
     let small = of.over.1 == "m" && of.rows.iter().all(|row| row[0].abs() < MILLIMETRES);
@@ -54,14 +54,14 @@ pub fn card(
     };
     let figure = EffectFigure {
         title: title.clone(),
-        told: told.clone(),
+        description: description.clone(),
         over,
         of: (format!("{torque}{along}"), unit.to_owned()),
         rows: (of.rows.iter())
             .map(|[x, without, added]| [scale * x, *without, *added])
             .collect(),
     };
-    let mut words = vec![told];
+    let mut words = vec![description];
     words.push(format!("What to do: {}.", effect.law.entry.remedy));
     words.extend(said);
     let cells = figure.cells(words);

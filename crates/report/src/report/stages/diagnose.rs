@@ -49,7 +49,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
     let mut page = report.page();
     first_screen::show(&mut page, (of.machine, of.found), (of.path, of.logs));
     errors(&mut page, of.machine, of.found);
-    formulas::told(&mut page, of.machine, of.found);
+    formulas::write(&mut page, of.machine, of.found);
     free_run::section(&mut page, of.found.free_run.as_ref());
     report
 }
@@ -127,7 +127,7 @@ pub fn diagnosed(
             .skip(MAX_CHANGES_ON_SCREEN),
     );
     formulas::in_short(&mut report.usual(), machine, found);
-    formulas::told(&mut report.detail(), machine, found);
+    formulas::write(&mut report.detail(), machine, found);
     formulas::candidates(&mut report.detail(), machine, found);
     let mut terminal = report.terminal();
     terminal.line("");

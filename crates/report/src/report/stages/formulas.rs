@@ -50,7 +50,7 @@ pub fn candidates(detail: &mut Writer, machine: &LoggedRobot, found: &Diagnosed)
 }
 
 /// What a search came to, joint by joint.
-pub fn told(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+pub fn write(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     if !found.searched {
         return;
     }
@@ -126,7 +126,7 @@ fn figure(machine: &LoggedRobot, of: &FormulaResult, picture: &FormulaPicture) -
     let joint = names.iter().position(|n| *n == of.joint).unwrap_or(0);
     let figure = EffectFigure {
         title: format!("formula of {}, on data set aside", of.joint),
-        told: of.text.clone(),
+        description: of.text.clone(),
         over: axis_of(machine, joint, picture.over),
         of: (
             "torque".to_owned(),
@@ -139,7 +139,7 @@ fn figure(machine: &LoggedRobot, of: &FormulaResult, picture: &FormulaPicture) -
 
 /// Numbers with units and intervals.
 fn numbers(of: &FormulaResult) -> Vec<String> {
-    let told = of.parameters.iter().map(|(key, n)| {
+    let numbers = of.parameters.iter().map(|(key, n)| {
         let interval = match n.std {
             Some(std) => format!(
                 " ({} .. {})",
@@ -158,5 +158,5 @@ fn numbers(of: &FormulaResult) -> Vec<String> {
             n.unit
         )
     });
-    told.collect()
+    numbers.collect()
 }

@@ -1,6 +1,6 @@
 //! The report of `identify`: the whole campaign.
 
-use super::{diagnose, first_screen, friction as filter, lsq, validate};
+use super::{diagnose, first_screen, friction as filter, lsq, quality_of_fit, validate};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::table::Table;
@@ -113,8 +113,8 @@ pub fn identify(of: &Identify) -> Report {
     detail.paragraph(&format!("{tally}."));
     detail.table(beside_truth(of));
     detail.line("");
-    lsq::condition(&mut detail, &found.dynamics);
-    lsq::fit_quality(&mut detail, &found.dynamics);
+    quality_of_fit::condition(&mut detail, &found.dynamics);
+    quality_of_fit::fit_quality(&mut detail, &found.dynamics);
     report.terminal().line("");
     let mut page = report.page();
     match (of.diagnosed(), &found.validated) {

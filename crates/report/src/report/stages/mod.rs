@@ -13,6 +13,7 @@ pub mod friction;
 pub mod identify;
 pub mod inspect;
 pub mod lsq;
+mod quality_of_fit;
 pub mod setup;
 pub mod show;
 mod step_words;

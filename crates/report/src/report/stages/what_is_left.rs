@@ -12,7 +12,7 @@ pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String>
     let names = machine.robot.joint_names();
     let all = &found.diagnosis.left.dependence;
     let of_joint = |(j, name): (usize, &String)| {
-        let told = all.iter().filter(|d| d.joint == j).map(|d| {
+        let signals = all.iter().filter(|d| d.joint == j).map(|d| {
             let signals = d.signals.iter().map(|s| signal_words(names, j, *s));
             let signals: Vec<String> = signals.collect();
             format!(
@@ -22,11 +22,11 @@ pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String>
                 chance(d.p_value)
             )
         });
-        let told: Vec<String> = told.collect();
-        (!told.is_empty()).then(|| {
+        let signals: Vec<String> = signals.collect();
+        (!signals.is_empty()).then(|| {
             format!(
                 "the residual of {name} still depends on {}",
-                told.join(", ")
+                signals.join(", ")
             )
         })
     };
@@ -67,7 +67,7 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
         [f64::min as fn(f64, f64) -> f64, f64::max].map(|of| means.clone().fold(0.0, of));
     MapFigure {
         title: format!("what is left of {}", names[joint]),
-        told: format!(
+        description: format!(
             "Over {} the mean residual goes from {} to {} {torque}",
             over[0].0,
             number::significant(low, 2),

@@ -183,9 +183,6 @@ impl ReducedLog {
     }
 
     /// Its rows.
-    ///
-    /// # Errors
-    /// Other columns than those it was made with.
     pub(in crate::identify) fn rows(
         &self,
         columns: RegressorColumns,
@@ -194,9 +191,6 @@ impl ReducedLog {
     }
 
     /// Its rows by a narrower position filter.
-    ///
-    /// # Errors
-    /// Those of [`Self::rows`].
     pub(in crate::identify) fn narrower_rows(
         &self,
         columns: RegressorColumns,
@@ -205,9 +199,6 @@ impl ReducedLog {
     }
 
     /// Its rows with positions rounded anew on a shifted grid; none of a robot whose encoders are not known.
-    ///
-    /// # Errors
-    /// Those of [`Self::rows`].
     pub(in crate::identify) fn shifted_rows(
         &self,
         grid: u32,
@@ -218,9 +209,6 @@ impl ReducedLog {
     }
 
     /// Refuses a log that was reduced with something else than `wanted`.
-    ///
-    /// # Errors
-    /// [`ReducedError::Other`] with what differs.
     pub(in crate::identify) fn belongs_to(&self, wanted: &MadeWith) -> Result<(), ReducedError> {
         match self.made_with.difference(wanted) {
             None => Ok(()),
@@ -232,9 +220,6 @@ impl ReducedLog {
     }
 
     /// Refuses a log of another robot, settings or version, whatever friction it was reduced with.
-    ///
-    /// # Errors
-    /// [`ReducedError::Other`] with what differs.
     pub(in crate::identify) fn belongs_to_robot(
         &self,
         file: &RobotFile,

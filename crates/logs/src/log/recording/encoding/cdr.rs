@@ -115,9 +115,6 @@ impl CdrReader {
     }
 
     /// Reads the fields of one message into `out`, one value for each field that was asked for.
-    ///
-    /// # Errors
-    /// [`MalformedMessage`]: the bytes are no message of this type.
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), MalformedMessage> {
         out.fill(Value::Absent);
         if out.len() != self.outputs {

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use super::wire::{Broken, Fields, Item};
 
 /// Messages inside messages inside ..., deepest.
-const DEEPEST: usize = 64;
+const MAX_DEPTH: usize = 64;
 
 /// The types of one set.
 #[derive(Debug, Clone)]
@@ -88,9 +88,6 @@ struct Found {
 
 impl Types {
     /// Finds message type `name` in a descriptor set.
-    ///
-    /// # Errors
-    /// What is wrong with the set, or that it lacks the type.
     pub(super) fn parse(name: &str, set: &[u8]) -> Result<Self, String> {
         let damaged = |_: Broken| "its descriptor set is damaged".to_owned();
         let mut found = Found::default();
@@ -144,7 +141,7 @@ impl Found {
         let messages = |scope: &str, data, tag, depth, to: &mut Vec<_>| -> Result<(), Broken> {
             for field in Fields::new(data) {
                 match field? {
-                    (number, Item::Bytes(message)) if number == tag && depth < DEEPEST => {
+                    (number, Item::Bytes(message)) if number == tag && depth < MAX_DEPTH => {
                         to.push((scope.to_owned(), message, depth));
                     }
                     _ => {}
@@ -208,8 +205,7 @@ impl Presence {
     }
 }
 
-/// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9,
-/// proto3_optional 17.
+/// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9, proto3_optional 17.
 fn field_type(field: &[u8], mut presence: Presence) -> Result<Unresolved, Broken> {
     let (mut name, mut type_name) = (String::new(), None);
     let (mut number, mut label, mut kind, mut chosen) = (0, 1, 0, false);

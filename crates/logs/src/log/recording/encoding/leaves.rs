@@ -25,8 +25,7 @@ pub(super) fn of_tree(tree: &Tree) -> Vec<Leaf> {
     out
 }
 
-/// Adds the numbers below a place, which `path` leads to and `label` names; `lists` are the lists of texts on
-/// the way.
+/// Adds the numbers below a place, which `path` leads to and `label` names; `lists` are the lists of texts on the way.
 fn collect<'t>(
     tree: &'t Tree,
     (path, label): (&str, &str),

@@ -26,9 +26,6 @@ type Open = fn(&Schema, &[Vec<FieldPath>]) -> Option<Result<Box<dyn MessageReade
 const ENCODINGS: [Open; 3] = [cdr::open, json::open, proto::open];
 
 /// Makes a reader for `fields` of messages: for each the paths that it may have.
-///
-/// # Errors
-/// Why messages of this schema cannot be read, for the user.
 pub(super) fn reader_of(
     schema: &Schema,
     fields: &[Vec<FieldPath>],

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Levels of messages in messages that are followed.
-const DEEPEST: usize = 32;
+const MAX_DEPTH: usize = 32;
 /// Bytes of definition text that are read.
-const LONGEST: usize = 1 << 20;
+const MAX_DEFINITION_BYTES: usize = 1 << 20;
 
 /// Why a message definition cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -31,13 +31,13 @@ pub enum DefinitionError {
         name: String,
     },
     /// Messages in messages without an end.
-    #[error("{message} holds messages in messages, more than {DEEPEST} levels deep")]
+    #[error("{message} holds messages in messages, more than {MAX_DEPTH} levels deep")]
     Deep {
         /// The outermost message.
         message: String,
     },
     /// A text that no real message has.
-    #[error("the definition is {bytes} bytes long, more than {LONGEST}")]
+    #[error("the definition is {bytes} bytes long, more than {MAX_DEFINITION_BYTES}")]
     Long {
         /// Its length.
         bytes: usize,
@@ -163,11 +163,8 @@ impl Definition {
     /// Parses the definition of message `name` (`package/msg/Type`) and resolves every type in it.
     ///
     /// `text` may be empty where the type is one that is known here.
-    ///
-    /// # Errors
-    /// [`DefinitionError`]: a line that is no field, a type that is not defined, an endless nesting.
     pub(super) fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
-        if text.len() > LONGEST {
+        if text.len() > MAX_DEFINITION_BYTES {
             return Err(DefinitionError::Long { bytes: text.len() });
         }
         let root = short(name);
@@ -279,7 +276,7 @@ fn resolve(
     messages: &mut Vec<Vec<Field>>,
     depth: usize,
 ) -> Result<usize, DefinitionError> {
-    if depth > DEEPEST {
+    if depth > MAX_DEPTH {
         return Err(DefinitionError::Deep {
             message: root.to_owned(),
         });
@@ -405,6 +402,6 @@ mod tests {
         assert!(parse("A a\n===\nMSG: p/A\nB b\n===\nMSG: p/B\nA a\n").contains("levels deep"));
         let unknown = Definition::parse("unknown/msg/Type", "").unwrap_err();
         assert!(unknown.to_string().contains("not defined"), "{unknown}");
-        assert!(parse(&"#".repeat(LONGEST + 1)).contains("bytes long"));
+        assert!(parse(&"#".repeat(MAX_DEFINITION_BYTES + 1)).contains("bytes long"));
     }
 }

@@ -14,7 +14,7 @@ use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
 /// Steps that a path may have.
-const LONGEST: usize = 16;
+const MAX_PATH_STEPS: usize = 16;
 
 /// Messages in protobuf, by the descriptor set that is their schema.
 pub(super) fn open(
@@ -75,9 +75,6 @@ enum Place<'m> {
 
 impl ProtoReader {
     /// A reader for message type `name` of the descriptor set that a recording carries.
-    ///
-    /// # Errors
-    /// What is wrong with the set, or that it lacks the type.
     pub(super) fn new(name: &str, set: &[u8]) -> Result<Self, String> {
         let types = Types::parse(name, set)?;
         Ok(Self {
@@ -87,9 +84,6 @@ impl ProtoReader {
     }
 
     /// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
-    ///
-    /// # Errors
-    /// Bytes that are no message.
     pub(super) fn read(
         &self,
         data: &[u8],
@@ -125,9 +119,9 @@ impl ProtoReader {
             return Ok(Value::Absent);
         };
         // Places on the way.
-        let mut way = [Place::Nothing; LONGEST + 1];
+        let mut way = [Place::Nothing; MAX_PATH_STEPS + 1];
         way[0] = Place::Message(data, root);
-        if steps.len() > LONGEST {
+        if steps.len() > MAX_PATH_STEPS {
             return Ok(Value::Absent);
         }
         for (index, step) in steps.iter().enumerate() {
@@ -260,7 +254,12 @@ impl ProtoReader {
 
     /// What a message of a type holds, as far as it can be read.
     fn tree(&self, data: &[u8], number: usize, depth: usize) -> Tree {
-        let Some(kind) = self.types.messages.get(number).filter(|_| depth < LONGEST) else {
+        let Some(kind) = self
+            .types
+            .messages
+            .get(number)
+            .filter(|_| depth < MAX_PATH_STEPS)
+        else {
             return Tree::Nothing;
         };
         let of_field = |field: &FieldType| {

@@ -268,8 +268,7 @@ fn beside(database: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-/// Copies a database into a folder of its own, decompressed (SQLite reads files only) and with its
-/// journal.
+/// Copies a database into a folder of its own, decompressed (SQLite reads files only) and with its journal.
 fn copy_of(path: &Path, content: Content, journal: Option<&Journal>) -> Result<TempDir, LogError> {
     let failed = |error: io::Error| source::failed(path, error);
     let largest = content.size.saturating_mul(LARGEST_RATIO) + (1 << 20);
@@ -293,8 +292,7 @@ fn copy_of(path: &Path, content: Content, journal: Option<&Journal>) -> Result<T
     Ok(folder)
 }
 
-/// The address of a database that nobody writes: SQLite then neither locks it nor makes files
-/// beside it.
+/// The address of a database that nobody writes: SQLite then neither locks it nor makes files beside it.
 fn unwritten(path: &Path) -> String {
     let mut address = String::from("file:");
     for byte in path.as_os_str().as_encoded_bytes() {
