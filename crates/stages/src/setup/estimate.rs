@@ -139,29 +139,26 @@ fn best(
     free: Free,
     (few, whole): (&Trial, &Trial),
 ) -> Option<SetupEstimate> {
-    let at = |x: f64, least: f64| {
-        let change = free.change(problem, x);
-        Trial::new(
-            problem,
-            (base, Some(&change)),
-            (problem.few(), least),
-            &[few],
-        )
-    };
+    let every = problem.few();
     let [low, high] = free.range();
     let count = ((high - low) / STEP).ceil();
     let grid = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
-    let mut grid: Vec<f64> = grid.collect();
-    // what is near the declared set-up bounds what is far from it
-    grid.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    // the least that is promised first: it bounds what is promised less
+    let promised = |x: f64| {
+        let change = free.change(problem, x);
+        Some((Trial::least(problem, (base, Some(&change)), every, &[few])?, x))
+    };
+    let mut grid: Vec<(f64, f64)> = grid.filter_map(promised).collect();
+    grid.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.abs().total_cmp(&b.1.abs())));
     let mut best: Option<(f64, Trial)> = None;
-    for x in grid {
+    for (_, x) in grid {
         let least = best.as_ref().map_or(f64::INFINITY, |(_, b)| b.whole());
         let better = |trial: &Trial| match &best {
             Some((first, _)) if trial.whole() == least => x < *first,
             _ => trial.whole() < least,
         };
-        let trial = at(x, least);
+        let change = free.change(problem, x);
+        let trial = Trial::new(problem, (base, Some(&change)), (every, least), &[few]);
         if let Some(trial) = trial.filter(better) {
             best = Some((x, trial));
         }
