@@ -60,12 +60,10 @@ impl<'a> FitToAll<'a> {
         out
     }
 
-    /// Its weighted squared error. One that found nothing bounds nothing: 0 then.
-    pub fn least(&self) -> f64 {
-        match self.values.iter().any(|x| *x != 0.0) {
-            true => self.error,
-            false => 0.0,
-        }
+    /// Its weighted squared error; none where it found nothing, which bounds nothing.
+    pub fn least(&self) -> Option<f64> {
+        let found = self.values.iter().any(|x| *x != 0.0);
+        found.then_some(self.error)
     }
 
     /// Its weighted squared error in some rows.
@@ -77,7 +75,7 @@ impl<'a> FitToAll<'a> {
     /// an error.
     fn is_above(&self, least: f64, most: f64) -> bool {
         let rounding = f64::EPSILON.sqrt();
-        self.least() > 0.0 && least > most * (1.0 + rounding) + rounding
+        self.least().is_some() && least > most * (1.0 + rounding) + rounding
     }
 
     /// Fits without each block, in this order; none where the others determine nothing, or where the weighted error is surely

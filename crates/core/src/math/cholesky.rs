@@ -88,7 +88,9 @@ mod tests {
     #[test]
     fn solutions_are_those_of_the_equations_and_what_is_not_positive_definite_has_none() {
         for n in [0, 1, 2, 3, 4, 5, 9, 30] {
-            let rows = DMatrix::from_fn(n + 4, n, |i, k| (1.1 + (i * i) as f64 + 1.7 * k as f64).sin());
+            let rows = DMatrix::from_fn(n + 4, n, |i, k| {
+                (1.1 + (i * i) as f64 + 1.7 * k as f64).sin()
+            });
             let a = rows.transpose() * &rows + DMatrix::identity(n, n);
             let x = DVector::from_fn(n, |i, _| 0.3 + i as f64);
             let (mut factor, mut b) = (a.clone(), &a * &x);

@@ -17,6 +17,7 @@
 //! | [`formula`] | formulas of users, evaluated or as text of a program | `exmex` |
 //! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
+//! | [`kept`] | the same where few outputs are kept | none |
 
 pub mod bootstrap;
 pub mod causal;
@@ -26,6 +27,7 @@ pub mod descent;
 pub mod formula;
 pub mod gram;
 pub mod jacobi;
+pub mod kept;
 pub mod lanes;
 pub mod long_run;
 pub mod minimise;

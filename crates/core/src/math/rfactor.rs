@@ -272,7 +272,7 @@ fn reflect_four(u: &[f64], columns: [&mut [f64]; 4], r: &mut [f64], u0: f64, inv
 
 /// Inner product with eight partial sums, which the compiler keeps in vector registers.
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0_f64; 8];
     let mut a8 = a.chunks_exact(8);
     let mut b8 = b.chunks_exact(8);

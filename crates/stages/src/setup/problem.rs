@@ -66,7 +66,10 @@ impl JointRows {
     fn products(&self, rows: Range<usize>) -> DMatrix<f64> {
         let stride = stride(self.columns);
         let within = |k: usize| (k * stride).min(self.data.len());
-        gram(&self.data[within(rows.start)..within(rows.end)], self.columns)
+        gram(
+            &self.data[within(rows.start)..within(rows.end)],
+            self.columns,
+        )
     }
 }
 
@@ -77,7 +80,9 @@ impl Rows {
             let joints = self.joints.iter();
             joints.map(|joint| joint.products(rows.clone())).collect()
         };
-        &self.blocks.get_or_init(|| self.of_blocks.iter().map(of).collect())[b]
+        &self
+            .blocks
+            .get_or_init(|| self.of_blocks.iter().map(of).collect())[b]
     }
 
     /// Number of blocks.
@@ -196,11 +201,15 @@ impl<'a> Problem<'a> {
     pub(super) fn rows(&self, robot: &Robot, by: &Correction, every: usize) -> Option<Rows> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let places = self.places_of(robot);
-        let no_rows = |places: &Vec<usize>| JointRows {
-            columns: places.len() + n,
-            data: Vec::new(),
+        let most = self.sample.len() / every + 1;
+        let no_rows = |(places, moves): (&Vec<usize>, &bool)| {
+            let columns = places.len() + n;
+            JointRows {
+                columns,
+                data: Vec::with_capacity(if *moves { most * stride(columns) } else { 0 }),
+            }
         };
-        let mut joints: Vec<JointRows> = places.iter().map(no_rows).collect();
+        let mut joints: Vec<JointRows> = places.iter().zip(&self.moving).map(no_rows).collect();
         let mut carried = Carried::new(n);
         let mut y = vec![0.0; n * p];
         let mut of_blocks = Vec::with_capacity(self.blocks.list.len());
@@ -218,7 +227,11 @@ impl<'a> Problem<'a> {
                     continue;
                 }
                 good += 1;
-                for (j, rows) in joints.iter_mut().enumerate().filter(|(j, _)| self.moving[*j]) {
+                for (j, rows) in joints
+                    .iter_mut()
+                    .enumerate()
+                    .filter(|(j, _)| self.moving[*j])
+                {
                     let shared = places[j].len() - self.columns.own[j].len();
                     let data = &mut rows.data;
                     data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));

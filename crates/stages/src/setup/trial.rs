@@ -122,14 +122,14 @@ impl Trial {
         })
     }
 
-    /// The least that the whole error of such a trial can be; none where there is none.
+    /// The whole error of such a fit to all its blocks; none where there is none.
     pub fn least(
         problem: &Problem,
         change: (&Correction, Option<&Change>),
         every: usize,
         same: &[&Trial],
     ) -> Option<f64> {
-        Some(Mixed::new(problem, change, every, same)?.fit().least())
+        Mixed::new(problem, change, every, same)?.fit().least()
     }
 
     /// Errors of each block by the fit of a change to all rows, all joints together.

@@ -159,7 +159,10 @@ pub fn nearest(
 
 /// Standard parameters at the search's numbers, and the derivatives of each link's by its own numbers, column by column; a
 /// drive's is its own derivative.
-fn standard_at(map: &StandardMap, x: &DVector<f64>) -> (DVector<f64>, Vec<[[f64; STANDARD]; STANDARD]>) {
+fn standard_at(
+    map: &StandardMap,
+    x: &DVector<f64>,
+) -> (DVector<f64>, Vec<[[f64; STANDARD]; STANDARD]>) {
     let links = map.links.len();
     let mut s = x.map(f64::exp);
     let of_link = |i: usize| {
@@ -199,7 +202,9 @@ impl Point {
         let mut row = vec![0.0; n + 1];
         for i in 0..m {
             let entries = self.jacobian.row(i);
-            row.iter_mut().zip(entries.iter()).for_each(|(to, x)| *to = *x);
+            row.iter_mut()
+                .zip(entries.iter())
+                .for_each(|(to, x)| *to = *x);
             row[n] = -self.residual[i];
             factor.fold(&row);
         }
