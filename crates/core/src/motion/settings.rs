@@ -14,8 +14,6 @@ const POSITION_OVERLAP: f64 = 45.0;
 const PARALLEL_OVERLAP: f64 = 28.0;
 /// Samples of a window besides its overlaps, at least.
 const WINDOW_CORE: usize = 8192;
-/// Overlaps that a window is as long as, at least: both of its own are then a third of what is computed.
-const WINDOW_OVERLAPS: usize = 4;
 
 /// How a log is filtered.
 #[derive(Debug, Clone, PartialEq)]
@@ -229,7 +227,7 @@ impl FilterChain {
             .max(position_pad);
         let parallel_overlap = parallel.settle_samples(PARALLEL_OVERLAP);
         let overlap = position_overlap + parallel_overlap.max(trim).max(pad(&parallel));
-        let core = WINDOW_CORE.max(WINDOW_OVERLAPS * overlap);
+        let core = WINDOW_CORE.max(2 * overlap);
         let parallel = ZeroPhase::new(parallel);
         let shortest = 2 * (edge + trim) + 3 * position_pad.max(pad(parallel.sos()));
         let reach = settings.differences.reach();
