@@ -242,61 +242,6 @@ impl<'a> BlocksLeftOut<'a> {
     }
 }
 
-/// Errors of blocks by fits without them, and by the fit to all.
-pub struct BlockErrors {
-    /// Squared errors of each block by the fit of the others, `[block][joint]`.
-    pub errors: Vec<Vec<f64>>,
-    /// Values of the terms by all blocks.
-    pub values: DVector<f64>,
-    /// The same without each block.
-    pub without: Vec<DVector<f64>>,
-}
-
-impl BlockErrors {
-    /// Of blocks whose sum is `total`, in this order; none where these data determine nothing, or where the weighted error is
-    /// surely above `most`. The fit to all leaves no more of a block than the fit without it: it shows early what is above.
-    pub fn up_to(
-        total: &[DMatrix<f64>],
-        (order, block): (&[usize], impl Fn(usize) -> Vec<DMatrix<f64>>),
-        terms: &Terms,
-        most: f64,
-    ) -> Option<Self> {
-        let all = terms.normal(total);
-        let diagonal: Vec<f64> = all.0.diagonal().iter().map(|x| x.max(1e-300)).collect();
-        let own = terms.own_of_all();
-        let fit = terms.fit(total, &[]);
-        let weigh = |squares: &[f64]| weighted(&[squares.to_vec()], &terms.weights);
-        // a fit that found nothing bounds nothing; sums of products hold half of a number's digits of an error
-        let found = fit.values.iter().any(|x| *x != 0.0);
-        let rounding = f64::EPSILON.sqrt();
-        let above = |least: f64| found && least > most * (1.0 + rounding) + rounding;
-        let mut to_come = weigh(&fit.squares);
-        if above(to_come) {
-            return None;
-        }
-        let mut out = Self {
-            errors: vec![Vec::new(); order.len()],
-            values: fit.values,
-            without: vec![DVector::zeros(0); order.len()],
-        };
-        let mut so_far = 0.0;
-        for &b in order {
-            let block = block(b);
-            let fitted = terms.squares(&block, &out.values);
-            let (_, values) = fit_without((terms, &own), &all, (&block, -1.0), &diagonal)?;
-            let errors = terms.squares(&block, &values);
-            so_far += weigh(&errors);
-            to_come -= weigh(&fitted);
-            if above(so_far + to_come) {
-                return None;
-            }
-            out.errors[b] = errors;
-            out.without[b] = values;
-        }
-        Some(out)
-    }
-}
-
 /// The factor and the values of the terms when a block is counted so many times more.
 fn fit_without(
     (terms, own): (&Terms, &[Vec<(usize, usize)>]),

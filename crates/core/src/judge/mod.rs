@@ -18,6 +18,7 @@
 //! | `left_out` | errors of each block by the fit of the others, for the terms in use and for more |
 //! | `parts` | agreement of an amplitude between parts |
 
+mod block_errors;
 mod blocks;
 mod bounded;
 mod left_out;
@@ -26,9 +27,10 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
+pub use block_errors::{BlockErrors, FitToAll};
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
-pub use left_out::{BlockErrors, BlocksLeftOut, ErrorGain, compare, weighted};
+pub use left_out::{BlocksLeftOut, ErrorGain, compare, weighted};
 pub use parts::{Agreement, LEAST_PARTS, agreement, agreement_on_share};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 

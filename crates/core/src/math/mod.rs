@@ -9,19 +9,25 @@
 //! | `jacobi` | one-sided Jacobi singular values: fallback and test oracle | none |
 //! | [`covariance`] | the information that a covariance holds | none |
 //! | `bootstrap` | 95 % intervals of statistics of pieces of data | none |
+//! | [`gram`] | sums of products of rows | none |
+//! | [`cholesky`] | normal equations in place | none |
 //! | `lanes` | loops compiled for the widest vectors of the processor | `pulp` |
 //! | [`descent`] | step control of the Gauss-Newton loops | none |
 //! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
 //! | [`formula`] | formulas of users, evaluated or as text of a program | `exmex` |
 //! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
+//! | [`kept`] | the same where few outputs are kept | none |
 
 pub mod bootstrap;
 pub mod causal;
+pub mod cholesky;
 pub mod covariance;
 pub mod descent;
 pub mod formula;
+pub mod gram;
 pub mod jacobi;
+pub mod kept;
 pub mod lanes;
 pub mod long_run;
 pub mod minimise;

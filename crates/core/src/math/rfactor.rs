@@ -47,6 +47,16 @@ impl RFactor {
         }
     }
 
+    /// The factor of rows that are an upper triangle already, row-major.
+    pub fn of_triangle(columns: usize, triangle: Vec<f64>) -> Self {
+        debug_assert_eq!(triangle.len(), columns * columns, "a square");
+        Self {
+            rows: columns as u64,
+            triangle,
+            ..Self::new(columns)
+        }
+    }
+
     /// Number of columns.
     pub fn columns(&self) -> usize {
         self.columns
@@ -99,12 +109,8 @@ impl RFactor {
     /// Folds the rows that wait in the block.
     pub fn flush(&mut self) {
         if self.pending > 0 {
-            reduce(
-                self.columns,
-                &mut self.triangle,
-                &mut self.block,
-                self.pending,
-            );
+            let size = [self.columns, self.pending, BLOCK_ROWS];
+            reduce(size, &mut self.triangle, &mut self.block);
             self.pending = 0;
         }
     }
@@ -112,10 +118,12 @@ impl RFactor {
     /// R, `columns x columns`, upper triangular, of all rows added so far. Signs of its rows are
     /// not normalised.
     pub fn r(&self) -> DMatrix<f64> {
-        let n = self.columns;
+        let (n, k) = (self.columns, self.pending);
         let mut triangle = self.triangle.clone();
-        if self.pending > 0 {
-            reduce(n, &mut triangle, &mut self.block.clone(), self.pending);
+        if k > 0 {
+            let columns = self.block.chunks_exact(BLOCK_ROWS);
+            let mut waiting: Vec<f64> = columns.flat_map(|x| &x[..k]).copied().collect();
+            reduce([n, k, k], &mut triangle, &mut waiting);
         }
         DMatrix::from_row_slice(n, n, &triangle)
     }
@@ -150,21 +158,21 @@ impl RFactor {
     }
 }
 
-/// Annihilates `k` rows of the column-major `block` under the row-major upper `triangle`.
-fn reduce(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
+/// Annihilates k rows of the column-major `block` of n columns, which begin `stride` numbers apart, under the row-major
+/// upper `triangle`.
+fn reduce(size: [usize; 3], triangle: &mut [f64], block: &mut [f64]) {
     widest(Reduction {
-        n,
+        size,
         triangle,
         block,
-        k,
     });
 }
 
 struct Reduction<'a> {
-    n: usize,
+    /// n, k and the stride.
+    size: [usize; 3],
     triangle: &'a mut [f64],
     block: &'a mut [f64],
-    k: usize,
 }
 
 impl LaneWork for Reduction<'_> {
@@ -172,15 +180,15 @@ impl LaneWork for Reduction<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        reflect_all(self.n, self.triangle, self.block, self.k);
+        reflect_all(self.size, self.triangle, self.block);
     }
 }
 
 #[inline(always)]
-fn reflect_all(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
+fn reflect_all([n, k, stride]: [usize; 3], triangle: &mut [f64], block: &mut [f64]) {
     for j in 0..n {
-        let (left, right) = block.split_at_mut((j + 1) * BLOCK_ROWS);
-        let u = &left[j * BLOCK_ROWS..j * BLOCK_ROWS + k];
+        let (left, right) = block.split_at_mut((j + 1) * stride);
+        let u = &left[j * stride..j * stride + k];
         let below = dot(u, u);
         if below < TINY {
             continue;
@@ -197,12 +205,12 @@ fn reflect_all(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
         triangle[j * n + j] = r;
 
         let row = &mut triangle[j * n + j + 1..(j + 1) * n];
-        let mut quads = right.chunks_exact_mut(4 * BLOCK_ROWS);
+        let mut quads = right.chunks_exact_mut(4 * stride);
         let mut entries = row.chunks_exact_mut(4);
         for (columns, r) in (&mut quads).zip(&mut entries) {
-            let (a, rest) = columns.split_at_mut(BLOCK_ROWS);
-            let (b, rest) = rest.split_at_mut(BLOCK_ROWS);
-            let (c, d) = rest.split_at_mut(BLOCK_ROWS);
+            let (a, rest) = columns.split_at_mut(stride);
+            let (b, rest) = rest.split_at_mut(stride);
+            let (c, d) = rest.split_at_mut(stride);
             reflect_four(
                 u,
                 [&mut a[..k], &mut b[..k], &mut c[..k], &mut d[..k]],
@@ -213,7 +221,7 @@ fn reflect_all(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
         }
         for (column, r) in quads
             .into_remainder()
-            .chunks_exact_mut(BLOCK_ROWS)
+            .chunks_exact_mut(stride)
             .zip(entries.into_remainder())
         {
             let column = &mut column[..k];
@@ -264,7 +272,7 @@ fn reflect_four(u: &[f64], columns: [&mut [f64]; 4], r: &mut [f64], u0: f64, inv
 
 /// Inner product with eight partial sums, which the compiler keeps in vector registers.
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0_f64; 8];
     let mut a8 = a.chunks_exact(8);
     let mut b8 = b.chunks_exact(8);

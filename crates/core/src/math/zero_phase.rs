@@ -32,6 +32,11 @@ impl ZeroPhase {
         &self.sos
     }
 
+    /// State of each section after a long constant input of 1 to the cascade.
+    pub(super) fn steady(&self) -> &[[f64; 2]] {
+        &self.steady
+    }
+
     /// Filters `data`, `samples x channels` row-major, in place.
     ///
     /// # Errors

@@ -237,9 +237,10 @@ impl OneJoint<'_> {
         let channel = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             (self.edge..v.len() - self.edge).map(of).collect()
         };
-        let smear = channel(&|k| f(v[k]) - f(again[k]));
-        let more = channel(&|k| f(v[k] + level * noise_v[k]) - f(v[k]));
-        let less = channel(&|k| f(v[k] - level * noise_v[k]) - f(v[k]));
+        let here: Vec<f64> = v.iter().map(|v| f(*v)).collect();
+        let smear = channel(&|k| here[k] - f(again[k]));
+        let more = channel(&|k| f(v[k] + level * noise_v[k]) - here[k]);
+        let less = channel(&|k| f(v[k] - level * noise_v[k]) - here[k]);
         let rows = design.run(&[&smear, &more, &less])?;
         for (row, _) in moves.iter().enumerate().filter(|(_, moves)| **moves) {
             sum.change += rows[0][row].powi(2);

@@ -3,6 +3,7 @@
 use super::MotionError;
 use super::position_filter::{HIGHEST_SHARE, PositionFilter};
 use super::rest::response;
+use crate::math::kept::KeptEvery;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 
@@ -124,6 +125,8 @@ pub(super) struct FilterChain {
     pub differences: Differences,
     pub position: Option<PositionFilter>,
     pub parallel: ZeroPhase,
+    /// The same, of which the rows are kept.
+    pub kept: KeptEvery,
     pub decimation: usize,
     /// Samples dropped at a segment's end before the parallel filter.
     pub edge: usize,
@@ -225,7 +228,8 @@ impl FilterChain {
         let parallel_overlap = parallel.settle_samples(PARALLEL_OVERLAP);
         let overlap = position_overlap + parallel_overlap.max(trim).max(pad(&parallel));
         let core = WINDOW_CORE.max(2 * overlap);
-        let shortest = 2 * (edge + trim) + 3 * position_pad.max(pad(&parallel));
+        let parallel = ZeroPhase::new(parallel);
+        let shortest = 2 * (edge + trim) + 3 * position_pad.max(pad(parallel.sos()));
         let reach = settings.differences.reach();
         let of_joint = |(j, speed): (usize, &f64)| {
             let cutoff = position.as_ref().map(|f| f.cutoff_hz(j));
@@ -243,7 +247,8 @@ impl FilterChain {
             row_samples: (0.5 / (settings.cutoff_hz * dt)) as usize + 1,
             differences: settings.differences,
             position,
-            parallel: ZeroPhase::new(parallel),
+            kept: KeptEvery::new(parallel.clone(), decimation),
+            parallel,
             decimation,
             edge,
             trim,

@@ -6,6 +6,7 @@ use super::run::{RunError, Summary, run};
 use super::settings::{Differences, FilterChain, FilterSettings};
 use super::{MotionError, rest};
 use crate::block::Block;
+use crate::math::kept::{KeptEvery, KeptRows, KeptWork};
 use crate::math::zero_phase::ZeroPhase;
 
 /// One uninterrupted stretch, smoothed and differentiated; every channel `[joint][sample]`.
@@ -178,6 +179,7 @@ pub fn stretches<E>(
 #[derive(Debug, Clone)]
 pub struct Parallel {
     filter: ZeroPhase,
+    kept: KeptEvery,
     /// The filter that the positions of its stretches came through.
     pub(super) position: Option<PositionFilter>,
     /// How they were differentiated.
@@ -197,6 +199,7 @@ impl Parallel {
         let chain = FilterChain::design(settings, dt)?;
         Ok(Parallel {
             filter: chain.parallel,
+            kept: chain.kept,
             position: chain.position,
             differences: chain.differences,
             decimation: chain.decimation,
@@ -247,22 +250,29 @@ impl Parallel {
         let samples = channels.first().map_or(0, |c| c.len());
         let rows = self.rows(samples);
         let mut out = Vec::with_capacity(channels.len());
-        let mut lanes = Vec::new();
-        // eight channels side by side fill the vector registers
+        let mut work = KeptWork::default();
+        // few are read side by side
         for group in channels.chunks(8) {
-            let width = group.len();
-            lanes.clear();
-            lanes.resize(samples * width, 0.0);
-            for (l, channel) in group.iter().enumerate() {
-                for (row, x) in lanes.chunks_exact_mut(width).zip(channel.iter()) {
-                    row[l] = *x;
-                }
-            }
-            self.filter.run(&mut lanes, width)?;
-            for l in 0..width {
-                let kept = (0..rows).map(|i| lanes[self.sample_of(i) * width + l]);
-                out.push(kept.collect());
-            }
+            let of = KeptRows {
+                samples,
+                channels: group.len(),
+                first: self.trim,
+                kept: rows,
+            };
+            let filtered = self.kept.run(of, &mut work, &mut |k, row| {
+                row.iter_mut()
+                    .zip(group)
+                    .for_each(|(x, channel)| *x = channel[k]);
+            })?;
+            let of_channel = |l: usize| {
+                filtered
+                    .iter()
+                    .skip(l)
+                    .step_by(group.len())
+                    .copied()
+                    .collect()
+            };
+            out.extend((0..group.len()).map(of_channel));
         }
         Ok(out)
     }

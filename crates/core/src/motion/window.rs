@@ -4,25 +4,14 @@ use std::cell::RefCell;
 
 use super::settings::FilterChain;
 use super::{FilteredRow, MotionError, MotionSample, rest};
+use crate::math::kept::{KeptRows, KeptWork};
 
-/// Channels filtered together. Each group of channels lies apart, so that a pass over it stays in a second-level cache.
-const GROUP: usize = 8;
 /// Share of movement in what a row is mostly made of, above which it is none of rest for sure.
 const MAY_REST: f64 = 0.6;
 
-/// Computed channels of a window.
-#[derive(Debug, Default)]
-struct Computed {
-    /// [group][sample][lane]
-    lanes: Vec<f64>,
-    /// Whether a group holds zeros only, as the columns of links do that a joint does not carry: it is neither
-    /// written nor filtered, for the filter of zeros is zeros.
-    empty: Vec<bool>,
-}
-
 thread_local! {
-    /// The largest memory of a window, kept from one to the next that a thread computes.
-    static COMPUTED: RefCell<Computed> = RefCell::default();
+    /// The memory of a filter, kept from one window to the next that a thread computes.
+    static WORK: RefCell<KeptWork> = RefCell::default();
 }
 
 /// A stretch of one segment, with the overlaps that its filters need, and the rows that come of it.
@@ -88,10 +77,7 @@ impl FilterWindow {
         let from = lost(self.first == 0);
         let to = samples - lost(self.ends);
         self.choose_rows(chain, samples);
-        COMPUTED.with_borrow_mut(|computed| {
-            self.compute(computed, from..to, joints, channels, fill);
-            self.filter(computed, chain, from..to, channels)
-        })?;
+        WORK.with_borrow_mut(|work| self.filter(work, chain, from..to, (joints, channels), fill))?;
         match self.filtered.iter().all(|x| x.is_finite()) {
             true => Ok(()),
             false => Err(self.offending(from..to, joints, channels, fill)),
@@ -120,28 +106,32 @@ impl FilterWindow {
         }
     }
 
-    /// Filters the channels of the samples `span` and keeps those of the rows.
+    /// Filters the channels of the samples `span` and keeps those of the rows, and the raw values.
     fn filter(
         &mut self,
-        Computed { lanes, empty }: &mut Computed,
+        work: &mut KeptWork,
         chain: &FilterChain,
         span: std::ops::Range<usize>,
-        channels: usize,
+        (joints, channels): (usize, usize),
+        fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
     ) -> Result<(), MotionError> {
-        let size = span.len() * GROUP;
-        self.filtered.clear();
-        self.filtered.resize(self.kept.len() * channels, 0.0);
-        let groups = lanes.chunks_exact_mut(size).zip(empty).enumerate();
-        for (g, (group, _)) in groups.filter(|(_, (_, empty))| !**empty) {
-            chain.parallel.run(group, GROUP)?;
-            let first = g * GROUP;
-            let width = GROUP.min(channels - first);
-            let rows = self.filtered.chunks_exact_mut(channels);
-            for (row, &k) in rows.zip(&self.kept) {
-                let at = (k - span.start) * GROUP;
-                row[first..first + width].copy_from_slice(&group[at..at + width]);
+        let mut raw = std::mem::take(&mut self.raw);
+        raw.clear();
+        let mut rows = self.kept.iter().peekable();
+        let of = KeptRows {
+            samples: span.len(),
+            channels,
+            first: self.kept.first().map_or(0, |k| k - span.start),
+            kept: self.kept.len(),
+        };
+        let filtered = chain.kept.run(of, work, &mut |k, values| {
+            let k = span.start + k;
+            fill(&self.sample(k, joints), values);
+            if rows.next_if_eq(&&k).is_some() {
+                raw.extend_from_slice(values);
             }
-        }
+        })?;
+        (self.raw, self.filtered) = (raw, filtered);
         Ok(())
     }
 
@@ -180,44 +170,6 @@ impl FilterWindow {
                 .step_by(chain.decimation)
                 .map(|index| index - self.first),
         );
-    }
-
-    /// Fills the channels of the samples `span` and the raw values of the rows.
-    fn compute(
-        &mut self,
-        Computed { lanes, empty }: &mut Computed,
-        span: std::ops::Range<usize>,
-        joints: usize,
-        channels: usize,
-        fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
-    ) {
-        let (size, groups) = (span.len() * GROUP, channels.div_ceil(GROUP));
-        lanes.resize(groups * size, 0.0);
-        empty.clear();
-        empty.resize(groups, true);
-        self.raw.clear();
-        let mut values = vec![0.0; channels];
-        let mut rows = self.kept.iter().peekable();
-        for k in span.clone() {
-            fill(&self.sample(k, joints), &mut values);
-            let at = (k - span.start) * GROUP;
-            let groups = lanes.chunks_exact_mut(size).zip(&mut *empty);
-            for (values, (group, empty)) in values.chunks(GROUP).zip(groups) {
-                if *empty && values.iter().any(|x| *x != 0.0) {
-                    *empty = false;
-                    // of another window until here
-                    group[..at].fill(0.0);
-                }
-                if !*empty {
-                    let (lanes, rest) = group[at..at + GROUP].split_at_mut(values.len());
-                    lanes.copy_from_slice(values);
-                    rest.fill(0.0);
-                }
-            }
-            if rows.next_if_eq(&&k).is_some() {
-                self.raw.extend_from_slice(&values);
-            }
-        }
     }
 
     /// The first sample at which a channel is not finite.

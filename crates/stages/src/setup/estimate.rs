@@ -139,34 +139,28 @@ fn best(
     free: Free,
     (few, whole): (&Trial, &Trial),
 ) -> Option<SetupEstimate> {
-    let at = |x: f64, least: f64| {
-        let change = free.change(problem, x);
-        Trial::new(
-            problem,
-            (base, Some(&change)),
-            (problem.few(), least),
-            &[few],
-        )
-    };
+    let every = problem.few();
     let [low, high] = free.range();
     let count = ((high - low) / STEP).ceil();
     let grid = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
-    let mut grid: Vec<f64> = grid.collect();
-    // what is near the declared set-up bounds what is far from it
-    grid.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    let mut best: Option<(f64, Trial)> = None;
-    for x in grid {
-        let least = best.as_ref().map_or(f64::INFINITY, |(_, b)| b.whole());
-        let better = |trial: &Trial| match &best {
-            Some((first, _)) if trial.whole() == least => x < *first,
-            _ => trial.whole() < least,
-        };
-        let trial = at(x, least);
-        if let Some(trial) = trial.filter(better) {
-            best = Some((x, trial));
-        }
-    }
-    let (mut x, found) = best?;
+    // by what the steps that follow go down, and the nearest to the declared set-up of equals
+    let scored = |x: f64| {
+        let change = free.change(problem, x);
+        Some((
+            Trial::least(problem, (base, Some(&change)), every, &[few])?,
+            x,
+        ))
+    };
+    let lower =
+        |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0).then(a.1.abs().total_cmp(&b.1.abs()));
+    let (_, mut x) = grid.filter_map(scored).min_by(lower)?;
+    let change = free.change(problem, x);
+    let found = Trial::new(
+        problem,
+        (base, Some(&change)),
+        (every, f64::INFINITY),
+        &[few],
+    )?;
     let own: Vec<usize> = free
         .joint()
         .map_or_else(|| problem.channels_that_move(), |j| vec![j]);

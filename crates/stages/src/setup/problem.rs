@@ -1,5 +1,8 @@
 //! Sums of products of a sample under a correction, by block of time and joint.
 
+use std::ops::Range;
+use std::sync::OnceLock;
+
 use nalgebra::DMatrix;
 
 use super::LIMITS;
@@ -8,6 +11,7 @@ use super::correction::Correction;
 use super::sample::Sample;
 use cft_ident_core::inertia::columns::{Own, RegressorColumns};
 use cft_ident_core::judge::{Blocks, Bound, NUMBERS, Term, divide};
+use cft_ident_core::math::gram::{gram, stride};
 use cft_ident_core::robot::Robot;
 
 /// What the robot file knows beside its channels.
@@ -38,14 +42,53 @@ pub struct Problem<'a> {
     moving: Vec<bool>,
 }
 
-/// Sums of products by block and joint: the joint's inertial parameters, its own terms, the torque of each channel.
+/// Rows of each joint, and their sums of products: the joint's inertial parameters, its own terms, the torque of each channel.
 pub(super) struct Rows {
-    pub blocks: Vec<Vec<DMatrix<f64>>>,
-    /// Their sum.
-    pub total: Vec<DMatrix<f64>>,
     pub terms: Vec<Term>,
     /// Rows that are poses of the robot.
     pub count: usize,
+    /// Over all rows.
+    pub total: Vec<DMatrix<f64>>,
+    joints: Vec<JointRows>,
+    /// Rows of each block.
+    of_blocks: Vec<Range<usize>>,
+    /// Sums of each block, once they are asked for: most hypotheses are seen to be no better before.
+    blocks: OnceLock<Vec<Vec<DMatrix<f64>>>>,
+}
+
+/// Rows of so many columns, one behind the other.
+struct JointRows {
+    columns: usize,
+    data: Vec<f64>,
+}
+
+impl JointRows {
+    fn products(&self, rows: Range<usize>) -> DMatrix<f64> {
+        let stride = stride(self.columns);
+        let within = |k: usize| (k * stride).min(self.data.len());
+        gram(
+            &self.data[within(rows.start)..within(rows.end)],
+            self.columns,
+        )
+    }
+}
+
+impl Rows {
+    /// Sums of products of a block, by joint.
+    pub fn block(&self, b: usize) -> &[DMatrix<f64>] {
+        let of = |rows: &Range<usize>| {
+            let joints = self.joints.iter();
+            joints.map(|joint| joint.products(rows.clone())).collect()
+        };
+        &self
+            .blocks
+            .get_or_init(|| self.of_blocks.iter().map(of).collect())[b]
+    }
+
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.of_blocks.len()
+    }
 }
 
 impl<'a> Problem<'a> {
@@ -154,18 +197,25 @@ impl<'a> Problem<'a> {
         all.map(of).collect()
     }
 
-    /// Sums over every so many rows of each block; none where most of them are no pose of the robot.
+    /// Every so many rows of each block; none where most of them are no pose of the robot.
     pub(super) fn rows(&self, robot: &Robot, by: &Correction, every: usize) -> Option<Rows> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let places = self.places_of(robot);
-        let widths: Vec<usize> = places.iter().map(|c| c.len() + n).collect();
+        let most = self.sample.len() / every + 1;
+        let no_rows = |(places, moves): (&Vec<usize>, &bool)| {
+            let columns = places.len() + n;
+            JointRows {
+                columns,
+                data: Vec::with_capacity(if *moves { most * stride(columns) } else { 0 }),
+            }
+        };
+        let mut joints: Vec<JointRows> = places.iter().zip(&self.moving).map(no_rows).collect();
         let mut carried = Carried::new(n);
         let mut y = vec![0.0; n * p];
-        let mut out: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(self.blocks.list.len());
-        let mut data: Vec<Vec<f64>> = vec![Vec::new(); n];
+        let mut of_blocks = Vec::with_capacity(self.blocks.list.len());
         let (mut good, mut all) = (0, 0);
         for block in &self.blocks.list {
-            data.iter_mut().for_each(Vec::clear);
+            let first = good;
             let rows = block.pieces.iter().flat_map(|(_, rows)| rows.clone());
             for k in rows.filter(|k| k % every == 0) {
                 all += 1;
@@ -177,20 +227,21 @@ impl<'a> Problem<'a> {
                     continue;
                 }
                 good += 1;
-                for (j, data) in data.iter_mut().enumerate().filter(|(j, _)| self.moving[*j]) {
+                for (j, rows) in joints
+                    .iter_mut()
+                    .enumerate()
+                    .filter(|(j, _)| self.moving[*j])
+                {
                     let shared = places[j].len() - self.columns.own[j].len();
+                    let data = &mut rows.data;
                     data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));
                     let own = self.columns.own[j].iter();
                     data.extend(own.map(|own| own_column(*own, &carried, j)));
                     data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
+                    data.resize(data.len().next_multiple_of(stride(rows.columns)), 0.0);
                 }
             }
-            // columns of the transposed are rows
-            let gram = |(data, width): (&Vec<f64>, &usize)| {
-                let x = DMatrix::from_column_slice(*width, data.len() / width, data);
-                &x * x.transpose()
-            };
-            out.push(data.iter().zip(&widths).map(gram).collect());
+            of_blocks.push(first..good);
         }
         let term = |unknown: usize| {
             let of = |j: usize| Some((j, places[j].iter().position(|u| *u == unknown)?));
@@ -200,20 +251,14 @@ impl<'a> Problem<'a> {
             }
         };
         (good > 0 && 2 * good >= all).then(|| Rows {
-            total: sum(&out),
-            blocks: out,
             terms: (0..self.first_own(robot, n)).map(term).collect(),
             count: good,
+            total: joints.iter().map(|rows| rows.products(0..good)).collect(),
+            joints,
+            of_blocks,
+            blocks: OnceLock::new(),
         })
     }
-}
-
-fn sum(blocks: &[Vec<DMatrix<f64>>]) -> Vec<DMatrix<f64>> {
-    let mut total = blocks.first().cloned().unwrap_or_default();
-    for block in blocks.iter().skip(1) {
-        total.iter_mut().zip(block).for_each(|(t, x)| *t += x);
-    }
-    total
 }
 
 /// The column of a joint's own term in a row.

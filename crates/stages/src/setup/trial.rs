@@ -8,7 +8,7 @@ use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::problem::{Problem, Rows};
-use cft_ident_core::judge::{BlockErrors, ErrorGain, NUMBERS, Terms, agreement_on_share, compare};
+use cft_ident_core::judge::{ErrorGain, FitToAll, NUMBERS, Terms, agreement_on_share, compare};
 use cft_ident_core::robot::Robot;
 
 /// A hypothesis as it was fitted.
@@ -30,14 +30,13 @@ pub(super) struct Trial {
     left_out: Vec<Vec<f64>>,
 }
 
-/// Sums of products as a hypothesis has them, and the terms that are fitted to them.
+/// Rows as a hypothesis has them, and the terms that are fitted to them.
 struct Mixed {
     by: Correction,
     robot: Robot,
     rows: Arc<Rows>,
     mix: Vec<DVector<f64>>,
     terms: Terms,
-    total: Vec<DMatrix<f64>>,
 }
 
 impl Mixed {
@@ -59,15 +58,17 @@ impl Mixed {
             }
         };
         let mix = problem.channels.mix(&by);
-        let total = mixed(&rows.total, &mix);
-        let weight = |(j, m): (usize, &DMatrix<f64>)| {
-            let power = m[(m.nrows() - 1, m.nrows() - 1)];
+        let weight = |(j, (sums, mix)): (usize, (&DMatrix<f64>, &DVector<f64>))| {
+            let torques = sums.nrows() - mix.len();
+            let of_torques = sums.view((torques, torques), (mix.len(), mix.len()));
+            let power = mix.dot(&(of_torques * mix));
             let counts = problem.moving()[j] && power > 0.0;
             if counts { power.recip() } else { 0.0 }
         };
+        let joints = rows.total.iter().zip(&mix).enumerate();
         let terms = Terms {
             list: rows.terms.clone(),
-            weights: total.iter().enumerate().map(weight).collect(),
+            weights: joints.map(weight).collect(),
             prior: (DMatrix::zeros(0, 0), DVector::zeros(0)),
             ridge: NUMBERS.ridge,
         };
@@ -77,8 +78,11 @@ impl Mixed {
             rows,
             mix,
             terms,
-            total,
         })
+    }
+
+    fn fit(&self) -> FitToAll<'_> {
+        FitToAll::new(&self.rows.total, &self.mix, &self.terms)
     }
 }
 
@@ -87,46 +91,45 @@ impl Trial {
     /// torques differ. None where most rows belong to no pose, or the whole error is surely above `most`.
     pub fn new(
         problem: &Problem,
-        (base, change): (&Correction, Option<&Change>),
+        change: (&Correction, Option<&Change>),
         (every, most): (usize, f64),
         same: &[&Trial],
     ) -> Option<Self> {
-        let Mixed {
-            by,
-            robot,
-            rows,
-            mix,
-            terms,
-            total,
-        } = Mixed::new(problem, (base, change), every, same)?;
+        let of = Mixed::new(problem, change, every, same)?;
         // what is hardest to foresee as declared shows first that a hypothesis is no better
-        let mut order: Vec<usize> = (0..rows.blocks.len()).collect();
+        let mut order: Vec<usize> = (0..of.rows.blocks()).collect();
         if let Some(same) = same.first() {
             let error = |b: &usize| same.left_out[*b].iter().sum::<f64>();
             order.sort_by(|a, b| error(b).total_cmp(&error(a)));
         }
-        let block = |b: usize| mixed(&rows.blocks[b], &mix);
-        let left_out = BlockErrors::up_to(&total, (&order, block), &terms, most)?;
+        let left_out = of.fit().blocks((&order, |b| of.rows.block(b)), most)?;
         let mut errors = left_out.errors;
         for squares in &mut errors {
-            let pairs = squares.iter_mut().zip(&terms.weights);
+            let pairs = squares.iter_mut().zip(&of.terms.weights);
             pairs.for_each(|(s, w)| *s *= w);
         }
-        errors
-            .iter()
-            .flatten()
-            .all(|x| x.is_finite())
-            .then_some(Self {
-                change: change.cloned(),
-                by,
-                robot,
-                rows,
-                terms,
-                total,
-                theta: left_out.values,
-                without: left_out.without,
-                left_out: errors,
-            })
+        let finite = errors.iter().flatten().all(|x| x.is_finite());
+        finite.then(|| Self {
+            change: change.1.cloned(),
+            by: of.by,
+            robot: of.robot,
+            total: mixed(&of.rows.total, &of.mix),
+            rows: of.rows,
+            terms: of.terms,
+            theta: left_out.values,
+            without: left_out.without,
+            left_out: errors,
+        })
+    }
+
+    /// The whole error of such a fit to all its blocks; none where there is none.
+    pub fn least(
+        problem: &Problem,
+        change: (&Correction, Option<&Change>),
+        every: usize,
+        same: &[&Trial],
+    ) -> Option<f64> {
+        Mixed::new(problem, change, every, same)?.fit().least()
     }
 
     /// Errors of each block by the fit of a change to all rows, all joints together.
@@ -136,13 +139,9 @@ impl Trial {
         same: &Trial,
     ) -> Option<Vec<f64>> {
         let all = Mixed::new(problem, change, 1, &[same])?;
-        let theta = all.terms.fit(&all.total, &[]).values;
-        let of_block = |block: &Vec<DMatrix<f64>>| -> f64 {
-            let squares = all.terms.squares(&mixed(block, &all.mix), &theta);
-            let shares = squares.iter().zip(&all.terms.weights);
-            shares.map(|(s, w)| s * w).sum()
-        };
-        Some(all.rows.blocks.iter().map(of_block).collect())
+        let fit = all.fit();
+        let blocks = 0..all.rows.blocks();
+        Some(blocks.map(|b| fit.error_of(all.rows.block(b))).collect())
     }
 
     /// Error of each joint in blocks left out, a share of its torque.

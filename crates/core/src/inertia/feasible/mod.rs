@@ -11,7 +11,7 @@ mod log_cholesky;
 
 pub use friction::{FrictionColumns, with_friction};
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SVector};
 
 use super::solution::FitError;
 use crate::math::descent::{Ending, StepControl, Trial, descend};
@@ -99,29 +99,22 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     // from the prior outward: a search that begins without it runs along the border of what
     // is consistent, where its numbers go to infinity and it hardly moves
     for weight in WEIGHTS {
-        let at = |x: DVector<f64>| {
-            let (residual, slopes) = reduced.at(task.map, &x, &prior, weight);
-            (x, residual.norm_squared(), residual, slopes)
-        };
-        let found = descend(
-            at(x),
-            &DAMPING,
-            MAX_STEPS,
-            &mut |(x, lowest, residual, slopes), d| {
-                let step = damped_step(&reduced.jacobian(slopes, weight), residual, d);
-                let next = at(x + step.map(|s| s.clamp(-FARTHEST, FARTHEST)));
-                Ok::<_, FitError>(match next.1 {
-                    cost if cost < *lowest && lowest - cost <= SETTLED * cost => Trial::Last(next),
-                    cost if cost < *lowest => Trial::Accepted(next),
-                    _ => Trial::Rejected,
-                })
-            },
-        )?;
-        x = found.0.0;
+        let at = |x: DVector<f64>| reduced.at(task.map, x, &prior, weight);
+        let found = descend(at(x), &DAMPING, MAX_STEPS, &mut |from, damping| {
+            let step = from.damped_step(weight, damping);
+            let next = at(&from.x + step.map(|s| s.clamp(-FARTHEST, FARTHEST)));
+            let (lowest, cost) = (from.cost, next.cost);
+            Ok::<_, FitError>(match cost < lowest {
+                true if lowest - cost <= SETTLED * cost => Trial::Last(next),
+                true => Trial::Accepted(next),
+                false => Trial::Rejected,
+            })
+        })?;
+        x = found.0.x;
         ending = found.1;
         iterations += found.2;
     }
-    let (standard, _) = standard_at(&x, links, drives);
+    let (standard, _) = standard_at(task.map, &x);
     let mapped = &task.map.matrix * &standard;
     Ok(Feasible {
         theta: reduced.complete(&mapped),
@@ -164,27 +157,64 @@ pub fn nearest(
     Ok(feasible(&task)?.theta)
 }
 
-/// Standard parameters at the search's numbers, and the derivatives.
-fn standard_at(x: &DVector<f64>, links: usize, drives: usize) -> (DVector<f64>, DMatrix<f64>) {
-    let size = STANDARD * links + drives;
-    let mut s = DVector::zeros(size);
-    let mut slopes = DMatrix::zeros(size, size);
-    for i in 0..links {
+/// Standard parameters at the search's numbers, and the derivatives of each link's by its own numbers, column by column; a
+/// drive's is its own derivative.
+fn standard_at(
+    map: &StandardMap,
+    x: &DVector<f64>,
+) -> (DVector<f64>, Vec<[[f64; STANDARD]; STANDARD]>) {
+    let links = map.links.len();
+    let mut s = x.map(f64::exp);
+    let of_link = |i: usize| {
         let at = STANDARD * i;
         let own: LogCholesky = std::array::from_fn(|k| x[at + k]);
         let (values, columns) = log_cholesky::standard(&own);
-        for k in 0..STANDARD {
-            s[at + k] = values[k];
-            for (r, v) in columns[k].iter().enumerate() {
-                slopes[(at + r, at + k)] = *v;
-            }
-        }
-    }
-    for k in STANDARD * links..size {
-        s[k] = x[k].exp();
-        slopes[(k, k)] = s[k];
-    }
+        s.rows_mut(at, STANDARD).copy_from_slice(&values);
+        columns
+    };
+    let slopes = (0..links).map(of_link).collect();
     (s, slopes)
+}
+
+/// Where a search stands.
+struct Point {
+    x: DVector<f64>,
+    /// Residual of the data and its slopes by the numbers.
+    residual: DVector<f64>,
+    jacobian: DMatrix<f64>,
+    /// Distance from the prior.
+    off: DVector<f64>,
+    cost: f64,
+}
+
+impl Point {
+    /// Least-squares step with the columns' own size as damping. Prior and damping have one row a number: the rows of the
+    /// data go under their triangle.
+    fn damped_step(&self, weight: f64, damping: f64) -> DVector<f64> {
+        let (m, n) = self.jacobian.shape();
+        let mut triangle = vec![0.0; (n + 1) * (n + 1)];
+        for (c, column) in self.jacobian.column_iter().enumerate() {
+            let size = (weight + damping * (column.norm_squared() + weight)).sqrt();
+            triangle[c * (n + 2)] = size;
+            triangle[c * (n + 1) + n] = -weight * self.off[c] / size;
+        }
+        let mut factor = RFactor::of_triangle(n + 1, triangle);
+        let mut row = vec![0.0; n + 1];
+        for i in 0..m {
+            let entries = self.jacobian.row(i);
+            row.iter_mut()
+                .zip(entries.iter())
+                .for_each(|(to, x)| *to = *x);
+            row[n] = -self.residual[i];
+            factor.fold(&row);
+        }
+        let r = factor.r();
+        let right = r.view((0, n), (n, 1)).column(0).into_owned();
+        let square = r.view((0, 0), (n, n));
+        square
+            .solve_upper_triangular(&right)
+            .unwrap_or_else(|| DVector::zeros(n))
+    }
 }
 
 /// The factor with the unknowns that no link has a part in solved for.
@@ -227,37 +257,27 @@ impl EliminatedFactor {
         }
     }
 
-    /// Residual, data first, prior below, and the slopes of the standard parameters.
-    fn at(
-        &self,
-        map: &StandardMap,
-        x: &DVector<f64>,
-        prior: &DVector<f64>,
-        weight: f64,
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let (s, slopes) = standard_at(x, map.links.len(), map.drives.len());
-        let (m, n) = (self.target.len(), x.len());
-        let mut residual = DVector::zeros(m + n);
-        residual
-            .rows_mut(0, m)
-            .copy_from(&(&self.rows * s - &self.target));
-        residual
-            .rows_mut(m, n)
-            .copy_from(&((x - prior) * weight.sqrt()));
-        (residual, slopes)
-    }
-
-    /// Jacobian of the residual where the standard parameters have these slopes.
-    fn jacobian(&self, slopes: &DMatrix<f64>, weight: f64) -> DMatrix<f64> {
-        let (m, n) = (self.target.len(), slopes.ncols());
-        let mut jacobian = DMatrix::zeros(m + n, n);
-        jacobian
-            .view_mut((0, 0), (m, n))
-            .copy_from(&(&self.rows * slopes));
-        jacobian
-            .view_mut((m, 0), (n, n))
-            .fill_diagonal(weight.sqrt());
-        jacobian
+    fn at(&self, map: &StandardMap, x: DVector<f64>, prior: &DVector<f64>, weight: f64) -> Point {
+        let (s, slopes) = standard_at(map, &x);
+        let residual = &self.rows * &s - &self.target;
+        let mut jacobian = self.rows.clone();
+        for (c, mut column) in jacobian.column_iter_mut().enumerate() {
+            match slopes.get(c / STANDARD) {
+                Some(slopes) => {
+                    let own = self.rows.columns(c / STANDARD * STANDARD, STANDARD);
+                    own.mul_to(&SVector::from(slopes[c % STANDARD]), &mut column);
+                }
+                None => column *= s[c],
+            }
+        }
+        let off = &x - prior;
+        Point {
+            cost: residual.norm_squared() + weight * off.norm_squared(),
+            x,
+            residual,
+            jacobian,
+            off,
+        }
     }
 
     /// All unknowns from the shared parameters of the map.
@@ -285,31 +305,6 @@ impl EliminatedFactor {
         }
         theta
     }
-}
-
-/// Least-squares step with the columns' own size as damping.
-fn damped_step(jacobian: &DMatrix<f64>, residual: &DVector<f64>, damping: f64) -> DVector<f64> {
-    let n = jacobian.ncols();
-    let mut factor = RFactor::new(n + 1);
-    let mut row = vec![0.0; n + 1];
-    for i in 0..jacobian.nrows() {
-        for (c, x) in row.iter_mut().enumerate().take(n) {
-            *x = jacobian[(i, c)];
-        }
-        row[n] = -residual[i];
-        factor.fold(&row);
-    }
-    for c in 0..n {
-        row.fill(0.0);
-        row[c] = damping.sqrt() * jacobian.column(c).norm();
-        factor.fold(&row);
-    }
-    let r = factor.r();
-    let right = r.view((0, n), (n, 1)).column(0).into_owned();
-    let square = r.view((0, 0), (n, n)).into_owned();
-    square
-        .solve_upper_triangular(&right)
-        .unwrap_or_else(|| DVector::zeros(n))
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@
 
 use super::links::{MOST_JOINTS, Tree};
 use super::newton_euler::walk;
+use crate::math::lanes::{LaneWork, Simd, widest};
+use crate::math::rfactor::dot;
 use crate::robot::joint::JointKind;
 use crate::robot::standard::STANDARD;
 use rand::{RngExt, SeedableRng};
@@ -99,11 +101,10 @@ fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
                 if of & joints == 0 {
                     continue;
                 }
-                let part: f64 = b.iter().zip(&rest).map(|(b, x)| b * x).sum();
-                *total += part;
-                for (x, b) in rest.iter_mut().zip(b) {
-                    *x -= part * b;
-                }
+                *total += widest(Projection {
+                    of: &mut rest,
+                    along: b,
+                });
                 joints |= of;
             }
         }
@@ -133,6 +134,25 @@ fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
         }
     }
     found
+}
+
+/// Takes off what a column has along a unit one: how much that is.
+struct Projection<'a> {
+    of: &'a mut [f64],
+    along: &'a [f64],
+}
+
+impl LaneWork for Projection<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> f64 {
+        let part = dot(self.of, self.along);
+        for (x, b) in self.of.iter_mut().zip(self.along) {
+            *x -= part * b;
+        }
+        part
+    }
 }
 
 /// A number near a round one of nine decimals is that one.

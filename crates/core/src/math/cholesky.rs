@@ -1,0 +1,108 @@
+//! Normal equations by the Cholesky factor of their matrix, in place.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::lanes::{LaneWork, Simd, widest};
+
+/// Columns that are taken off another at once.
+const TOGETHER: usize = 4;
+
+/// Solves A x = b, of whose symmetric matrix the lower half is read; the factor takes its place, and x that of b. False where
+/// the matrix is not positive definite: both hold nothing then.
+#[must_use]
+pub fn solve(a: &mut DMatrix<f64>, b: &mut DVector<f64>) -> bool {
+    debug_assert!(a.is_square() && a.nrows() == b.len(), "as many as rows");
+    widest(Solve {
+        n: b.len(),
+        a: a.as_mut_slice(),
+        b: b.as_mut_slice(),
+    })
+}
+
+struct Solve<'a> {
+    n: usize,
+    a: &'a mut [f64],
+    b: &'a mut [f64],
+}
+
+impl LaneWork for Solve<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> bool {
+        let Self { n, a, b } = self;
+        for j in 0..n {
+            let (before, rest) = a.split_at_mut(j * n);
+            let column = &mut rest[j..n];
+            take_off(column, before, n, j);
+            let diagonal = column[0].sqrt();
+            // nor is a NaN
+            if column[0].is_nan() || column[0] <= 0.0 {
+                return false;
+            }
+            column[0] = diagonal;
+            column[1..].iter_mut().for_each(|x| *x /= diagonal);
+        }
+        for j in 0..n {
+            let (x, below) = b[j..].split_at_mut(1);
+            x[0] /= a[j * n + j];
+            let column = &a[j * n + j + 1..(j + 1) * n];
+            for (b, l) in below.iter_mut().zip(column) {
+                *b -= x[0] * l;
+            }
+        }
+        for j in (0..n).rev() {
+            let (x, below) = b[j..].split_at_mut(1);
+            let column = &a[j * n + j + 1..(j + 1) * n];
+            let known: f64 = column.iter().zip(below).map(|(l, b)| l * *b).sum();
+            x[0] = (x[0] - known) / a[j * n + j];
+        }
+        true
+    }
+}
+
+/// Takes off a column, from its row j down, what the columns before it have of it.
+#[inline(always)]
+fn take_off(column: &mut [f64], before: &[f64], n: usize, j: usize) {
+    let mut groups = before.chunks_exact(TOGETHER * n);
+    for group in &mut groups {
+        let [x, y, z, w] = std::array::from_fn(|m| &group[m * n + j..(m + 1) * n]);
+        let by = [x[0], y[0], z[0], w[0]];
+        let others = x.iter().zip(y).zip(z).zip(w);
+        for (to, (((x, y), z), w)) in column.iter_mut().zip(others) {
+            *to = *to - by[0] * x - by[1] * y - by[2] * z - by[3] * w;
+        }
+    }
+    for one in groups.remainder().chunks_exact(n) {
+        let by = one[j];
+        for (to, x) in column.iter_mut().zip(&one[j..]) {
+            *to -= by * x;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solutions_are_those_of_the_equations_and_what_is_not_positive_definite_has_none() {
+        for n in [0, 1, 2, 3, 4, 5, 9, 30] {
+            let rows = DMatrix::from_fn(n + 4, n, |i, k| {
+                (1.1 + (i * i) as f64 + 1.7 * k as f64).sin()
+            });
+            let a = rows.transpose() * &rows + DMatrix::identity(n, n);
+            let x = DVector::from_fn(n, |i, _| 0.3 + i as f64);
+            let (mut factor, mut b) = (a.clone(), &a * &x);
+            assert!(solve(&mut factor, &mut b));
+            assert!((b - &x).amax() < 1e-11 || n == 0, "{n}");
+            if n > 0 {
+                let mut a = a;
+                a[(n - 1, n - 1)] = f64::NAN;
+                assert!(!solve(&mut a.clone(), &mut x.clone()));
+                a[(n - 1, n - 1)] = -1.0;
+                assert!(!solve(&mut a, &mut x.clone()));
+            }
+        }
+    }
+}
