@@ -22,9 +22,10 @@ impl ErrorText {
         }
     }
 
-    /// Adds a way out.
+    /// Adds a way out, or several, a line each.
     pub fn remedy(mut self, remedy: impl fmt::Display) -> Self {
-        self.remedies.push(remedy.to_string());
+        let remedy = remedy.to_string();
+        self.remedies.extend(remedy.lines().map(str::to_owned));
         self
     }
 

@@ -135,7 +135,7 @@ impl<'a> Document<'a> {
                     file: self.file.to_owned(),
                     line,
                     key: escape(name),
-                    remedy: "it; the files in configs/ show how".to_owned(),
+                    remedy: "it\nthe files in configs/ show how".to_owned(),
                 };
             } else if message == "duplicate key" {
                 let name = error.span().and_then(|span| self.text.get(span));

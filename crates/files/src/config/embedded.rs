@@ -134,7 +134,7 @@ pub fn text_of_kind(path: &Path, wanted: Wanted) -> Result<String, ConfigError> 
         let more = match known.is_empty() {
             true => String::new(),
             false => format!(
-                "; {}these come with the tool: {known}",
+                "\n{}these come with the tool: {known}",
                 did_you_mean(&shown(path), &known)
             ),
         };
@@ -175,7 +175,7 @@ pub(super) fn other_kind(path: &Path, text: &str) -> Option<ConfigError> {
         ),
         text if text.starts_with('<') => (
             "an XML file",
-            "give a robot file; `cft-ident new` writes one".to_owned(),
+            "give a robot file\n`cft-ident new` writes one".to_owned(),
         ),
         _ if ["csv", "mcap", "db3", "zst", "gz", "bag"].contains(&ends) => (
             "a log",

@@ -87,7 +87,7 @@ impl Header<'_> {
 
     fn missing(&self, channel: &Channel, purpose: &str) -> LogError {
         let near = nearest(&channel.column, self.names.iter().map(String::as_str));
-        let near = near.map(|name| format!("the nearest is `{}`; ", escape(name)));
+        let near = near.map(|name| format!("the nearest is `{}`\n", escape(name)));
         let key = match &channel.key {
             None => "the [log] section of the robot file".to_owned(),
             Some(key) => format!("`{key}` of the robot file"),
@@ -98,7 +98,7 @@ impl Header<'_> {
             column: escape(&channel.column),
             purpose: purpose.to_owned(),
             remedy: format!(
-                "{}name the right column in {key}; the header has {}",
+                "{}name the right column in {key}\nthe header has {}",
                 near.unwrap_or_default(),
                 list(self.names.iter().map(String::as_str))
             ),

@@ -126,7 +126,7 @@ impl Content {
             return Err(LogError::Format {
                 file: source::shown(path),
                 kind: "a file of reduced logs",
-                remedy: "`lsq`, `validate`, `reduce` and `track` take it; give the log itself here",
+                remedy: "`lsq`, `validate`, `reduce` and `track` take it\ngive the log itself here",
             });
         }
         Ok(Self {

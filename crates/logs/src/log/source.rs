@@ -112,10 +112,10 @@ pub fn shown(path: &Path) -> String {
 /// What to do when the system refuses to read.
 pub fn remedy(error: &io::Error) -> &'static str {
     match error.kind() {
-        io::ErrorKind::NotFound => "check the path; it is looked for from the current folder",
+        io::ErrorKind::NotFound => "check the path\nit is looked for from the current folder",
         io::ErrorKind::PermissionDenied => "allow reading it, or copy it to where you may read",
         io::ErrorKind::IsADirectory => "name a file inside this folder",
-        io::ErrorKind::InvalidData => "it is no UTF-8 text; name the right file",
+        io::ErrorKind::InvalidData => "it is no UTF-8 text\nname the right file",
         io::ErrorKind::Unsupported => "write it as CSV, a column for each channel",
         io::ErrorKind::UnexpectedEof => "it is cut off: copy it again from where it was recorded",
         _ => "check the disk or the connection, and try again",
@@ -143,7 +143,7 @@ pub fn begins_with(path: &Path, bytes: &[u8]) -> bool {
     read.is_ok() && first == bytes
 }
 
-/// "; the nearest is `x`", or "; there are x, y" of the files of these kinds in the folder of one that is
+/// "\nthe nearest is `x`", or "\nthere are x, y" of the files of these kinds in the folder of one that is
 /// not there; empty where there are none.
 pub fn named_beside(path: &Path, ends: &[&str]) -> String {
     named_beside_of(path, ends, &|_| true)
@@ -165,9 +165,9 @@ pub fn named_beside_of(path: &Path, ends: &[&str], wanted: &dyn Fn(&Path) -> boo
     names.sort();
     let known = || names.iter().map(String::as_str);
     match nearest(&file_name(path), known()) {
-        Some(near) => format!("; did you mean `{}`?", escape(near)),
+        Some(near) => format!("\ndid you mean `{}`?", escape(near)),
         None if names.is_empty() => String::new(),
-        None => format!("; in that folder are {}", list(known())),
+        None => format!("\nin that folder are {}", list(known())),
     }
 }
 

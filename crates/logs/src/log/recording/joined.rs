@@ -107,7 +107,7 @@ impl JoinedTopics {
             return Err(LogError::Topic {
                 file: source::shown_all(paths),
                 problem: format!("`{}` names no topic, as other channels do", escape(&channel.column)),
-                remedy: "write every position and torque as \"/topic:path\" in [log.joint]; `inspect` lists topics and paths".to_owned(),
+                remedy: "write every position and torque as \"/topic:path\" in [log.joint]\n`inspect` lists topics and paths".to_owned(),
             });
         }
         let mut fields: Vec<(String, Vec<(String, String)>)> = Vec::new();
@@ -184,7 +184,7 @@ impl JoinedTopics {
                     None => "no message of it holds numbers that can be read".to_owned(),
                 },
                 remedy: format!(
-                    "record the joints' states, as CDR with ros2msg definitions, protobuf or JSON; the topics are {}",
+                    "record the joints' states, as CDR with ros2msg definitions, protobuf or JSON\nthe topics are {}",
                     list(topics)
                 ),
             });

@@ -64,7 +64,7 @@ pub(super) fn open(
         return Err(LogError::Format {
             file: shown(path),
             kind: "an archive without arrays of numpy (Excel's .xlsx, or a .zip)",
-            remedy: "save the sheet as CSV: `python -c \"import pandas; pandas.read_excel('IN').to_csv('OUT.csv', index=False)\"`; or unpack the archive",
+            remedy: "save the sheet as CSV: `python -c \"import pandas; pandas.read_excel('IN').to_csv('OUT.csv', index=False)\"`\nor unpack the archive",
         });
     }
     let (table, notes) = arrays
