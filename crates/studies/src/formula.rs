@@ -398,10 +398,12 @@ pub fn table(rows: &Rows) -> String {
             ));
         }
         let clean = all[4];
-        heads.push(format!(
-            "- {tool}, on clean machines: a formula in {}.",
-            said(clean.false_ones, clean.runs, limits.on_clean)
-        ));
+        if clean.runs > 0 {
+            heads.push(format!(
+                "- {tool}, on clean machines: a formula in {}.",
+                said(clean.false_ones, clean.runs, limits.on_clean)
+            ));
+        }
     }
     format!("{}\n\n{text}", heads.join("\n"))
 }
