@@ -4,22 +4,23 @@
 //! speed; right is a formula whose torque along unseen motion is that of the law within a fifth (rms), both beside what
 //! the declared model can take up.
 
+mod subjects;
+
 use std::path::Path as File;
 
 use serde_json::{Value, json};
 
+pub use self::subjects::{Subject, subjects};
 use crate::added::Shape;
 use crate::chance::Chance;
 use crate::drive::Run;
 use crate::judge::{LIMITS, Share};
 use crate::lab::{Lab, errors};
-use crate::machine::Kind;
 use crate::path::Motion;
 use crate::planted::{band, put_in, sized};
 use crate::signal::{beside, rms};
 use crate::study::{Rows, StudyError};
 use crate::tool::Tool;
-use crate::uncatalogued::Uncatalogued;
 
 pub const SIZES: [f64; 2] = [2.0, 6.0];
 pub const USUAL_RUNS: u64 = 20;
@@ -45,191 +46,6 @@ pub const FORMULA_LIMITS: FormulaLimits = FormulaLimits {
     over_noise: 1.5,
     on_clean: 0.01,
 };
-
-/// A law, the machine and joint that have it, and its signals; none on a clean machine.
-#[derive(Clone, Copy)]
-pub struct Subject {
-    pub name: &'static str,
-    kind: Kind,
-    joint: usize,
-    law: Option<Uncatalogued>,
-    /// What a formula is in, and what it may be in besides.
-    signals: &'static [&'static str],
-    besides: &'static [&'static str],
-}
-
-/// The laws, ten by ten, then clean machines.
-pub fn subjects() -> Vec<Subject> {
-    use Uncatalogued::*;
-    let of = |name, (kind, joint), law, signals, besides| Subject {
-        name,
-        kind,
-        joint,
-        law: Some(law),
-        signals,
-        besides,
-    };
-    let one = (Kind::Single, 0);
-    let far = (Kind::Arm3, 2);
-    let shoulder = (Kind::Arm3, 1);
-    let clean = |kind| Subject {
-        name: "nothing",
-        kind,
-        joint: 0,
-        law: None,
-        signals: &[],
-        besides: &[],
-    };
-    let other = 1;
-    vec![
-        of(
-            "speed times speed",
-            far,
-            SpeedProduct { other },
-            &["v", "v_o"],
-            &[],
-        ),
-        of(
-            "friction by another position",
-            far,
-            FrictionByOther { other },
-            &["v", "q_o"],
-            &[],
-        ),
-        of("hose", far, Hose { other }, &["q", "q_o"], &[]),
-        of("cam", one, Cam, &["q"], &[]),
-        of(
-            "cogging by load",
-            shoulder,
-            LoadCogging,
-            &["load", "q"],
-            &[],
-        ),
-        of("Maxwell slip", one, MaxwellSlip, &["memory"], &["v"]),
-        of(
-            "thermal friction",
-            one,
-            ThermalFriction,
-            &["v", "warm"],
-            &[],
-        ),
-        of(
-            "magnetic hysteresis",
-            one,
-            MagneticHysteresis,
-            &["memory", "q"],
-            &["v"],
-        ),
-        of(
-            "friction after a reversal",
-            one,
-            DwellFriction,
-            &["memory"],
-            &["v"],
-        ),
-        of(
-            "drag by pose",
-            far,
-            DragByPose { other },
-            &["v", "q_o"],
-            &[],
-        ),
-        of(
-            "seal by speed",
-            far,
-            SealBySpeed { other },
-            &["v", "v_o"],
-            &[],
-        ),
-        of(
-            "eccentric load",
-            shoulder,
-            EccentricLoad,
-            &["v", "load", "q"],
-            &[],
-        ),
-        of(
-            "spring between joints",
-            far,
-            SpringBetween { other },
-            &["q", "q_o"],
-            &[],
-        ),
-        of("cable", far, Cable { other }, &["q", "q_o"], &[]),
-        of("film loss", one, FilmLoss, &["v"], &[]),
-        of(
-            "thermal viscosity",
-            one,
-            ThermalViscosity,
-            &["v", "warm"],
-            &[],
-        ),
-        of("eddy poles", one, EddyPoles, &["v", "q"], &[]),
-        of(
-            "friction by acceleration",
-            one,
-            FrictionByAcceleration,
-            &["v", "a"],
-            &[],
-        ),
-        of(
-            "inertia by position",
-            one,
-            InertiaByPosition,
-            &["a", "q"],
-            &[],
-        ),
-        of(
-            "hysteresis by load",
-            shoulder,
-            LoadedHysteresis,
-            &["memory", "load"],
-            &["v"],
-        ),
-        of(
-            "wheel spun by another joint",
-            far,
-            SpunWheel { other },
-            &["v_o", "q"],
-            &[],
-        ),
-        of(
-            "friction off a pose",
-            far,
-            FrictionOffPose { other },
-            &["v", "q_o"],
-            &[],
-        ),
-        of("taut hose", far, TautHose { other }, &["q", "q_o"], &[]),
-        of("cam lobe", one, CamLobe, &["q"], &[]),
-        of(
-            "cogging by load size",
-            shoulder,
-            CoggingByLoadSize,
-            &["load", "q"],
-            &[],
-        ),
-        of("uneven slip", one, UnevenSlip, &["memory"], &["v"]),
-        of("warm spring", one, WarmSpring, &["warm", "q"], &[]),
-        of(
-            "hysteresis by pole",
-            one,
-            PoleHysteresis,
-            &["memory", "q"],
-            &["v"],
-        ),
-        of("creep friction", one, CreepFriction, &["v"], &[]),
-        of(
-            "belt between joints",
-            far,
-            BeltBetween { other },
-            &["q", "q_o"],
-            &[],
-        ),
-        clean(Kind::Single),
-        clean(Kind::Arm3),
-    ]
-}
 
 impl Subject {
     pub fn cells(self) -> Vec<(Self, f64)> {
@@ -524,7 +340,7 @@ pub fn table(rows: &Rows) -> String {
     );
     let mut heads = Vec::new();
     for tool in rows.tools() {
-        let mut all = [Counts::default(); 3];
+        let mut all = [Counts::default(); 5];
         for (subject, size) in subjects().into_iter().flat_map(Subject::cells) {
             let cell = subject.cell(size);
             let c = counts(&subject, rows.of(&tool, &cell));
@@ -533,9 +349,9 @@ pub fn table(rows: &Rows) -> String {
             }
             let clean = subject.law.is_none();
             let at = if clean {
-                2
+                4
             } else {
-                usize::from(size > SIZES[0])
+                2 * usize::from(subject.reviewed) + usize::from(size > SIZES[0])
             };
             let sum = &mut all[at];
             for (sum, own) in [
@@ -567,9 +383,13 @@ pub fn table(rows: &Rows) -> String {
             )
         };
         let limits = FORMULA_LIMITS;
-        for (sum, size) in all.iter().zip(SIZES) {
+        let of = SIZES
+            .map(|size| (size, ""))
+            .into_iter()
+            .chain(SIZES.map(|size| (size, "of the ten laws of a reviewer, ")));
+        for (sum, (size, whose)) in all.iter().zip(of).filter(|(sum, _)| sum.runs > 0) {
             heads.push(format!(
-                "- {tool}, at {size} times the noise: right signals {}; torque within a fifth {}; unseen error down to {} times \
+                "- {tool}, {whose}at {size} times the noise: right signals {}; torque within a fifth {}; unseen error down to {} times \
                  the noise {}.",
                 said(sum.signals, sum.runs, limits.right_signals),
                 said(sum.torque, sum.runs, limits.right_torque),
@@ -577,11 +397,13 @@ pub fn table(rows: &Rows) -> String {
                 said(sum.noise, sum.runs, limits.down_to_noise)
             ));
         }
-        let clean = all[2];
-        heads.push(format!(
-            "- {tool}, on clean machines: a formula in {}.",
-            said(clean.false_ones, clean.runs, limits.on_clean)
-        ));
+        let clean = all[4];
+        if clean.runs > 0 {
+            heads.push(format!(
+                "- {tool}, on clean machines: a formula in {}.",
+                said(clean.false_ones, clean.runs, limits.on_clean)
+            ));
+        }
     }
     format!("{}\n\n{text}", heads.join("\n"))
 }

@@ -1,7 +1,7 @@
 //! Laws that stand in no catalogue of the tool: what a search for a formula is judged by. The first ten were fixed
 //! before the search was judged on any; the second ten too, from what machines are known to do; the third ten after a first
-//! run of some of the others, from a list of causes and not from the terms of the search. Their signals are what a formula
-//! must be in, whatever its form.
+//! run of some of the others, from a list of causes and not from the terms of the search; the last ten are those of a
+//! reviewer who had not seen the search. Their signals are what a formula must be in, whatever its form.
 
 use serde::Serialize;
 
@@ -72,6 +72,26 @@ pub enum Uncatalogued {
     CreepFriction,
     /// A toothed belt between two joints.
     BeltBetween { other: usize },
+    /// A body that the drawing lacks, thrown out by another joint's turning.
+    ThrownBody { other: usize },
+    /// A motor whose iron saturates.
+    SaturatingMotor,
+    /// A worn spot of the guide.
+    WornSpot,
+    /// A damper on a crank.
+    CrankDamper,
+    /// Cogging of magnets that a logged temperature changes.
+    WarmCogging,
+    /// Hysteresis of a seal that a logged temperature softens.
+    WarmHysteresis,
+    /// An energy chain that lies on its rail beyond the middle.
+    EnergyChain,
+    /// Tooth error of a differential, by the sum of two joints.
+    DifferentialTeeth { other: usize },
+    /// Air that a link's turning in space moves.
+    Fan { other: usize },
+    /// Oil that the gear churns above a speed.
+    Churning,
 }
 
 /// Remembered by the plant for each joint.
@@ -147,7 +167,11 @@ impl Uncatalogued {
     pub fn is_warm(self) -> bool {
         matches!(
             self,
-            Self::ThermalFriction | Self::ThermalViscosity | Self::WarmSpring
+            Self::ThermalFriction
+                | Self::ThermalViscosity
+                | Self::WarmSpring
+                | Self::WarmCogging
+                | Self::WarmHysteresis
         )
     }
 
@@ -191,6 +215,19 @@ impl Uncatalogued {
             Self::PoleHysteresis => torque(k * seen.memory.bristle * (5.0 * q).sin()),
             Self::CreepFriction => level(k * (v.abs() / 0.1).ln_1p()),
             Self::BeltBetween { other } => torque(k * (4.0 * (q - at(other).0)).sin()),
+            Self::ThrownBody { other } => torque(k * at(other).1.powi(2) * (2.0 * q).sin()),
+            Self::SaturatingMotor => torque(k * seen.load * seen.load.abs()),
+            Self::WornSpot => level(k * (-((q + 0.2) / 0.25).powi(2)).exp()),
+            Self::CrankDamper => torque(k * v * v.abs() * q.cos().powi(2)),
+            Self::WarmCogging => torque(k * (warm - 30.0) / 10.0 * (6.0 * q).sin()),
+            Self::WarmHysteresis => torque(k * seen.memory.bristle * (-(warm - 20.0) / 15.0).exp()),
+            Self::EnergyChain => level(k * 0.5 * (1.0 + (3.0 * q).tanh())),
+            Self::DifferentialTeeth { other } => torque(k * (8.0 * (q + at(other).0)).sin()),
+            Self::Fan { other } => {
+                let v = v + at(other).1;
+                torque(k * v * v.abs())
+            }
+            Self::Churning => level(k * (v.abs() - 0.3).max(0.0)),
         }
     }
 }

@@ -10,8 +10,9 @@ use crate::robot::FormulaSignal;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Source {
     Signal(FormulaSignal, usize),
-    /// Position of two joints together.
+    /// Position of two joints together, or of the first beyond the second.
     Sum(usize, usize),
+    Beyond(usize, usize),
     /// What remembers the way of a joint, with its scale [m or rad].
     State(FormulaSignal, usize, f64),
 }
@@ -74,7 +75,7 @@ impl Source {
     pub fn joints(self) -> Vec<usize> {
         match self {
             Self::Signal(_, j) | Self::State(_, j, _) => vec![j],
-            Self::Sum(i, j) => vec![i, j],
+            Self::Sum(i, j) | Self::Beyond(i, j) => vec![i, j],
         }
     }
 
@@ -85,14 +86,14 @@ impl Source {
             Self::Signal(of, _) | Self::State(of, ..) => {
                 matches!(of, Speed | Direction | Play | Dahl)
             }
-            Self::Sum(..) => false,
+            Self::Sum(..) | Self::Beyond(..) => false,
         }
     }
 
     pub fn is_position(self) -> bool {
         matches!(
             self,
-            Self::Signal(FormulaSignal::Position, _) | Self::Sum(..)
+            Self::Signal(FormulaSignal::Position, _) | Self::Sum(..) | Self::Beyond(..)
         )
     }
 
@@ -108,9 +109,14 @@ impl Source {
         };
         match self {
             Self::Signal(signal, j) | Self::State(signal, j, _) => of(signal, j),
-            Self::Sum(i, j) => {
+            Self::Sum(i, j) | Self::Beyond(i, j) => {
                 let position = |j| of(FormulaSignal::Position, j);
-                format!("({} + {})", position(i), position(j))
+                let sign = if matches!(self, Self::Sum(..)) {
+                    '+'
+                } else {
+                    '-'
+                };
+                format!("({} {sign} {})", position(i), position(j))
             }
         }
     }
@@ -136,8 +142,10 @@ impl Source {
                 }
             },
             Self::State(..) => Powers::new(),
-            Self::Sum(i, j) if position(i) == position(j) => powers(&[(position(i), 1)]),
-            Self::Sum(..) => return None,
+            Self::Sum(i, j) | Self::Beyond(i, j) if position(i) == position(j) => {
+                powers(&[(position(i), 1)])
+            }
+            Self::Sum(..) | Self::Beyond(..) => return None,
         })
     }
 
@@ -145,9 +153,14 @@ impl Source {
         match self {
             Self::Signal(signal, j) => signal.series(scene, j, None),
             Self::State(signal, j, scale) => signal.series(scene, j, Some(scale)),
-            Self::Sum(i, j) => {
+            Self::Sum(i, j) | Self::Beyond(i, j) => {
+                let sign = if matches!(self, Self::Sum(..)) {
+                    1.0
+                } else {
+                    -1.0
+                };
                 let q = &scene.stretch.q;
-                q[i].iter().zip(&q[j]).map(|(a, b)| a + b).collect()
+                q[i].iter().zip(&q[j]).map(|(a, b)| a + sign * b).collect()
             }
         }
     }
