@@ -125,8 +125,9 @@ impl Judging<'_> {
             let count = way.verified.amplitude.len();
             let own = estimates.values.rows(at, count);
             way.verified.amplitude = own.iter().copied().collect();
-            // beside the others a bound may hold all of it
-            let there = own.iter().any(|x| *x != 0.0);
+            // beside the others a bound may hold all of it, or what it cannot be without
+            let effect = tables::effect(&self.field, &way.verified.chosen, own.as_slice());
+            let there = own.iter().any(|x| *x != 0.0) && effect.can_be();
             way.amplitude = there.then(|| own.iter().map(|x| factor * x).collect());
             at += count;
         }

@@ -163,6 +163,15 @@ impl Added {
         }
     }
 
+    /// Whether its numbers are among those that a file of it may hold.
+    pub fn can_be(&self) -> bool {
+        let keys = self.law.keys(&self.shape, &self.linear);
+        keys.iter().all(|of| {
+            let range = self.law.entry.key(of.key).and_then(|key| key.range);
+            range.is_none_or(|range| range.holds(of.value))
+        })
+    }
+
     /// Number of parameters.
     pub fn parameters(&self) -> usize {
         self.shape.len() + self.linear.len()

@@ -153,3 +153,15 @@ fn saturating(law: &JointFriction, v: f64) -> f64 {
         law => law.direction(v),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::LAW;
+    use crate::effect::{Added, Place};
+
+    #[test]
+    fn bristles_that_carry_nothing_cannot_be() {
+        let of = |fc| Added::new(&LAW, Place::Joint(0), vec![50.0], vec![fc, 0.3]).can_be();
+        assert!(of(1.0) && !of(0.0));
+    }
+}
