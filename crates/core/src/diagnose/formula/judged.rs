@@ -105,7 +105,6 @@ impl PreparedCase<'_> {
             taken.iter().all(|i| proposed[*i].beside.iter().any(same))
         };
         let mut chosen: Vec<Chosen> = confirmed.iter().filter(stays).cloned().collect();
-        let directions = searched.directions_of(&chosen);
         let mut candidates = searched.candidates.clone();
         for (i, candidate) in candidates.iter_mut().enumerate() {
             if !chosen.iter().any(|c| c.candidate == i) {
@@ -123,8 +122,8 @@ impl PreparedCase<'_> {
             candidates.push(self.candidate(&proposed[*i], &definitions[*i])?);
         }
         let about = searched.summed.about.clone();
-        let summed = self.summed(about, &candidates, &directions)?;
-        let summed = self.polished(&mut candidates, &summed, &chosen, &directions)?;
+        let summed = self.summed(about, &candidates, &searched.directions)?;
+        let summed = self.polished(&mut candidates, &summed, &chosen, &searched.directions)?;
         let first = chosen.len() - taken.len();
         let field = self.field(&candidates, &summed, UNWATCHED);
         for at in first..chosen.len() {
@@ -141,7 +140,7 @@ impl PreparedCase<'_> {
             chosen,
             not_tried: searched.not_tried.clone(),
             looked: searched.looked.clone(),
-            directions,
+            directions: searched.directions.clone(),
             error: searched.error,
             determined: searched.determined,
         };
@@ -279,9 +278,7 @@ fn signals(terms: &[FormulaTerm]) -> Vec<(FormulaSignal, usize)> {
     for source in terms.iter().flat_map(FormulaTerm::sources) {
         let own = match source {
             Source::Signal(of, j) | Source::State(of, j, _) => vec![(of, j)],
-            Source::Sum(i, j) | Source::Beyond(i, j) => {
-                vec![(FormulaSignal::Position, i), (FormulaSignal::Position, j)]
-            }
+            Source::Sum(i, j) => vec![(FormulaSignal::Position, i), (FormulaSignal::Position, j)],
         };
         all.extend(
             own.into_iter()

@@ -64,14 +64,6 @@ pub fn library(around: &Around) -> Vec<FormulaTerm> {
         ];
         all.extend(own.map(|f| FormulaTerm::of(&[f, speed])));
         all.extend(around.waves(k).into_iter().map(|wave| wave.times(speed)));
-        // what lies across two joints: a force, or friction
-        for both in [Source::Sum(j, k), Source::Beyond(j, k)] {
-            let mut across = of_position(both);
-            across.extend(TURNS.map(|n| wave(both, n)));
-            let direction = Factor::plain(Of::Direction, j);
-            all.extend(across.iter().map(|term| term.times(direction)));
-            all.extend(across);
-        }
     }
     all.retain(|term| term.unit(around.names).is_some());
     let mut kept: Vec<FormulaTerm> = Vec::new();
@@ -153,19 +145,33 @@ impl Around<'_> {
             let decays = [0.3, 1.0, 3.0].map(|s| Factor::of(Function::Decay(s * spread), source));
             all.extend(decays.map(|f| FormulaTerm::of(&[f])));
         }
-        all.extend(of_position(Source::Signal(Of::Position, j)));
+        all.extend(self.of_position(Source::Signal(Of::Position, j)));
         all.extend(self.waves(j));
         all
     }
 
     /// What another joint sets.
     fn sizes_of(&self, k: usize) -> Vec<FormulaTerm> {
-        let mut all = of_position(Source::Signal(Of::Position, k));
+        let mut all = self.of_position(Source::Signal(Of::Position, k));
         all.extend(self.waves(k));
         let speed = Source::Signal(Of::Speed, k);
         let own = [Function::Abs, Function::Square].map(|f| Factor::of(f, speed));
         all.extend(own.map(|f| FormulaTerm::of(&[f])));
+        let both = Source::Sum(self.joint, k);
+        all.extend(self.of_position(both));
+        all.extend(TURNS[..2].iter().map(|n| wave(both, *n)));
         all
+    }
+
+    fn of_position(&self, source: Source) -> Vec<FormulaTerm> {
+        let all = [
+            Function::Plain,
+            Function::Square,
+            Function::Cube,
+            Function::Abs,
+        ];
+        all.map(|f| FormulaTerm::of(&[Factor::of(f, source)]))
+            .to_vec()
     }
 
     /// Waves over the position of a joint: whole ones a turn, and those of the residual's spectrum at the joint itself.
@@ -192,17 +198,6 @@ impl Around<'_> {
         all.dedup();
         all.into_iter().map(|n| wave(source, n)).collect()
     }
-}
-
-fn of_position(source: Source) -> Vec<FormulaTerm> {
-    let all = [
-        Function::Plain,
-        Function::Square,
-        Function::Cube,
-        Function::Abs,
-    ];
-    all.map(|f| FormulaTerm::of(&[Factor::of(f, source)]))
-        .to_vec()
 }
 
 fn wave(source: Source, n: f64) -> FormulaTerm {

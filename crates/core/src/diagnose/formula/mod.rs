@@ -34,7 +34,6 @@ mod term;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -52,7 +51,7 @@ use super::search::Chosen;
 use super::searched::SearchedCase;
 use super::steps::Judged;
 use super::watch::Watch;
-use crate::effect::{Added, AugmentedModel, Place};
+use crate::effect::Place;
 use crate::judge::{LEAST_PARTS, TimeBlock, compare};
 
 /// A formula of a joint before the judge.
@@ -94,8 +93,8 @@ impl PreparedCase<'_> {
         self.judged_formulas(searched, &confirmed, proposed)
     }
 
-    /// The formula of a joint that is to be judged: in the place of what the catalogue found at the joint where it explains
-    /// as much by itself, or beside that. Both are asked whether they are chance; of what is none the simplest is taken.
+    /// The formula of a joint that is to be judged: beside what the catalogue found at the joint, or in its place where it
+    /// explains as much by itself.
     fn proposed(
         &self,
         searched: &SearchedCase,
@@ -104,79 +103,44 @@ impl PreparedCase<'_> {
     ) -> Result<Option<Proposed>, DiagnoseError> {
         let of_joint = OfJoint::of(self, searched, confirmed, j);
         let terms = self.with_names(j, |names| library(&self.around(names)));
-        let both = [true, false].map(|with_own| of_joint.stays(searched, confirmed, with_own));
-        let about = both.each_ref().map(|own| searched.about(own));
-        let of_rows =
-            |about: &AugmentedModel| -> Result<(RowsOfJoint, DMatrix<f64>), DiagnoseError> {
-                let rows = self.joint_rows(about, &of_joint.candidates, &terms, j)?;
-                let gram = gram(&rows.more);
-                Ok((rows, gram))
+        let rows = self.joint_rows(searched, &of_joint.candidates, &terms, j)?;
+        let gram = gram(&rows.more);
+        let search = |with_own: bool| -> Result<Option<Proposed>, DiagnoseError> {
+            let kept = of_joint.kept(with_own);
+            let (ridge, rows) = (self.case.numbers.ridge, (&rows, &gram, kept.as_slice()));
+            let products = self.with_names(j, |names| Products::of(&terms, rows, names, ridge));
+            let Some(products) = products else {
+                return Ok(None);
             };
-        let [stays, others] = both;
-        let mut made = of_rows(&about[0])?;
-        let way = (&of_joint, &about[0], of_joint.kept(true));
-        let (catalogue, beside) = self.searched_terms(way, stays, (&terms, &made))?;
-        if !of_joint.own.contains(&true) {
-            return Ok(beside);
-        }
-        if about[1].effects.len() < about[0].effects.len() {
-            made = of_rows(&about[1])?;
-        }
-        let way = (&of_joint, &about[1], of_joint.kept(false));
-        let (_, alone) = self.searched_terms(way, others, (&terms, &made))?;
-        let Some(alone) = alone else {
-            return Ok(beside);
+            let Some(selected) = self.selected(&products, None) else {
+                return Ok(None);
+            };
+            let p_value = self.chance(&products, &selected);
+            let terms = selected.terms.iter().map(|t| terms[*t].clone()).collect();
+            let (terms, selected) =
+                self.reshaped(searched, (&of_joint, &kept), (terms, selected))?;
+            let stays = |c: &&Chosen| with_own || !of_joint.is_own(searched, c);
+            Ok(Some(Proposed {
+                joint: j,
+                terms,
+                selected,
+                p_value,
+                beside: confirmed.iter().filter(stays).cloned().collect(),
+            }))
         };
-        let is_more = |left: &[Vec<f64>]| {
-            let gain = compare(&alone.selected.left, left, &[1.0]);
-            gain.is_beyond(self.case.numbers.screen, None)
+        let beside = search(true)?;
+        let alone = match of_joint.own.contains(&true) {
+            true => search(false)?,
+            false => None,
         };
-        let holds = |p: &Proposed| p.p_value <= self.case.formula.chance;
-        let instead = holds(&alone) && !is_more(&catalogue);
-        let more = |b: &Proposed| !instead || holds(b) && is_more(&b.selected.left);
-        Ok(beside.filter(more).or(instead.then_some(alone)))
-    }
-
-    /// Errors of blocks left out without a formula, and the formula that is found.
-    fn searched_terms(
-        &self,
-        (of_joint, about, kept): (&OfJoint, &AugmentedModel, Vec<usize>),
-        beside: Vec<Chosen>,
-        (terms, (rows, gram)): (&[FormulaTerm], &(RowsOfJoint, DMatrix<f64>)),
-    ) -> Result<(Vec<Vec<f64>>, Option<Proposed>), DiagnoseError> {
-        let rows = (rows, gram, kept.as_slice());
-        let Some((products, bare)) = self.products(of_joint.joint, terms, rows) else {
-            return Ok((Vec::new(), None));
-        };
-        let Some(selected) = self.selected(&products, None) else {
-            return Ok((bare, None));
-        };
-        let p_value = self.chance(&products, &selected);
-        let terms = selected.terms.iter().map(|t| terms[*t].clone()).collect();
-        let (terms, selected) = self.reshaped(about, (of_joint, &kept), (terms, selected))?;
-        let proposed = Proposed {
-            joint: of_joint.joint,
-            terms,
-            selected,
-            p_value,
-            beside,
-        };
-        Ok((bare, Some(proposed)))
-    }
-
-    /// Sums of products of terms, and errors of blocks left out without any.
-    fn products<'b>(
-        &self,
-        j: usize,
-        terms: &'b [FormulaTerm],
-        rows: (&'b RowsOfJoint, &DMatrix<f64>, &[usize]),
-    ) -> Option<(Products<'b>, Vec<Vec<f64>>)> {
-        let numbers = &self.case.numbers;
-        let products =
-            self.with_names(j, |names| Products::of(terms, rows, names, numbers.ridge))?;
-        let plain = vec![1.0; self.blocks.list.len()];
-        let bare = products.bare(&plain, (&self.case.formula, numbers))?;
-        Some((products, bare))
+        Ok(match (beside, alone) {
+            (Some(beside), Some(alone)) => {
+                let gain = compare(&alone.selected.left, &beside.selected.left, &[1.0]);
+                let more = gain.is_beyond(self.case.numbers.screen, None);
+                Some(if more { beside } else { alone })
+            }
+            (beside, alone) => alone.or(beside),
+        })
     }
 
     fn selected(&self, products: &Products, signs: Option<&[f64]>) -> Option<Selected> {
@@ -189,7 +153,7 @@ impl PreparedCase<'_> {
     /// each time: what only made good for a wrong shape falls out.
     fn reshaped(
         &self,
-        about: &AugmentedModel,
+        searched: &SearchedCase,
         (of_joint, kept): (&OfJoint, &[usize]),
         (mut terms, mut selected): (Vec<FormulaTerm>, Selected),
     ) -> Result<(Vec<FormulaTerm>, Selected), DiagnoseError> {
@@ -200,9 +164,11 @@ impl PreparedCase<'_> {
             if near.len() == terms.len() {
                 break;
             }
-            let rows = self.joint_rows(about, &of_joint.candidates, &near, j)?;
-            let products = self.products(j, &near, (&rows, &gram(&rows.more), kept));
-            let Some(found) = products.and_then(|(p, _)| self.selected(&p, None)) else {
+            let rows = self.joint_rows(searched, &of_joint.candidates, &near, j)?;
+            let gram = gram(&rows.more);
+            let (ridge, rows) = (self.case.numbers.ridge, (&rows, &gram, kept));
+            let products = self.with_names(j, |names| Products::of(&near, rows, names, ridge));
+            let Some(found) = products.and_then(|p| self.selected(&p, None)) else {
                 break;
             };
             terms = found.terms.iter().map(|t| near[*t].clone()).collect();
@@ -238,7 +204,7 @@ impl PreparedCase<'_> {
     /// Rows of a joint with the columns of all terms.
     fn joint_rows(
         &self,
-        about: &AugmentedModel,
+        searched: &SearchedCase,
         candidates: &[Candidate],
         terms: &[FormulaTerm],
         j: usize,
@@ -250,7 +216,7 @@ impl PreparedCase<'_> {
             count: columns.count(),
         };
         let rows = joint_rows(
-            about,
+            &searched.summed.about,
             (&self.unknowns, candidates),
             (&self.data, &self.blocks.list),
             (j, self.case.formula.rows),
@@ -284,30 +250,6 @@ impl PreparedCase<'_> {
             }
         }
         (1 + as_good) as f64 / (1 + drawn) as f64
-    }
-}
-
-impl SearchedCase {
-    /// Friction laws by whose direction friction goes, of some effects in their shape: a law that does not stay gives none.
-    fn directions_of(&self, effects: &[Chosen]) -> Vec<Added> {
-        let own = effects.iter().map(|c| &self.candidates[c.candidate].effect);
-        let is_law = |e: &&Added| {
-            let same = |d: &Added| d.name() == e.name() && d.place == e.place;
-            self.directions.iter().any(same)
-        };
-        let law = |e: &Added| {
-            let mut law = e.clone();
-            law.linear.fill(0.0);
-            law
-        };
-        own.filter(is_law).map(law).collect()
-    }
-
-    /// The declared model that a formula is searched about, beside some effects.
-    fn about(&self, beside: &[Chosen]) -> AugmentedModel {
-        let mut about = self.summed.about.clone();
-        about.effects.extend(self.directions_of(beside));
-        about
     }
 }
 
@@ -346,12 +288,8 @@ impl OfJoint {
         }
     }
 
-    /// Effects that are confirmed, with the joint's own or without.
-    fn stays(&self, searched: &SearchedCase, confirmed: &[Chosen], with_own: bool) -> Vec<Chosen> {
-        let own = Place::Joint(self.joint);
-        let is_own = |c: &Chosen| searched.candidates[c.candidate].effect.place == own;
-        let stays = confirmed.iter().filter(|c| with_own || !is_own(c));
-        stays.cloned().collect()
+    fn is_own(&self, searched: &SearchedCase, chosen: &Chosen) -> bool {
+        searched.candidates[chosen.candidate].effect.place == Place::Joint(self.joint)
     }
 
     /// Declared columns, with those of the joint's own effects or without.

@@ -103,34 +103,22 @@ impl<'a> Products<'a> {
         Some(all)
     }
 
-    fn asked<'b>(
-        &'b self,
-        signs: &'b [f64],
-        (formula, judge): (&'b FormulaNumbers, &'b Numbers),
-    ) -> Asked<'b> {
-        Asked {
-            of: self,
-            signs,
-            pull: self.pull(signs),
-            formula,
-            judge,
-        }
-    }
-
-    /// Errors of blocks left out of the declared columns alone, the residual of each block with a sign.
-    pub fn bare(
+    /// Chooses terms, the residual of each block with a sign.
+    pub fn select(
         &self,
         signs: &[f64],
-        numbers: (&FormulaNumbers, &Numbers),
-    ) -> Option<Vec<Vec<f64>>> {
-        self.asked(signs, numbers).bare()
-    }
-
-    /// Chooses terms, the residual of each block with a sign.
-    pub fn select(&self, signs: &[f64], numbers: (&FormulaNumbers, &Numbers)) -> Option<Selected> {
-        let (asked, formula) = (self.asked(signs, numbers), numbers.0);
+        (formula, judge): (&FormulaNumbers, &Numbers),
+    ) -> Option<Selected> {
+        let pull = self.pull(signs);
+        let asked = Asked {
+            of: self,
+            signs,
+            pull: &pull,
+            formula,
+            judge,
+        };
         let mut chosen: Vec<usize> = Vec::new();
-        let none = asked.bare()?;
+        let none = asked.with_left_out((&[], &[]), |none, _| none.errors())?;
         let error: f64 = none.iter().flatten().sum();
         while chosen.len() < formula.terms {
             let Some((best, gain)) = asked.best(&chosen, None) else {
@@ -220,7 +208,7 @@ fn shapes_of(term: &FormulaTerm, names: &Names) -> Vec<String> {
 struct Asked<'a> {
     of: &'a Products<'a>,
     signs: &'a [f64],
-    pull: DVector<f64>,
+    pull: &'a DVector<f64>,
     formula: &'a FormulaNumbers,
     judge: &'a Numbers,
 }
@@ -295,10 +283,6 @@ impl Asked<'_> {
         });
         let more: Vec<Vec<Term>> = more.collect();
         Some(of(&left_out, &more))
-    }
-
-    fn bare(&self) -> Option<Vec<Vec<f64>>> {
-        self.with_left_out((&[], &[]), |none, _| none.errors())
     }
 
     /// Gain of terms together beside others.

@@ -10,9 +10,8 @@ use crate::robot::FormulaSignal;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Source {
     Signal(FormulaSignal, usize),
-    /// Position of two joints together, or of the first beyond the second.
+    /// Position of two joints together.
     Sum(usize, usize),
-    Beyond(usize, usize),
     /// What remembers the way of a joint, with its scale [m or rad].
     State(FormulaSignal, usize, f64),
 }
@@ -75,7 +74,7 @@ impl Source {
     pub fn joints(self) -> Vec<usize> {
         match self {
             Self::Signal(_, j) | Self::State(_, j, _) => vec![j],
-            Self::Sum(i, j) | Self::Beyond(i, j) => vec![i, j],
+            Self::Sum(i, j) => vec![i, j],
         }
     }
 
@@ -86,14 +85,14 @@ impl Source {
             Self::Signal(of, _) | Self::State(of, ..) => {
                 matches!(of, Speed | Direction | Play | Dahl)
             }
-            Self::Sum(..) | Self::Beyond(..) => false,
+            Self::Sum(..) => false,
         }
     }
 
     pub fn is_position(self) -> bool {
         matches!(
             self,
-            Self::Signal(FormulaSignal::Position, _) | Self::Sum(..) | Self::Beyond(..)
+            Self::Signal(FormulaSignal::Position, _) | Self::Sum(..)
         )
     }
 
@@ -109,14 +108,9 @@ impl Source {
         };
         match self {
             Self::Signal(signal, j) | Self::State(signal, j, _) => of(signal, j),
-            Self::Sum(i, j) | Self::Beyond(i, j) => {
+            Self::Sum(i, j) => {
                 let position = |j| of(FormulaSignal::Position, j);
-                let sign = if matches!(self, Self::Sum(..)) {
-                    '+'
-                } else {
-                    '-'
-                };
-                format!("({} {sign} {})", position(i), position(j))
+                format!("({} + {})", position(i), position(j))
             }
         }
     }
@@ -142,10 +136,8 @@ impl Source {
                 }
             },
             Self::State(..) => Powers::new(),
-            Self::Sum(i, j) | Self::Beyond(i, j) if position(i) == position(j) => {
-                powers(&[(position(i), 1)])
-            }
-            Self::Sum(..) | Self::Beyond(..) => return None,
+            Self::Sum(i, j) if position(i) == position(j) => powers(&[(position(i), 1)]),
+            Self::Sum(..) => return None,
         })
     }
 
@@ -153,14 +145,9 @@ impl Source {
         match self {
             Self::Signal(signal, j) => signal.series(scene, j, None),
             Self::State(signal, j, scale) => signal.series(scene, j, Some(scale)),
-            Self::Sum(i, j) | Self::Beyond(i, j) => {
-                let sign = if matches!(self, Self::Sum(..)) {
-                    1.0
-                } else {
-                    -1.0
-                };
+            Self::Sum(i, j) => {
                 let q = &scene.stretch.q;
-                q[i].iter().zip(&q[j]).map(|(a, b)| a + sign * b).collect()
+                q[i].iter().zip(&q[j]).map(|(a, b)| a + b).collect()
             }
         }
     }
