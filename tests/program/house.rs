@@ -29,7 +29,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("open_loop", "explain math number robot motion effect"),
     ("friction", "explain math robot block motion verdict"),
     ("inertia", "explain math robot block motion verdict"),
-    ("judge", ""),
+    ("judge", "math"),
     ("diagnose", "explain math robot block motion effect judge"),
     ("validate", "math robot block motion verdict"),
     ("inspect", "math number block log"),

@@ -51,7 +51,7 @@ pub struct EffectChange {
 impl EffectChange {
     /// The joint that it makes worse by the most, beyond its interval.
     pub fn worst(&self) -> Option<f64> {
-        let worse = self.joints.iter().filter(|j| j.worsened);
+        let worse = self.joints.iter().filter(|j| j.noticeably_worse());
         let by = worse.map(|j| (j.after - j.before) / j.before);
         by.max_by(f64::total_cmp)
     }
