@@ -148,8 +148,9 @@ impl<'a> FitToAll<'a> {
     /// Squared residual of each joint at some values.
     fn squares(&self, sums: &[DMatrix<f64>], values: &DVector<f64>) -> Vec<f64> {
         let joints = self.own.iter().zip(sums).zip(self.torques);
-        let of_joint = |((own, sums), torque): ((&Vec<(usize, usize)>, _), &DVector<f64>)| {
-            let sums: &DMatrix<f64> = sums;
+        let of_joint = |((own, sums), torque)| {
+            let (own, sums): (&Vec<(usize, usize)>, &DMatrix<f64>) = (own, sums);
+            let torque: &DVector<f64> = torque;
             let mut x = vec![0.0; sums.nrows()];
             let first = x.len() - torque.len();
             own.iter().for_each(|(i, a)| x[*a] = values[*i]);
