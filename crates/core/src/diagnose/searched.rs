@@ -40,8 +40,8 @@ pub struct SearchedCase {
     pub looked: Vec<Looked>,
     /// Squared error of blocks left out by all that was chosen, in the weights of the joints.
     pub error: f64,
-    /// The same with as much noise again in the positions.
-    pub noisier: BlockSums,
+    /// The sums with as much noise again in the positions; none where nothing was chosen.
+    pub noisier: Option<BlockSums>,
     /// Friction laws by whose direction friction goes.
     pub directions: Vec<Added>,
     /// Whether the declared model explains more of blocks left out than no torque does.
@@ -168,7 +168,10 @@ impl PreparedCase<'_> {
         if !chosen.is_empty() {
             summed = self.polished(&mut candidates, &summed, &chosen, &directions)?;
         }
-        let noisier = self.noisier(&summed, &candidates)?;
+        let noisier = match chosen.is_empty() {
+            true => None,
+            false => Some(self.noisier(&summed, &candidates)?),
+        };
         Ok(SearchedCase {
             noisier,
             error,

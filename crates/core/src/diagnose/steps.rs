@@ -97,7 +97,7 @@ impl Judging<'_> {
             self.declared,
             &searched.chosen,
             &self.prepared.blocks,
-            Some(&searched.noisier),
+            searched.noisier.as_ref(),
         );
         let way = |verified: Verified| {
             let effect = &searched.candidates[verified.chosen.candidate].effect;

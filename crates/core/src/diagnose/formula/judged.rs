@@ -134,7 +134,7 @@ impl PreparedCase<'_> {
             (chosen[at].gain, chosen[at].error) = judged;
         }
         let case = SearchedCase {
-            noisier: self.noisier(&summed, &candidates)?,
+            noisier: Some(self.noisier(&summed, &candidates)?),
             candidates,
             summed,
             chosen,
