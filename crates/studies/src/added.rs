@@ -72,14 +72,27 @@ impl Added {
         let level = |level: f64| Share { torque: 0.0, level };
         match self.shape {
             Shape::Offset => torque(k),
-            Shape::Asymmetric => level(if v_own > 0.0 { k } else { 0.0 }),
+            // a step alone would be an offset and a higher Coulomb level, which every model declares
+            Shape::Asymmetric => Share {
+                torque: if v_own > 0.0 {
+                    k * (friction * v_own)
+                } else {
+                    0.0
+                },
+                level: if v_own > 0.0 { k } else { 0.0 },
+            },
             Shape::Stribeck { vs } => level(k * (-(v_own / vs).powi(2)).exp()),
             Shape::Quadratic => torque(k * v_own * v_own.abs()),
             Shape::Ripple { order, phase } => torque(k * (order * q_own + phase).sin()),
             Shape::Spring { zero } => torque(k * (q_own - zero)),
             Shape::PositionFriction { order, phase } => level(k * (order * q_own + phase).sin()),
             Shape::LoadFriction => level(k * load.abs()),
-            Shape::Efficiency => torque(if load * v_own > 0.0 { k * load } else { 0.0 }),
+            // a loss of the gear can hold a joint that stands, and cannot push it
+            Shape::Efficiency => level(if load * v_own >= 0.0 {
+                k * load.abs()
+            } else {
+                0.0
+            }),
             Shape::Coupling { other } => torque(k * v[other]),
             Shape::WarmUp { time_s } => {
                 let cold = k * (-t / time_s).exp();

@@ -110,7 +110,7 @@ impl Plant {
 
     fn go(&self, s: &mut State, u: &Joints, h: f64) {
         let mut left = h;
-        for _ in 0..8 {
+        for stops_left in (0..8).rev() {
             let first = self.settled(s, u);
             (s.load, s.a) = (first.load, first.v);
             let middle = self.moved(s, &first, 0.5 * left, None);
@@ -120,6 +120,18 @@ impl Plant {
                 *s = end;
                 return;
             };
+            if stops_left == 0 {
+                // One that turns again and again holds to the end of the step; the others go on.
+                let turned: Vec<usize> = (0..self.joints)
+                    .filter(|&i| self.stop(s, &end, i).is_some())
+                    .collect();
+                *s = end;
+                for joint in turned {
+                    s.v[joint] = 0.0;
+                    s.contact[joint] = Contact::Holds;
+                }
+                return;
+            }
             if part > 0.0 {
                 let middle = self.moved(s, &first, 0.5 * part * left, None);
                 let second = self.rates(&middle, u);
@@ -132,7 +144,6 @@ impl Plant {
                 return;
             }
         }
-        s.t += left;
     }
 
     /// Torque of additions against the motion, with what they change of the friction.
@@ -168,16 +179,20 @@ impl Plant {
 
     /// The joint whose direction turns first inside a step, and the part of the step until then.
     fn first_stop(&self, from: &State, to: &State) -> Option<(usize, f64)> {
-        let stop = |i: usize| match from.contact[i] {
+        (0..self.joints)
+            .filter_map(|i| Some((i, self.stop(from, to, i)?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// The part of a step after which one joint turns; none where it does not.
+    fn stop(&self, from: &State, to: &State, i: usize) -> Option<f64> {
+        match from.contact[i] {
             Contact::Slides(d) if self.friction[i].sticks() && to.v[i] * d < 0.0 => {
                 let part = from.v[i] / (from.v[i] - to.v[i]);
-                Some((i, if from.v[i] * d > 0.0 { part } else { 0.0 }))
+                Some(if from.v[i] * d > 0.0 { part } else { 0.0 })
             }
             _ => None,
-        };
-        (0..self.joints)
-            .filter_map(stop)
-            .min_by(|a, b| a.1.total_cmp(&b.1))
+        }
     }
 
     /// Rates at a state whose joints hold only where their friction can.

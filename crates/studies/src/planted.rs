@@ -173,8 +173,17 @@ impl Member {
                 None
             }
             What::Presliding => {
-                // the way on which the bristle yields, by bisection of its logarithm
-                let (mut low, mut high) = (1e-5_f64, 0.1_f64);
+                // the way on which the bristle yields, by bisection of its logarithm; beside the same machine with an
+                // ideal stick on the same course
+                let along = |lab: &Lab| {
+                    let seed = &mut Chance::of("presliding", 1);
+                    let course = lab.course(Motion::SlowSines, seed);
+                    band(&course.logged(&lab.machine, &lab.sensing, seed), |r, k| {
+                        r.clean[k][joint]
+                    })
+                };
+                let ideal = along(lab);
+                let (mut low, mut high) = (1e-4_f64, 0.1_f64);
                 for _ in 0..9 {
                     let way = (low * high).sqrt();
                     let friction = &mut lab.machine.plant.friction[joint];
@@ -183,13 +192,8 @@ impl Member {
                         stiffness,
                         damping: 0.0,
                     };
-                    let seed = &mut Chance::of("presliding", 1);
-                    let with = lab.course(Motion::SlowSines, seed).logged(
-                        &lab.machine,
-                        &lab.sensing,
-                        seed,
-                    );
-                    let left = beside(&band(&with, |r, k| r.clean[k][joint]), &declared(&with));
+                    let left: Vec<f64> =
+                        along(lab).iter().zip(&ideal).map(|(a, b)| a - b).collect();
                     if rms(&left) > size * rms(&noise) {
                         high = way
                     } else {

@@ -1,5 +1,6 @@
 //! The plants obey physics: closed forms, energy, order of the steps, and a stick that holds.
 
+use cft_ident_studies::added::{Added, Shape};
 use cft_ident_studies::arms;
 use cft_ident_studies::chain::{JOINTS, Joints};
 use cft_ident_studies::friction::{Friction, Law};
@@ -263,4 +264,23 @@ fn a_bristle_yields_in_proportion_and_then_slides_at_the_level() {
         "{}",
         state.v[0] - before
     );
+}
+
+#[test]
+fn a_joint_that_turns_again_and_again_does_not_stop_the_others() {
+    let mut plant = arm(Law::Coulomb);
+    // gravity moves it, and what it meets when it moves throws it back
+    plant.added = vec![Added {
+        joint: 1,
+        shape: Shape::Coupling { other: 1 },
+        size: 1e9,
+    }];
+    let mut s = plant.at_rest([0.3; JOINTS]);
+    s.v[4] = 0.5;
+    s.contact[4] = Contact::Slides(1.0);
+    for _ in 0..20 {
+        let before = s.q[4];
+        plant.step(&mut s, &[0.0; JOINTS], 5e-5);
+        assert!(s.q[4] > before || s.v[4] <= 0.0, "{} at {}", s.q[4], s.t);
+    }
 }
