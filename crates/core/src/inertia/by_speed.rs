@@ -70,32 +70,55 @@ impl BySpeed {
         self.classes.iter().filter(|class| class.square > 0.0)
     }
 
-    /// Mean square of the residual's level in the classes, beyond what noise of this variance of a row makes of it
-    /// \[N^2 or (Nm)^2\].
-    pub(super) fn departure(&self, theta: &DVector<f64>, noise: f64) -> f64 {
-        let (mut rows, mut sum) = (0.0, 0.0);
+    /// Mean squares of the residual's level in the classes, beyond what noise of this variance of a row makes of it.
+    pub(super) fn departure(&self, theta: &DVector<f64>, noise: f64) -> Departure {
+        let level = |class: &Class| {
+            let each = class.product.iter().zip(theta.iter());
+            let fitted: f64 = each.map(|(x, p)| x * p).sum();
+            (class.product.last().copied().unwrap_or(0.0) - fitted) / class.square
+        };
+        let (mut level_sum, mut rows) = (0.0, 0.0);
         for class in self.filled() {
-            let fitted: f64 = class
-                .product
-                .iter()
-                .zip(theta.iter())
-                .map(|(x, p)| x * p)
-                .sum();
-            let residual = class.product.last().copied().unwrap_or(0.0) - fitted;
+            level_sum += level(class).powi(2) * class.square - noise;
             rows += class.square;
-            sum += residual * residual / class.square - noise;
         }
-        if rows > 0.0 {
-            (sum / rows).max(0.0)
-        } else {
-            0.0
+        // a constant torque is a level of either sign in the two directions
+        let (forward, backward) = self.classes.split_at(self.classes.len() / 2);
+        let (mut constant_sum, mut paired) = (0.0, 0.0);
+        for (a, b) in forward.iter().zip(backward) {
+            if a.square > 0.0 && b.square > 0.0 {
+                let by_noise = noise * (1.0 / a.square + 1.0 / b.square);
+                constant_sum +=
+                    (a.square + b.square) * ((level(a) - level(b)).powi(2) - by_noise) / 4.0;
+                paired += a.square + b.square;
+            }
+        }
+        let mean = |sum: f64, rows: f64| {
+            if rows > 0.0 {
+                (sum / rows).max(0.0)
+            } else {
+                0.0
+            }
+        };
+        Departure {
+            level: mean(level_sum, rows),
+            constant: mean(constant_sum, paired),
         }
     }
 }
 
+/// How far friction departs from its law over the speed, as mean squares \[N^2 or (Nm)^2\].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Departure {
+    /// Of the torque against the motion.
+    pub level: f64,
+    /// Of what is the same in both directions.
+    pub constant: f64,
+}
+
 /// Where a joint's speed and its Coulomb term stand in its row.
 pub(super) struct Place {
-    viscous: usize,
+    pub viscous: usize,
     pub coulomb: usize,
     rest_speed: f64,
 }

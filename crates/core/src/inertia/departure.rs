@@ -4,7 +4,7 @@
 //! the residual has a mean at each speed: the level of friction is only known to within that departure, and inertias
 //! take up a part of it. A fit with a level of friction of its own in each class of speed shows which part.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2};
 
 use super::accumulate::{BlockFactors, JointFactor};
 use super::by_speed::Place;
@@ -14,8 +14,12 @@ use super::solve::{Fit, weights_of};
 /// Ridge of the fit with free levels, over the diagonal: rounding alone.
 const RIDGE: f64 = 1e-9;
 
-/// Adds to a fit's covariance how far friction departs from its law: that departure to the variance of each Coulomb
-/// term, and to the parameters that joints share what a fit with free levels of friction changes in them.
+/// Directions of motion: each shows a departure of its own, however many rows hold it.
+const DIRECTIONS: f64 = 2.0;
+
+/// Adds to a fit's covariance how far friction departs from its law: to Coulomb and viscous terms what such departures
+/// make of a line through the levels at all speeds, to a constant torque what is the same in both directions, and to the
+/// parameters that joints share what a fit with free levels of friction changes in them.
 pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
     let columns = &sums.columns;
     let correlated = fit.rows as f64 / fit.effective_rows.max(1.0);
@@ -25,8 +29,23 @@ pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
         };
         let noise = fit.residual_std[j].powi(2) * correlated;
         let own = sums.own_unknowns(&fit.theta, j);
-        let unknown = columns.unknown(j, place.coulomb);
-        fit.covariance[(unknown, unknown)] += by_speed.departure(&own, noise);
+        let departure = by_speed.departure(&own, noise);
+        let (square, _) = products(&sums.parts(&sums.joint(j), j), columns.unknowns_of(j));
+        let line = [place.coulomb, place.viscous];
+        let normal = Matrix2::from_fn(|a, b| square[(line[a], line[b])]);
+        if let Some(inverse) = normal.try_inverse() {
+            let of_line = inverse * (departure.level * normal[(0, 0)] / DIRECTIONS);
+            for a in 0..2 {
+                for b in 0..2 {
+                    let at = [a, b].map(|k| columns.unknown(j, line[k]));
+                    fit.covariance[(at[0], at[1])] += of_line[(a, b)];
+                }
+            }
+        }
+        if let Some(offset) = columns.own[j].iter().position(|own| *own == Own::Offset) {
+            let unknown = columns.first_own(j) + offset;
+            fit.covariance[(unknown, unknown)] += departure.constant;
+        }
     }
     if let Some(change) = change_by_levels(sums, fit, correlated) {
         fit.covariance.ger(1.0, &change, &change, 1.0);
