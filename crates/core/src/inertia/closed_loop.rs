@@ -139,7 +139,9 @@ impl<'a> ClosedLoop<'a> {
                     sum[0] += size * t;
                     sum[1] += size * (1.0 - t * t) / width;
                 }
-                Own::Offset | Own::Saturating(_) | Own::Law(_) => sum[0] += size * own.column(v),
+                Own::Offset | Own::Saturating(_) | Own::Law(_) | Own::TorqueRate => {
+                    sum[0] += size * own.column(v)
+                }
             }
         }
         sum

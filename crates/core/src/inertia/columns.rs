@@ -19,6 +19,8 @@ pub enum Own {
     /// Change of the parameter of this index of a friction law (order of [`DoubleTanh::NAMES`]);
     /// the law's gradient is its column.
     Law(usize),
+    /// What the torque changes over a sample: a torque that is logged late or early, in samples.
+    TorqueRate,
 }
 
 impl Own {
@@ -30,6 +32,7 @@ impl Own {
             Own::Offset => "offset",
             Own::Saturating(_) => "coulomb",
             Own::Law(k) => DoubleTanh::NAMES[k],
+            Own::TorqueRate => "torque rate",
         }
     }
 
@@ -41,7 +44,7 @@ impl Own {
             Own::Coulomb => sign(v),
             Own::Offset => 1.0,
             Own::Saturating(slope) => (slope * v).tanh(),
-            Own::Law(_) => 0.0,
+            Own::Law(_) | Own::TorqueRate => 0.0,
         }
     }
 }
@@ -228,6 +231,26 @@ impl RegressorColumns {
             }
             out[at] = b;
             end = first;
+        }
+    }
+
+    /// The same columns with a torque's rate of its own for each joint, the last of its own terms.
+    pub fn with_torque_rates(&self) -> RegressorColumns {
+        let mut columns = self.clone();
+        columns
+            .own
+            .iter_mut()
+            .for_each(|own| own.push(Own::TorqueRate));
+        columns
+    }
+
+    /// Fills in what the torques change over a sample.
+    pub(super) fn fill_torque_rates(&self, sample: &MotionSample<'_>, out: &mut [f64]) {
+        for (j, own) in self.own.iter().enumerate() {
+            for k in (0..own.len()).filter(|k| own[*k] == Own::TorqueRate) {
+                let [before, after] = sample.tau_beside.map(|tau| tau[j]);
+                out[self.offset(j) + self.shared + k] = (after - before) / 2.0;
+            }
         }
     }
 

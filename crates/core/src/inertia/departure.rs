@@ -89,29 +89,47 @@ fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<D
     if kept.len() == u {
         return None;
     }
-    let scale: Vec<f64> = kept.iter().map(|i| normal[(*i, *i)].sqrt()).collect();
-    let scaled = DMatrix::from_fn(kept.len(), kept.len(), |a, b| {
-        normal[(kept[a], kept[b])] / (scale[a] * scale[b]) + if a == b { RIDGE } else { 0.0 }
-    });
-    let inverse = scaled.cholesky()?.inverse();
-    let right = DVector::from_fn(kept.len(), |a, _| target[kept[a]] / scale[a]);
-    let solved = &inverse * right;
+    let inverse = inverse_scaled(&DMatrix::from_fn(kept.len(), kept.len(), |a, b| {
+        normal[(kept[a], kept[b])]
+    }))?;
+    let solved = &inverse * DVector::from_fn(kept.len(), |a, _| target[kept[a]]);
     let mut change = DVector::zeros(u);
     for (a, &i) in kept
         .iter()
         .enumerate()
         .filter(|(_, i)| **i < columns.shared)
     {
-        let moved = solved[a] / scale[a] - fit.theta[i];
-        let by_noise = (inverse[(a, a)] / (scale[a] * scale[a]) - fit.textbook[(i, i)]).max(0.0);
+        let moved = solved[a] - fit.theta[i];
+        let by_noise = (inverse[(a, a)] - fit.textbook[(i, i)]).max(0.0);
         let beyond = (moved * moved - by_noise * correlated).max(0.0);
         change[i] = beyond.sqrt().copysign(moved);
     }
     Some(change)
 }
 
+/// Inverse of normal equations, by columns of one size; what no row determines, with a diagonal of 0, stays 0.
+pub(super) fn inverse_scaled(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = normal
+        .diagonal()
+        .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+    let scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |a, b| {
+        let ridge = if a != b {
+            0.0
+        } else if scale[a] > 0.0 {
+            RIDGE
+        } else {
+            1.0
+        };
+        normal[(a, b)] * scale[a] * scale[b] + ridge
+    });
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(normal.nrows(), normal.ncols(), |a, b| {
+        inverse[(a, b)] * scale[a] * scale[b]
+    }))
+}
+
 /// X'X and X't of a joint.
-fn products(factor: &JointFactor, unknowns: usize) -> (DMatrix<f64>, DVector<f64>) {
+pub(super) fn products(factor: &JointFactor, unknowns: usize) -> (DMatrix<f64>, DVector<f64>) {
     let x = factor.r.columns(0, unknowns);
     let t = factor.r.column(factor.r.ncols() - 1);
     (x.tr_mul(&x), x.tr_mul(&t))

@@ -2,7 +2,7 @@
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
 //! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is, `standstill` whether rows at rest count, and
-//! `departure` how far friction departs from its law (from sums `by_speed`). `robust`,
+//! `departure` how far friction departs from its law (from sums `by_speed`), `late` what a torque that is logged late changes. `robust`,
 //! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
 //! several times; `condense` makes of a log what a file of reduced logs holds, one R factor and `scores`; `essential`
 //! and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque channel is at its joint.
@@ -21,6 +21,7 @@ pub mod feasible;
 pub mod gains;
 pub mod instruments;
 pub mod jumps;
+pub mod late;
 pub mod law_start;
 pub mod refine;
 pub mod robust;
@@ -77,6 +78,7 @@ pub fn accumulate_weighted<E>(
         columns.channels(),
         &|s, out| {
             columns.fill(robot, s.q, s.v, s.a, s.tau, out);
+            columns.fill_torque_rates(s, out);
             columns.weigh(s, out);
         },
         &mut |row| {

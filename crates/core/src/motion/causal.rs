@@ -205,6 +205,7 @@ impl Chain {
                 v: &self.v,
                 a: &self.a,
                 tau: &self.ring[middle + n..middle + 2 * n],
+                tau_beside: [&self.ring[middle + n..middle + 2 * n]; 2],
             },
             begins: self.count == self.settle + 1,
         };

@@ -73,6 +73,8 @@ pub struct MotionSample<'a> {
     pub a: &'a [f64],
     /// The log's torque channels, unfiltered, brought to the time of q [N, Nm, or V if so logged].
     pub tau: &'a [f64],
+    /// The same of the samples before and after it; at an end of the stretch, and where rows come one by one, its own.
+    pub tau_beside: [&'a [f64]; 2],
     /// What each joint's row weighs: 0 where it stands or turns, 1 where it moves, and 1 where no speed of rest is given.
     pub weight: &'a [f64],
     /// Whether each joint rests for longer than a row lasts, somewhere in what is filtered with this sample.

@@ -203,12 +203,14 @@ impl FilterWindow {
 
     fn sample(&self, k: usize, joints: usize) -> MotionSample<'_> {
         let row = k * joints..(k + 1) * joints;
+        let torques = |k: usize| &self.tau[k * joints..(k + 1) * joints];
         MotionSample {
             t: self.t[k],
             q: &self.q[row.clone()],
             v: &self.v[row.clone()],
             a: &self.a[row.clone()],
-            tau: &self.tau[row.clone()],
+            tau: torques(k),
+            tau_beside: [k.saturating_sub(1), (k + 1).min(self.t.len() - 1)].map(torques),
             weight: &self.weight[row],
             rests: &self.rests,
         }

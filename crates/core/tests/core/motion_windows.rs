@@ -143,7 +143,8 @@ fn whole(log: &Log, stretches: &[usize], settings: &FilterSettings, dt: f64) -> 
                 q: &q[row.clone()],
                 v: &v[row.clone()],
                 a: &a[row.clone()],
-                tau: &tau[row],
+                tau: &tau[row.clone()],
+                tau_beside: [&tau[row.clone()], &tau[row]],
                 weight: &[1.0; JOINTS],
                 rests: &[false; JOINTS],
             };

@@ -15,6 +15,7 @@ use cft_ident_core::inertia::departure;
 use cft_ident_core::inertia::encoder::{GRIDS, add_scatter};
 use cft_ident_core::inertia::feasible::nearest;
 use cft_ident_core::inertia::instruments::{self, Instrumental};
+use cft_ident_core::inertia::late;
 use cft_ident_core::inertia::law_start;
 use cft_ident_core::inertia::refine::{self, RefinedFit};
 use cft_ident_core::inertia::robust::{self, Robust, Weigher};
@@ -391,7 +392,13 @@ fn widen(
             let (sums, _) = passes.read_instruments(PositionFilter::Narrower, read, simulated)?;
             instruments::again(read, found, &sums)?
         }
-        _ => {
+        Solver::Linear(_) => {
+            let rates = read.with_torque_rates();
+            let sums = passes.read(PositionFilter::Narrower, &rates, None)?;
+            late::widen_by_delay(&sums, fit);
+            solver.solve(late::without_rates(&sums), None)?
+        }
+        Solver::Refined(_) | Solver::Robust(_) => {
             let sums = passes.read(PositionFilter::Narrower, read, weigher.as_mut())?;
             solver.solve(sums, weigher.as_ref())?
         }

@@ -72,7 +72,7 @@ pub fn reduce(
         let fastest = machine.fastest(one, control)?;
         let mut passes = Passes::new(machine, one, control).each_by_itself(own.clone());
         let declared = passes.read_condensed(&linear)?;
-        let narrower = passes.read(PositionFilter::Narrower, &linear, None)?;
+        let narrower = passes.read(PositionFilter::Narrower, &linear.with_torque_rates(), None)?;
         let mut shifted = Vec::new();
         if machine.robot.transmission().encoder_steps().is_some() {
             for grid in 0..GRIDS {

@@ -451,7 +451,7 @@ fn add_reduced(
             Own::Viscous => viscous_coulomb[0],
             Own::Coulomb => viscous_coulomb[1],
             Own::Offset => model.offset[j],
-            Own::Saturating(_) | Own::Law(_) => 0.0,
+            Own::Saturating(_) | Own::Law(_) | Own::TorqueRate => 0.0,
         }));
     }
     let rows = part.rows(columns)?;
