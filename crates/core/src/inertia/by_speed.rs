@@ -77,8 +77,9 @@ impl BySpeed {
             let fitted: f64 = each.map(|(x, p)| x * p).sum();
             (class.product.last().copied().unwrap_or(0.0) - fitted) / class.square
         };
-        let (mut level_sum, mut rows) = (0.0, 0.0);
+        let (mut level_sum, mut rows, mut squares) = (0.0, 0.0, 0.0);
         for class in self.filled() {
+            squares += class.square * class.square;
             level_sum += level(class).powi(2) * class.square - noise;
             rows += class.square;
         }
@@ -103,6 +104,11 @@ impl BySpeed {
         Departure {
             level: mean(level_sum, rows),
             constant: mean(constant_sum, paired),
+            classes: if rows > 0.0 {
+                rows * rows / squares
+            } else {
+                1.0
+            },
         }
     }
 }
@@ -114,6 +120,8 @@ pub(super) struct Departure {
     pub level: f64,
     /// Of what is the same in both directions.
     pub constant: f64,
+    /// Classes that it is of: as many of one size as would scatter alike.
+    pub classes: f64,
 }
 
 /// Where a joint's speed and its Coulomb term stand in its row.

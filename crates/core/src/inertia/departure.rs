@@ -14,11 +14,9 @@ use super::solve::{Fit, weights_of};
 /// Ridge of the fit with free levels, over the diagonal: rounding alone.
 const RIDGE: f64 = 1e-9;
 
-/// Directions of motion: each shows a departure of its own, however many rows hold it.
-const DIRECTIONS: f64 = 2.0;
-
-/// Adds to a fit's covariance how far friction departs from its law: to Coulomb and viscous terms what such departures
-/// make of a line through the levels at all speeds, to a constant torque what is the same in both directions, and to the
+/// Adds to a fit's covariance how far friction departs from its law: to Coulomb and viscous terms what such departures,
+/// one of each class of speed, make of a line through the levels, and no less than themselves to the first; to a constant
+/// torque the mean of what is the same in both directions; and to the
 /// parameters that joints share what a fit with free levels of friction changes in them.
 pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
     let columns = &sums.columns;
@@ -33,18 +31,16 @@ pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
         let (square, _) = products(&sums.parts(&sums.joint(j), j), columns.unknowns_of(j));
         let line = [place.coulomb, place.viscous];
         let normal = Matrix2::from_fn(|a, b| square[(line[a], line[b])]);
-        if let Some(inverse) = normal.try_inverse() {
-            let of_line = inverse * (departure.level * normal[(0, 0)] / DIRECTIONS);
-            for a in 0..2 {
-                for b in 0..2 {
-                    let at = [a, b].map(|k| columns.unknown(j, line[k]));
-                    fit.covariance[(at[0], at[1])] += of_line[(a, b)];
-                }
-            }
+        let mut of_line = normal.try_inverse().unwrap_or_default();
+        of_line *= departure.level * normal[(0, 0)] / departure.classes;
+        of_line[(0, 0)] = of_line[(0, 0)].max(departure.level);
+        let at = line.map(|c| columns.unknown(j, c));
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            fit.covariance[(at[a], at[b])] += of_line[(a, b)];
         }
         if let Some(offset) = columns.own[j].iter().position(|own| *own == Own::Offset) {
             let unknown = columns.first_own(j) + offset;
-            fit.covariance[(unknown, unknown)] += departure.constant;
+            fit.covariance[(unknown, unknown)] += departure.constant / departure.classes;
         }
     }
     if let Some(change) = change_by_levels(sums, fit, correlated) {
