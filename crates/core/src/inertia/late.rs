@@ -71,3 +71,75 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
 fn own_before(j: usize, c: usize, shared: usize) -> usize {
     if c < shared { 0 } else { j }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::accumulate::Accumulator;
+    use super::super::columns::RegressorColumns;
+    use super::super::solve::{Weighting, fit};
+    use super::*;
+
+    const STEP: f64 = 0.01;
+    const TRUE: [f64; 2] = [0.012, 0.5];
+
+    /// Error of the inertia of a light joint over its standard deviation, before and after, and that after, over what a
+    /// delay of which nothing is seen would make of it; each row holds the torque of `late` samples before.
+    fn errors(late: f64) -> [f64; 3] {
+        let columns = RegressorColumns {
+            joints: 1,
+            shared: 1,
+            own: vec![vec![Own::Viscous]],
+            known: vec![None],
+            rest_speed: Vec::new(),
+        };
+        let rates = columns.with_torque_rates();
+        let motion = |t: f64| {
+            let waves = [(0.4, 3.0, 0.0), (0.2, 7.0, 1.0)];
+            let (mut v, mut a) = (0.0, 0.0);
+            for (size, w, phase) in waves {
+                v += size * w * (w * t + phase).cos();
+                a -= size * w * w * (w * t + phase).sin();
+            }
+            (v, a)
+        };
+        let torque = |k: f64| {
+            let (v, a) = motion((k - late) * STEP);
+            TRUE[0] * a + TRUE[1] * v + 0.005 * (k * k * 0.7).sin()
+        };
+        let mut plain = Accumulator::new(columns, 0.1);
+        let mut with = Accumulator::new(rates, 0.1);
+        for k in 0..4000 {
+            let k = f64::from(k);
+            let (v, a) = motion(k * STEP);
+            let rate = (torque(k + 1.0) - torque(k - 1.0)) / 2.0;
+            plain.add(0, STEP, &[a, v, torque(k), torque(k)]);
+            with.add(0, STEP, &[a, v, rate, torque(k), torque(k)]);
+        }
+        let with = with.finish();
+        let mut found = fit(&plain.finish(), Weighting::Wls).unwrap();
+        let same = fit(&without_rates(&with), Weighting::Wls).unwrap();
+        assert!((&same.theta - &found.theta).amax() < 1e-12);
+        let error = |fit: &Fit| (fit.theta[0] - TRUE[0]) / fit.covariance[(0, 0)].sqrt();
+        let before = error(&found);
+        widen_by_delay(&with, &mut found).unwrap();
+        let blind = TRUE[1] * DELAY_SAMPLES * STEP;
+        [
+            before,
+            error(&found),
+            found.covariance[(0, 0)].sqrt() / blind,
+        ]
+    }
+
+    #[test]
+    fn an_interval_holds_the_inertia_of_a_joint_whose_torque_is_logged_late() {
+        for late in [0.25, -0.5, 0.8] {
+            let [before, after, _] = errors(late);
+            assert!(
+                before.abs() > 10.0 && after.abs() < 2.0,
+                "{late}: {before} {after}"
+            );
+        }
+        let [_, after, std] = errors(0.0);
+        assert!(after.abs() < 2.0 && std < 0.3, "{after} {std}");
+    }
+}
