@@ -244,6 +244,11 @@ impl RegressorColumns {
         columns
     }
 
+    /// Whether these are columns [`Self::with_torque_rates`].
+    pub fn have_torque_rates(&self) -> bool {
+        self.own.iter().any(|own| own.contains(&Own::TorqueRate))
+    }
+
     /// Fills in what the torques change over a sample.
     pub(super) fn fill_torque_rates(&self, sample: &MotionSample<'_>, out: &mut [f64]) {
         for (j, own) in self.own.iter().enumerate() {

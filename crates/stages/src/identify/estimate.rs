@@ -392,13 +392,13 @@ fn widen(
             let (sums, _) = passes.read_instruments(PositionFilter::Narrower, read, simulated)?;
             instruments::again(read, found, &sums)?
         }
-        Solver::Linear(_) => {
+        Solver::Linear(_) if passes.have_torque_rates() => {
             let rates = read.with_torque_rates();
             let sums = passes.read(PositionFilter::Narrower, &rates, None)?;
             late::widen_by_delay(&sums, fit);
             solver.solve(late::without_rates(&sums), None)?
         }
-        Solver::Refined(_) | Solver::Robust(_) => {
+        _ => {
             let sums = passes.read(PositionFilter::Narrower, read, weigher.as_mut())?;
             solver.solve(sums, weigher.as_ref())?
         }

@@ -101,6 +101,14 @@ impl<'a> Passes<'a> {
         whole
     }
 
+    /// Whether the narrower reading of every log can have the rates of torques among its columns.
+    pub(super) fn have_torque_rates(&self) -> bool {
+        self.logs.iter().all(|log| match log {
+            Log::Reduced(part) => part.holds_torque_rates(),
+            _ => true,
+        })
+    }
+
     /// The columns of a log's rows.
     fn columns_of(&self, columns: &RegressorColumns, log: usize) -> RegressorColumns {
         let mut columns = columns.clone();

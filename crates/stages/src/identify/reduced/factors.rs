@@ -113,6 +113,11 @@ impl Factors {
         self.head.scores.len().max(self.head.blocks.len())
     }
 
+    /// Columns of the first joint's rows.
+    pub(super) fn width(&self) -> usize {
+        self.matrices.first().map_or(0, DMatrix::ncols)
+    }
+
     /// The rows of `columns`, of the log of this name.
     pub(super) fn rows(
         &self,

@@ -11,6 +11,7 @@ use super::factors::Factors;
 use crate::identify::own_settings::OwnSettings;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
+use cft_ident_core::inertia::late;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_files::config::RobotFile;
@@ -195,7 +196,17 @@ impl ReducedLog {
         &self,
         columns: RegressorColumns,
     ) -> Result<BlockFactors, ReducedError> {
-        self.readings.narrower.rows(self.name(), columns)
+        let narrower = &self.readings.narrower;
+        if self.holds_torque_rates() && !columns.have_torque_rates() {
+            let rows = narrower.rows(self.name(), columns.with_torque_rates())?;
+            return Ok(late::without_rates(&rows));
+        }
+        narrower.rows(self.name(), columns)
+    }
+
+    /// Whether its rows by the narrower filter hold the rates of torques; those of 0.2 do not.
+    pub(in crate::identify) fn holds_torque_rates(&self) -> bool {
+        self.readings.narrower.width() > self.readings.declared.width()
     }
 
     /// Its rows with positions rounded anew on a shifted grid; none of a robot whose encoders are not known.
