@@ -1,7 +1,7 @@
 #!/bin/bash
-# Two threads against one for `diagnose` and `reduce` of a log of the CFT robot (1 kHz, four joints). The serial share is by
-# the processor time of the busiest thread beside that of all, which other work of the machine does not change; the times
-# by the clock want a quiet machine. Writes docs/results/scale_threads.json.
+# Two threads against one for `diagnose` and `reduce` of a log of the CFT robot (1 kHz, four joints). The serial share is
+# what the main thread spends of all processor time, which other work of the machine does not change; the times by the
+# clock want a quiet machine. Writes docs/results/scale_threads.json.
 #   benches/scale/threads.sh [TOOL] [ROWS]       (target/release/cft-ident and 100000 where absent)
 set -euo pipefail
 tool=$(realpath "${1:-target/release/cft-ident}")
@@ -23,12 +23,12 @@ run() {
   echo "$times"
 }
 
-# serial COMMAND...: share of the processor time of two threads that one alone can spend
+# serial COMMAND...: share of the processor time that the main thread spends, while those of the pool wait
 serial() {
   perf record -q -F 499 -o "$work/perf" "$tool" "$@" -q --threads 2 > "$work/said" 2>&1
-  perf report -i "$work/perf" --sort tid --stdio 2> /dev/null | awk '
-    /^ *[0-9.]+%/ { share = $1 + 0; all += share; if (share > most) most = share }
-    END { printf "%.3f", 2 * most / all - 1 }'
+  perf script -i "$work/perf" -F pid,tid 2> /dev/null | tr / ' ' | awk '
+    NF == 2 { all++; main += $1 == $2 }
+    END { printf "%.3f", main / all }'
 }
 
 for what in diagnose reduce; do

@@ -120,3 +120,23 @@ impl Block {
         self.dq.extend(other.dq.drain(from * dq..));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_are_kept_keep_their_own_numbers() {
+        let mut block = Block {
+            t: vec![0.0, 0.1, 0.2],
+            q: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+            tau: vec![10.0, 20.0, 30.0, 40.0, 50.0, 60.0],
+            ..Block::default()
+        };
+        block.retain(|t| t != 0.1);
+        assert_eq!(block.t, [0.0, 0.2]);
+        assert_eq!(block.q, [1.0, 2.0, 5.0, 6.0]);
+        assert_eq!(block.tau, [10.0, 20.0, 50.0, 60.0]);
+        assert!(block.dq.is_empty());
+    }
+}

@@ -107,3 +107,23 @@ impl Model {
         self.theta.len() + friction + self.offset.len()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_direction_is_one_at_speed_and_smooth_between() {
+        let law = JointFriction::DoubleTanh(DoubleTanh {
+            viscous: 2.0,
+            coulomb_1: 1.5,
+            coulomb_2: -0.5,
+            slope_1: 50.0,
+            slope_2: 20.0,
+        });
+        assert!((law.direction(10.0) - 1.0).abs() < 1e-9);
+        assert!((law.direction(-10.0) + 1.0).abs() < 1e-9);
+        assert!(law.direction(1e-3) > 0.0 && law.direction(1e-3) < 0.1);
+        assert_eq!(JointFriction::None.direction(-1e-3), -1.0);
+    }
+}

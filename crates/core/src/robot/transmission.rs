@@ -243,6 +243,23 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_coordinate_that_is_a_joint_differs_from_it_by_a_constant() {
+        let direct = Transmission::default();
+        assert_eq!(direct.joint_of(2), Some((2, 0.0)));
+        let drive = Transmission::pantograph(Setup::default());
+        for (i, joint) in (0..4).filter_map(|i| Some((i, drive.joint_of(i)?))) {
+            for q in [[0.35, 0.2, 0.9, 0.8], [0.31, -0.4, 1.0, 0.6]] {
+                let x = pantograph::cartesian(&q);
+                assert!(
+                    (x[i] - q[joint.0] - joint.1).abs() < 1e-12,
+                    "{i}: {x:?} {q:?}"
+                );
+            }
+        }
+        assert_eq!(drive.joint_of(0), None);
+    }
+
+    #[test]
     fn steps_of_the_encoders_are_seen_at_the_joints_through_the_pose() {
         let drive = Transmission::pantograph(Setup::default());
         let q = [0.35, 0.2, 0.9, 0.8];
