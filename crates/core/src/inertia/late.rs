@@ -27,7 +27,7 @@ pub fn without_rates(sums: &BlockFactors) -> BlockFactors {
 }
 
 /// Adds to a fit's covariance the second moment of what delays change in it: their mean and scatter by `sums`, rows with
-/// the rates, and what is known of them before.
+/// the rates, and what is known of them before. Nothing where the rows determine no fit.
 pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
     let columns = &sums.columns;
     let (n, u) = (columns.joints, fit.theta.len());
@@ -35,7 +35,7 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
     let weights = weights_of(sums, &fit.residual_std);
     let mut normal = DMatrix::<f64>::zeros(u + n, u + n);
     let mut target = DVector::<f64>::zeros(u + n);
-    for j in 0..n {
+    for (j, weight) in weights.iter().enumerate() {
         let (x, t) = products(&sums.parts(&sums.joint(j), j), columns.unknowns_of(j));
         let last = columns.unknowns_of(j) - 1;
         // the rates stand behind all other unknowns
@@ -46,7 +46,7 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
                 columns.unknown(j, c) - own_before(j, c, columns.shared)
             }
         };
-        let w = weights[j] * weights[j];
+        let w = weight * weight;
         for a in 0..=last {
             target[place(a)] += w * t[a];
             for b in 0..=last {
