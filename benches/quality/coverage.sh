@@ -15,8 +15,11 @@ fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cargo llvm-cov --locked --no-report ${BRANCH:-} "$@"
-cargo llvm-cov report --json --summary-only --output-path "$work/coverage.json" ${BRANCH:-}
-python3 - "$work/coverage.json" "$result" "${*:-all tests}" << 'END'
+# a report is of the packages that it names
+members=(-p cft-ident)
+for crate in crates/*/; do members+=(-p "cft-ident-$(basename "$crate")"); done
+cargo llvm-cov report "${members[@]}" --json --summary-only --output-path "$work/coverage.json" ${BRANCH:-}
+python3 - "$work/coverage.json" "$result" "${*:-all tests}" "$*" << 'END'
 import json, re, sys
 from collections import defaultdict
 
@@ -38,7 +41,7 @@ def share(of, kind):
 rows = [{"crate": name, "lines": of["lines count"], "lines covered": share(of, "lines"),
          "branches covered": share(of, "branches"), "functions covered": share(of, "functions")}
         for name, of in sorted(sums.items())]
-result = {"study": f"coverage by {sys.argv[3]}", "command": "benches/quality/coverage.sh", "rows": rows}
+result = {"study": f"coverage by {sys.argv[3]}", "command": f"benches/quality/coverage.sh RESULT.json {sys.argv[4]}".strip(), "rows": rows}
 json.dump(result, open(sys.argv[2], "w"), indent=1)
 for row in rows:
     print(row)

@@ -183,6 +183,7 @@ impl Member {
                     })
                 };
                 let ideal = along(lab);
+                // below the first the plant's step is too long for a bristle
                 let (mut low, mut high) = (1e-4_f64, 0.1_f64);
                 for _ in 0..9 {
                     let way = (low * high).sqrt();

@@ -114,7 +114,7 @@ impl BySpeed {
 }
 
 /// How far friction departs from its law over the speed, as mean squares \[N^2 or (Nm)^2\].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Departure {
     /// Of the torque against the motion.
     pub level: f64,

@@ -246,15 +246,17 @@ impl RegressorColumns {
 
     /// Whether these are columns [`Self::with_torque_rates`].
     pub fn have_torque_rates(&self) -> bool {
-        self.own.iter().any(|own| own.contains(&Own::TorqueRate))
+        self.own
+            .iter()
+            .any(|own| own.last() == Some(&Own::TorqueRate))
     }
 
     /// Fills in what the torques change over a sample.
     pub(super) fn fill_torque_rates(&self, sample: &MotionSample<'_>, out: &mut [f64]) {
         for (j, own) in self.own.iter().enumerate() {
-            for k in (0..own.len()).filter(|k| own[*k] == Own::TorqueRate) {
+            if own.last() == Some(&Own::TorqueRate) {
                 let [before, after] = sample.tau_beside.map(|tau| tau[j]);
-                out[self.offset(j) + self.shared + k] = (after - before) / 2.0;
+                out[self.offset(j) + self.unknowns_of(j) - 1] = (after - before) / 2.0;
             }
         }
     }

@@ -54,8 +54,7 @@ fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<D
     let columns = &sums.columns;
     let u = columns.unknowns();
     let weights = weights_of(sums, &fit.residual_std);
-    let mut normal = DMatrix::<f64>::zeros(u, u);
-    let mut target = DVector::<f64>::zeros(u);
+    let mut equations = NormalEquations::of(u);
     let mut levels = vec![false; u];
     for (j, by_speed) in sums.by_speed.iter().enumerate() {
         let own = columns.unknowns_of(j);
@@ -66,19 +65,14 @@ fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<D
             n.ger(-1.0 / class.square, &x, &x, 1.0);
             b.axpy(-class.product.last()? / class.square, &x, 1.0);
         }
-        let w = weights[j] * weights[j];
-        for a in 0..own {
-            target[columns.unknown(j, a)] += w * b[a];
-            for c in 0..own {
-                normal[(columns.unknown(j, a), columns.unknown(j, c))] += w * n[(a, c)];
-            }
-        }
+        equations.add(&|c| columns.unknown(j, c), weights[j], &(n, b));
         let spanned = by_speed.filled().next().is_some();
         let of_friction = columns.own[j].iter().enumerate();
         for (k, _) in of_friction.filter(|(_, own)| spanned && **own != Own::Viscous) {
             levels[columns.first_own(j) + k] = true;
         }
     }
+    let NormalEquations { normal, target } = equations;
     let kept: Vec<usize> = (0..u)
         .filter(|i| !levels[*i] && normal[(*i, *i)] > 0.0)
         .collect();
@@ -101,6 +95,38 @@ fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<D
         change[i] = beyond.sqrt().copysign(moved);
     }
     Some(change)
+}
+
+/// Normal equations of the rows of several joints.
+pub(super) struct NormalEquations {
+    pub normal: DMatrix<f64>,
+    pub target: DVector<f64>,
+}
+
+impl NormalEquations {
+    /// Of so many unknowns, without rows.
+    pub(super) fn of(unknowns: usize) -> Self {
+        NormalEquations {
+            normal: DMatrix::zeros(unknowns, unknowns),
+            target: DVector::zeros(unknowns),
+        }
+    }
+
+    /// Adds X'X and X't of a joint whose rows have this weight; `place` says which unknown a column is of.
+    pub(super) fn add(
+        &mut self,
+        place: &dyn Fn(usize) -> usize,
+        weight: f64,
+        (x, t): &(DMatrix<f64>, DVector<f64>),
+    ) {
+        let w = weight * weight;
+        for a in 0..t.len() {
+            self.target[place(a)] += w * t[a];
+            for b in 0..t.len() {
+                self.normal[(place(a), place(b))] += w * x[(a, b)];
+            }
+        }
+    }
 }
 
 /// Inverse of normal equations, by columns of one size; what no row determines, with a diagonal of 0, stays 0.

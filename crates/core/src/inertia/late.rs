@@ -5,11 +5,11 @@
 //! a millisecond takes two percent off a light joint's inertia, and its residual hardly shows. The rate of each joint's
 //! torque as one more column shows how late the rows let it be; a fit without that column is wrong by as much.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::accumulate::BlockFactors;
 use super::columns::Own;
-use super::departure::{inverse_scaled, products};
+use super::departure::{NormalEquations, inverse_scaled, products};
 use super::solve::{Fit, weights_of};
 
 /// Standard deviation of a delay before the rows are asked, in samples: a command is logged with the position before
@@ -33,27 +33,19 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
     let (n, u) = (columns.joints, fit.theta.len());
     let correlated = fit.rows as f64 / fit.effective_rows.max(1.0);
     let weights = weights_of(sums, &fit.residual_std);
-    let mut normal = DMatrix::<f64>::zeros(u + n, u + n);
-    let mut target = DVector::<f64>::zeros(u + n);
+    let mut equations = NormalEquations::of(u + n);
     for (j, weight) in weights.iter().enumerate() {
-        let (x, t) = products(&sums.parts(&sums.joint(j), j), columns.unknowns_of(j));
-        let last = columns.unknowns_of(j) - 1;
+        let own = columns.unknowns_of(j);
         // the rates stand behind all other unknowns
-        let place = |c: usize| {
-            if c == last {
-                u + j
-            } else {
-                columns.unknown(j, c) - own_before(j, c, columns.shared)
-            }
+        let place = |c: usize| match c {
+            c if c == own - 1 => u + j,
+            c if c < columns.shared => c,
+            c => columns.unknown(j, c) - j,
         };
-        let w = weight * weight;
-        for a in 0..=last {
-            target[place(a)] += w * t[a];
-            for b in 0..=last {
-                normal[(place(a), place(b))] += w * x[(a, b)];
-            }
-        }
+        let rows = products(&sums.parts(&sums.joint(j), j), own);
+        equations.add(&place, *weight, &rows);
     }
+    let NormalEquations { normal, target } = equations;
     let inverse = inverse_scaled(&normal.view((0, 0), (u, u)).into_owned())?;
     let cross = normal.view((0, u), (u, n)).into_owned();
     let by_delay = &inverse * &cross;
@@ -65,11 +57,6 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
     let mean = &scatter * score / correlated;
     fit.covariance += &by_delay * (scatter + &mean * mean.transpose()) * by_delay.transpose();
     Some(())
-}
-
-/// Rates that stand before an own term of joint j.
-fn own_before(j: usize, c: usize, shared: usize) -> usize {
-    if c < shared { 0 } else { j }
 }
 
 #[cfg(test)]
