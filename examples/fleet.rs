@@ -9,7 +9,9 @@
 
 use std::error::Error;
 
-use cft_ident::identify::{Control, Log, LoggedRobot, RobotSources, TrackSource, reduce, track};
+use cft_ident::identify::{
+    Control, Dataset, Log, LoggedRobot, RobotSources, TrackSource, reduce, track,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -21,7 +23,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut sources = Vec::new();
     for (file, log) in logs.iter().enumerate() {
-        let reduced = reduce(&machine, &[Log::File(log.parse()?)], None, &control)?;
+        let reduced = reduce(
+            &Dataset::new(&machine, &[Log::File(log.parse()?)]),
+            None,
+            &control,
+        )?;
         println!("{log}: {} bytes", reduced.to_bytes()?.len());
         let parts = reduced.logs().iter().cloned();
         sources.extend(parts.map(|log| TrackSource::Part { log, file }));

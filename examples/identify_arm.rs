@@ -8,8 +8,8 @@
 use std::error::Error;
 
 use cft_ident::identify::{
-    Control, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Log, LoggedRobot, LsqSettings,
-    check_setup, diagnose, lsq, refined, validate,
+    Control, Dataset, DiagnoseEnd, DiagnoseSettings, GivenModel, Log, LoggedRobot, LsqSettings,
+    ValidateSettings, check_setup, diagnose, lsq, validate,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -23,7 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let held_out = [Log::File(format!("{log}@70..100%").parse()?)];
 
     // signs, units and zeros of the robot file against the torques
-    let setup = check_setup(&arm, &fitted, &control)?;
+    let data = Dataset::new(&arm, &fitted).with_held_out(&held_out);
+    let setup = check_setup(&data, &control)?;
     for finding in setup.report.refusals() {
         eprintln!("{robot}: {}", finding.in_words());
     }
@@ -32,16 +33,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         consistent: true, // links that can exist, beside the plain fit
         ..LsqSettings::default()
     };
-    let fit = lsq(&arm, &fitted, &settings, &control)?;
-    let model = fit.model(&arm, None);
-    let used = refined(&model, "model")?;
-    let judged = validate(
-        &arm,
-        (&used, Some(&model)),
-        &held_out,
-        &control,
-        &mut |_, _| {},
-    )?;
+    let fit = lsq(&data, &settings, &control)?;
+    let model = GivenModel::new("model", fit.model(&arm, None));
+    let unseen = Dataset::new(&arm, &held_out);
+    let settings = ValidateSettings::of(&model);
+    let judged = validate(&unseen, &settings, &control, &mut |_, _| {})?;
     for joint in &judged.validation.errors.joints {
         println!(
             "{}: misses {:.1} % of its torque",
@@ -50,15 +46,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     }
 
-    let logs = DiagnoseLogs {
-        train: &fitted,
-        veto: &[],
-        holdout: &held_out,
-    };
-    let settings = DiagnoseSettings::default();
-    let DiagnoseEnd::Diagnosed(found) =
-        diagnose(&arm, ("model", &model), &logs, &settings, &control)?
-    else {
+    let settings = DiagnoseSettings::of(&model);
+    let DiagnoseEnd::Diagnosed(found) = diagnose(&data, &settings, &control)? else {
         return Err("the log has a fault: see `cft-ident inspect`".into());
     };
     for step in found.result(&arm).steps.iter().filter(|step| step.written) {
@@ -68,6 +57,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             step.joint.as_deref().unwrap_or("all joints")
         );
     }
-    std::fs::write(output, found.model(&arm, &model).to_toml()?)?;
+    std::fs::write(output, found.model(&arm, &model.file).to_toml()?)?;
     Ok(())
 }

@@ -7,7 +7,7 @@
 
 use std::error::Error;
 
-use cft_ident::identify::{Control, FrictionSettings, Log, LoggedRobot, friction};
+use cft_ident::identify::{Control, Dataset, FrictionSettings, Log, LoggedRobot, friction};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -19,8 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
 
     let found = friction(
-        &machine,
-        &logs,
+        &Dataset::new(&machine, &logs),
         &FrictionSettings::default(),
         &Control::default(),
     )?;

@@ -12,19 +12,17 @@ use std::error::Error;
 use std::path::Path;
 
 use cft_ident::config::ModelFile;
-use cft_ident::identify::{Control, Log, LoggedRobot, payload, refined};
+use cft_ident::identify::{Control, Dataset, GivenModel, Log, payload};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [name, log] = &arguments[..] else {
         return Err("give MODEL.toml LOG".into());
     };
-    let file = ModelFile::load(Path::new(name))?;
-    let arm = LoggedRobot::of_model(name, &file);
-    let empty = refined(&file, name)?;
-    let logs = [Log::File(log.parse()?)];
+    let empty = GivenModel::new(name, ModelFile::load(Path::new(name))?);
+    let data = Dataset::new(&empty.machine(), &[Log::File(log.parse()?)]);
 
-    let found = payload(&arm, (name, &file, &empty), &logs, &Control::default())?;
+    let found = payload(&data, &empty, &Control::default())?;
     for reading in &found.readings {
         println!(
             "on {}, gains of the torques {}:",

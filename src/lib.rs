@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use cft_ident::config::RobotFile;
-//! use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq};
+//! use cft_ident::identify::{Dataset, Control, Log, LoggedRobot, LsqSettings, lsq};
 //!
 //! let arm = r#"
 //!     robot.model = "serial"
@@ -42,7 +42,7 @@
 //! # }
 //! // t [s], q [rad] and tau [Nm] are slices, row after row; Log::from takes a file instead
 //! let log = Log::of_rows("monday", &t, &q, &tau)?;
-//! let found = lsq(&arm, &[log], &LsqSettings::default(), &Control::default())?;
+//! let found = lsq(&Dataset::new(&arm, &[log]), &LsqSettings::default(), &Control::default())?;
 //! for u in &found.unknowns {
 //!     println!("{} = {:.3} +- {:.3} {}", u.key, u.fitted, u.fitted_std, u.unit);
 //! }

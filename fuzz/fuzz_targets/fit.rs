@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, DiagnoseLogs, DiagnoseSettings, Log, LoggedRobot, LsqSettings, diagnose, lsq, refined,
+    Control, Dataset, DiagnoseSettings, GivenModel, Log, LoggedRobot, LsqSettings, ValidateSettings, diagnose, lsq,
     validate,
 };
 use libfuzzer_sys::fuzz_target;
@@ -36,16 +36,13 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     let machine = LoggedRobot::new("r.toml", robot.clone());
-    let (logs, control) = (std::slice::from_ref(&log), Control::default());
-    let Ok(found) = lsq(&machine, logs, &LsqSettings::default(), &control) else {
+    let control = Control::default();
+    let data = Dataset::new(&machine, std::slice::from_ref(&log));
+    let Ok(found) = lsq(&data, &LsqSettings::default(), &control) else {
         return;
     };
     let file = found.model(&machine, None);
-    let Ok(model) = refined(&file, "m.toml") else {
-        return;
-    };
-    let _ = validate(&machine, (&model, Some(&file)), logs, &control, &mut |_, _| {});
-    let roles = DiagnoseLogs { train: logs, veto: &[], holdout: &[] };
-    let settings = DiagnoseSettings::default();
-    let _ = diagnose(&machine, ("m.toml", &file), &roles, &settings, &control);
+    let given = GivenModel::new("m.toml", file);
+    let _ = validate(&data, &ValidateSettings::of(&given), &control, &mut |_, _| {});
+    let _ = diagnose(&data, &DiagnoseSettings::of(&given), &control);
 });

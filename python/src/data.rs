@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use cft_ident::config::{ModelFile, RobotFile};
-use cft_ident::identify::{self, LoggedRobot, ReducedLogs, is_reduced};
+use cft_ident::identify::{self, GivenModel, LoggedRobot, ReducedLogs, is_reduced};
 use cft_ident::log::{LogSpec, Provenance};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -133,8 +133,7 @@ impl Log {
 /// A model file.
 #[pyclass(frozen, module = "cft_ident._native")]
 pub struct Model {
-    pub name: String,
-    pub file: ModelFile,
+    pub given: GivenModel,
     pub text: String,
 }
 
@@ -142,14 +141,13 @@ impl Model {
     pub fn of(name: &str, file: ModelFile) -> PyResult<Self> {
         let text = file.to_toml().map_err(of_input)?;
         Ok(Model {
-            name: name.to_owned(),
-            file,
+            given: GivenModel::new(name, file),
             text,
         })
     }
 
     pub fn provenance(&self) -> Provenance {
-        Provenance::of_text(&self.name, &self.text)
+        Provenance::of_text(&self.given.name, &self.text)
     }
 }
 
@@ -160,8 +158,7 @@ impl Model {
         let text = cft_ident::config::text(Path::new(path)).map_err(of_input)?;
         let file = ModelFile::parse_in(path, &text, Path::new(path).parent()).map_err(of_input)?;
         Ok(Model {
-            name: path.to_owned(),
-            file,
+            given: GivenModel::new(path, file),
             text: text.to_string(),
         })
     }
@@ -170,15 +167,14 @@ impl Model {
     fn parse(text: &str, name: &str) -> PyResult<Self> {
         let file = ModelFile::parse(name, text).map_err(of_input)?;
         Ok(Model {
-            name: name.to_owned(),
-            file,
+            given: GivenModel::new(name, file),
             text: text.to_owned(),
         })
     }
 
     #[getter]
     fn name(&self) -> &str {
-        &self.name
+        &self.given.name
     }
 
     /// The file as TOML.
@@ -189,24 +185,25 @@ impl Model {
 
     #[getter]
     fn joints(&self) -> Vec<String> {
-        self.file.robot.joint_names()
+        self.given.file.robot.joint_names()
     }
 
     /// Name, joint, value, standard deviation, value in use and unit of every parameter.
     #[getter]
     fn parameters(&self) -> Vec<(String, Option<String>, f64, Option<f64>, f64, String)> {
-        let shown = self.file.parameters.iter();
-        shown.map(|p| {
-            (
-                p.name.clone(),
-                p.joint.clone(),
-                p.value,
-                p.std,
-                p.in_use(),
-                p.unit.clone(),
-            )
-        })
-        .collect()
+        let shown = self.given.file.parameters.iter();
+        shown
+            .map(|p| {
+                (
+                    p.name.clone(),
+                    p.joint.clone(),
+                    p.value,
+                    p.std,
+                    p.in_use(),
+                    p.unit.clone(),
+                )
+            })
+            .collect()
     }
 }
 

@@ -4,7 +4,6 @@ use cft_ident::effect::AugmentedModel;
 use cft_ident::effect::as_code::EffectsCode;
 use cft_ident::export::Program;
 use cft_ident::export::dissipative::joint_friction as friction_of;
-use cft_ident::identify::refined;
 use cft_ident::motion::Stretch;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -18,7 +17,7 @@ type Rows<'py> = PyReadonlyArray2<'py, f64>;
 
 /// A model with its effects.
 fn model_of(model: &Model) -> PyResult<AugmentedModel> {
-    refined(&model.file, &model.name).map_err(of_stage)
+    model.given.numbers().map_err(of_stage)
 }
 
 /// Rows of `n` joints.
@@ -116,7 +115,7 @@ pub fn regressor<'py>(
     v: Rows<'py>,
     a: Rows<'py>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let robot = model.file.robot.robot();
+    let robot = model.given.file.robot.robot();
     let (n, p) = (robot.joints(), robot.parameters().len());
     let each = [rows(&q, n, "q")?, rows(&v, n, "v")?, rows(&a, n, "a")?];
     let count = together(&each.map(<[f64]>::len))? / n.max(1);
@@ -147,7 +146,7 @@ pub fn joint_friction<'py>(
 #[pyfunction]
 pub fn rest_speeds(model: PyRef<'_, Model>) -> PyResult<Vec<f64>> {
     let mut program = Program::of(&model_of(&model)?.model);
-    program.rest_by(&model.file.robot);
+    program.rest_by(&model.given.file.robot);
     Ok(program.rest)
 }
 
@@ -184,7 +183,7 @@ pub fn covariance<'py>(
     py: Python<'py>,
     model: PyRef<'py, Model>,
 ) -> PyResult<Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>> {
-    let Some(found) = &model.file.covariance else {
+    let Some(found) = &model.given.file.covariance else {
         return Ok(None);
     };
     let u = found.names.len();

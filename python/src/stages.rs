@@ -7,8 +7,8 @@ use std::sync::atomic::AtomicBool;
 use cft_ident::cli;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
-    self, Control, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, FrictionSettings, LoggedRobot,
-    LsqSettings, ReducedLogs, RobotSources, TrackSource, check_setup, refined,
+    self, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings, LoggedRobot,
+    LsqSettings, ReducedLogs, RobotSources, TrackSource, ValidateSettings, check_setup,
 };
 use cft_ident::report::json::Document;
 use cft_ident::report::{Report, stages};
@@ -19,9 +19,9 @@ use crate::errors::{InputError, UsageError, of_command, of_input, of_stage};
 use crate::work;
 
 /// Document as JSON, page as HTML, text for a terminal.
-type Told = (String, String, String);
+type Shown = (String, String, String);
 
-fn told(document: &Document, report: &Report) -> Told {
+fn shown(document: &Document, report: &Report) -> Shown {
     (document.text(), report.html(), report.text())
 }
 
@@ -29,7 +29,7 @@ fn all(logs: &[PyRef<'_, Log>]) -> Vec<identify::Log> {
     logs.iter().flat_map(|log| log.logs.clone()).collect()
 }
 
-/// What the check of the set-up found, and what it tells.
+/// Findings of the check of the set-up, and its warnings.
 #[derive(Default)]
 struct Checked {
     findings: Vec<cft_ident::setup::Finding>,
@@ -37,16 +37,14 @@ struct Checked {
 }
 
 /// Refuses a set-up that the torques plainly contradict, as the commands do.
-fn checked(machine: &LoggedRobot, logs: &[identify::Log], control: &Control) -> PyResult<Checked> {
-    // logs that cannot be checked are told by the fit itself
-    let report = check_setup(machine, logs, control)
-        .unwrap_or_default()
-        .report;
+fn checked(data: &Dataset, control: &Control) -> PyResult<Checked> {
+    // of logs that cannot be checked the fit itself says why
+    let report = check_setup(data, control).unwrap_or_default().report;
     control.check().map_err(of_stage)?;
     if let Some(finding) = report.refusals().next() {
         return Err(InputError::new_err(format!(
             "{}: the torques contradict the robot file: {}; or go on without by as_declared=True",
-            machine.name,
+            data.machine.name,
             finding.in_words()
         )));
     }
@@ -94,17 +92,17 @@ pub fn friction(
     joint: Option<String>,
     model: Option<PyRef<'_, Model>>,
     as_declared: bool,
-) -> PyResult<(Told, Model)> {
+) -> PyResult<(Shown, Model)> {
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
-    let old = model.map(|m| m.file.clone());
+    let old = model.map(|m| m.given.file.clone());
     work::run(py, move |control, _| {
+        let data = Dataset::new(&machine, &logs);
         let setup = match as_declared {
             true => Checked::default(),
-            false => checked(&machine, &logs, control)?,
+            false => checked(&data, control)?,
         };
         let settings = FrictionSettings { joint };
-        let mut found =
-            identify::friction(&machine, &logs, &settings, control).map_err(of_stage)?;
+        let mut found = identify::friction(&data, &settings, control).map_err(of_stage)?;
         found.setup = setup.findings;
         found.warnings.splice(0..0, setup.warnings);
         let model = found.model(&machine, old.as_ref());
@@ -117,8 +115,8 @@ pub fn friction(
             path: "friction.toml",
             logs: &names,
         });
-        let told = told(&document.map_err(of_input)?, &report);
-        Ok((told, Model::of("friction.toml", model)?))
+        let shown = shown(&document.map_err(of_input)?, &report);
+        Ok((shown, Model::of("friction.toml", model)?))
     })
 }
 
@@ -152,35 +150,38 @@ pub fn lsq(
     unconstrained: bool,
     hold_friction: bool,
     as_declared: bool,
-) -> PyResult<(Told, Model)> {
+) -> PyResult<(Shown, Model)> {
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
     let kind = self::estimator(estimator)?;
-    let friction = model.map(|m| (m.name.clone(), m.file.clone()));
+    let friction = model.map(|m| m.given.clone());
     if friction.is_none() && machine.file.needs_friction_first() {
         return Err(UsageError::new_err(
             "lsq needs the friction of every joint; give a model of it, or set `fitted_with_inertias = true` in [friction] of the robot file",
         ));
     }
     work::run(py, move |control, _| {
-        let friction = friction.as_ref().map(|(name, file)| (name.as_str(), file));
-        if let Some((name, file)) = friction {
-            file.belongs_to(name, &machine.file).map_err(of_input)?;
+        if let Some(given) = &friction {
+            given
+                .file
+                .belongs_to(&given.name, &machine.file)
+                .map_err(of_input)?;
         }
+        let data = Dataset::new(&machine, &logs);
         let setup = match as_declared {
             true => Checked::default(),
-            false => checked(&machine, &logs, control)?,
+            false => checked(&data, control)?,
         };
         let settings = LsqSettings {
             estimator: kind,
             consistent: !unconstrained,
-            friction,
+            friction: friction.as_ref(),
             hold_friction,
-            gains: None,
+            ..LsqSettings::default()
         };
-        let mut found = identify::lsq(&machine, &logs, &settings, control).map_err(of_stage)?;
+        let mut found = identify::lsq(&data, &settings, control).map_err(of_stage)?;
         found.setup.splice(0..0, setup.findings);
         found.warnings.splice(0..0, setup.warnings);
-        let model = found.model(&machine, friction.map(|f| f.1));
+        let model = found.model(&machine, friction.as_ref().map(|given| &given.file));
         let document = Document::new("lsq", &found.inputs, &found.warnings, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::lsq::lsq(&stages::lsq::Lsq {
@@ -191,8 +192,8 @@ pub fn lsq(
             logs: &names,
             typed: "LOG",
         });
-        let told = told(&document.map_err(of_input)?, &report);
-        Ok((told, Model::of("model.toml", model)?))
+        let shown = shown(&document.map_err(of_input)?, &report);
+        Ok((shown, Model::of("model.toml", model)?))
     })
 }
 
@@ -202,35 +203,30 @@ pub fn validate(
     py: Python<'_>,
     model: PyRef<'_, Model>,
     logs: Vec<PyRef<'_, Log>>,
-) -> PyResult<Told> {
-    let (name, file, provenance) = (model.name.clone(), model.file.clone(), model.provenance());
+) -> PyResult<Shown> {
+    let (given, provenance) = (model.given.clone(), model.provenance());
     let logs = all(&logs);
     work::run(py, move |control, _| {
-        let augmented = refined(&file, &name).map_err(of_stage)?;
-        let machine = LoggedRobot::new(&name, file.robot.clone());
-        let found = identify::validate(
-            &machine,
-            (&augmented, Some(&file)),
-            &logs,
-            control,
-            &mut |_, _| {},
-        );
-        let mut found = found.map_err(of_stage)?;
-        let inputs = (&logs[..], &found.inputs[..]);
-        found.free_run =
-            identify::free_run(&machine, &augmented, inputs, control).map_err(of_stage)?;
+        let augmented = given.numbers().map_err(of_stage)?;
+        let data = Dataset::new(&given.machine(), &logs);
+        let settings = ValidateSettings {
+            free_run: true,
+            ..ValidateSettings::of(&given)
+        };
+        let found = identify::validate(&data, &settings, control, &mut |_, _| {});
+        let found = found.map_err(of_stage)?;
         let document = Document::new("validate", &found.inputs, &found.warnings, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::validate::validate(&stages::validate::Validate {
-            machine: &machine,
-            file: &file,
+            machine: &data.machine,
+            file: &given.file,
             model: &augmented,
             logs: &names,
             found: &found,
             limit: None,
             given: &provenance,
         });
-        Ok(told(&document.map_err(of_input)?, &report))
+        Ok(shown(&document.map_err(of_input)?, &report))
     })
 }
 
@@ -243,36 +239,33 @@ pub fn diagnose(
     veto: Vec<PyRef<'_, Log>>,
     holdout: Vec<PyRef<'_, Log>>,
     keep: bool,
-) -> PyResult<(Told, Option<Model>)> {
-    let (name, file, given) = (model.name.clone(), model.file.clone(), model.provenance());
+) -> PyResult<(Shown, Option<Model>)> {
+    let (of, given) = (model.given.clone(), model.provenance());
     let (train, veto, holdout) = (all(&logs), all(&veto), all(&holdout));
     work::run(py, move |control, _| {
-        let machine = LoggedRobot::new(&name, file.robot.clone());
-        let logs = DiagnoseLogs {
-            train: &train,
-            veto: &veto,
-            holdout: &holdout,
-        };
+        let (machine, file) = (of.machine(), &of.file);
+        let data = Dataset::new(&machine, &train)
+            .with_veto(&veto)
+            .with_held_out(&holdout);
         let settings = DiagnoseSettings {
             keep,
-            ..DiagnoseSettings::default()
+            ..DiagnoseSettings::of(&of)
         };
-        let of = (name.as_str(), &file);
-        let end = identify::diagnose(&machine, of, &logs, &settings, control).map_err(of_stage)?;
+        let end = identify::diagnose(&data, &settings, control).map_err(of_stage)?;
         match end {
             DiagnoseEnd::DataFault(fault) => {
                 let document = Document::new("diagnose", &[], &[], &fault.result());
                 let report = stages::diagnose::data_fault(&fault, &given);
-                Ok((told(&document.map_err(of_input)?, &report), None))
+                Ok((shown(&document.map_err(of_input)?, &report), None))
             }
             DiagnoseEnd::Diagnosed(found) => {
                 let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
                 let result = found.result(&machine);
                 let document = Document::new("diagnose", inputs, warnings, &result);
-                let refined = found.model(&machine, &file);
+                let refined = found.model(&machine, file);
                 let report = stages::diagnose::diagnose(&stages::diagnose::Diagnose {
                     machine: &machine,
-                    file: &file,
+                    file,
                     given: &given,
                     found: &found,
                     refined: &refined,
@@ -280,7 +273,7 @@ pub fn diagnose(
                     logs: "LOG",
                 });
                 let model = Model::of("refined.toml", refined)?;
-                Ok((told(&document.map_err(of_input)?, &report), Some(model)))
+                Ok((shown(&document.map_err(of_input)?, &report), Some(model)))
             }
         }
     })
@@ -297,13 +290,13 @@ pub fn reduce(
     as_declared: bool,
 ) -> PyResult<Part> {
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
-    let friction = model.map(|m| (m.name.clone(), m.file.clone()));
+    let friction = model.map(|m| m.given.clone());
     work::run(py, move |control, _| {
-        let friction = friction.as_ref().map(|(name, file)| (name.as_str(), file));
+        let data = Dataset::new(&machine, &logs);
         if !as_declared {
-            checked(&machine, &logs, control)?;
+            checked(&data, control)?;
         }
-        let found = identify::reduce(&machine, &logs, friction, control).map_err(of_stage)?;
+        let found = identify::reduce(&data, friction.as_ref(), control).map_err(of_stage)?;
         Ok(Part {
             logs: Arc::new(found),
         })
@@ -325,7 +318,7 @@ pub fn merge(parts: Vec<PyRef<'_, Part>>) -> PyResult<Part> {
 pub fn track(
     py: Python<'_>,
     robots: Vec<(String, Vec<PyRef<'_, Part>>, Vec<PyRef<'_, Model>>)>,
-) -> PyResult<Told> {
+) -> PyResult<Shown> {
     let mut all = Vec::new();
     for (name, parts, models) in robots {
         let mut sources = Vec::new();
@@ -336,8 +329,8 @@ pub fn track(
             }));
         }
         sources.extend(models.iter().map(|model| TrackSource::Model {
-            name: model.name.clone(),
-            file: Box::new(model.file.clone()),
+            name: model.given.name.clone(),
+            file: Box::new(model.given.file.clone()),
             provenance: model.provenance(),
         }));
         all.push(RobotSources { name, sources });
@@ -346,6 +339,6 @@ pub fn track(
         let found = identify::track(&all, control).map_err(of_stage)?;
         let document = Document::new("track", &found.inputs, &found.warnings, &found);
         let report = stages::track::track(&found);
-        Ok(told(&document.map_err(of_input)?, &report))
+        Ok(shown(&document.map_err(of_input)?, &report))
     })
 }

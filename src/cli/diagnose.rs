@@ -11,8 +11,7 @@ use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::{provenance, quality, residual};
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{
-    self, DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, DiagnosisResult,
-    DiagnosisVerdict, LoggedRobot,
+    self, DataFault, Dataset, DiagnoseEnd, DiagnoseSettings, DiagnosisResult, DiagnosisVerdict,
 };
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
@@ -85,24 +84,22 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model, context)?;
-    let (name, file) = (given.name, given.value);
-    let machine = LoggedRobot::of_model(&name, &file);
+    let file = &given.value.file;
+    let machine = given.value.machine();
     let machine = match args.as_declared {
         true => machine.as_declared(),
         false => machine,
     };
-    let (train, veto) = (logs_of(&args.leave_out.of(&args.logs)), logs_of(&args.veto));
-    let logs = DiagnoseLogs {
-        train: &train,
-        veto: &veto,
-        holdout: &logs_of(&args.holdout),
-    };
+    let data = Dataset::new(&machine, &logs_of(&args.leave_out.of(&args.logs)))
+        .with_veto(&logs_of(&args.veto))
+        .with_held_out(&logs_of(&args.holdout));
     let own = args
         .candidates
         .as_deref()
         .map(files::candidates)
         .transpose()?;
     let settings = DiagnoseSettings {
+        model: &given.value,
         keep: args.keep,
         candidates: own.map(|given| given.value).unwrap_or_default(),
         hold_friction: args.hold_friction,
@@ -113,16 +110,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         },
     };
     let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
-    let model = (name.as_str(), &file);
     // before the logs are looked at
-    identify::check_candidates(&settings.candidates, &machine, model)?;
-    let report = setup::report(&machine, &train, context)?;
+    settings.check_candidates()?;
+    let report = setup::report(&data, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
     let refused = fault.as_ref().filter(|_| !args.as_declared);
     if let Some(fault) = refused {
         return Err(at_fault(fault));
     }
-    let end = identify::diagnose(&machine, model, &logs, &settings, context.control())?;
+    let end = identify::diagnose(&data, &settings, context.control())?;
     let setup = report.findings;
     let found = match end {
         DiagnoseEnd::Diagnosed(found) => *found,
@@ -164,11 +160,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         ..plain
     };
     let document = Document::new("diagnose", inputs, warnings, &result)?;
-    let refined = found.model(&machine, &file);
+    let refined = found.model(&machine, file);
     let written = args.output.as_ref().unwrap_or(&args.model);
     let of = stages::diagnose::Diagnose {
         machine: &machine,
-        file: &file,
+        file,
         given: &given.provenance,
         found: &found,
         refined: &refined,

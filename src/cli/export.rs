@@ -23,7 +23,7 @@ use cft_ident_files::config::{self, ModelFile, RobotFile, UrdfReplacement, repla
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, BANDWIDTH_HZ, Log, LoggedRobot};
+use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, Log};
 
 const EXAMPLE: &str = "\
 Example:
@@ -190,14 +190,18 @@ struct Along {
 }
 
 impl Along {
-    fn read(args: &Args, given: &ReadFile<ModelFile>, context: &Context) -> Result<Self, CliError> {
+    fn read(
+        args: &Args,
+        given: &ReadFile<GivenModel>,
+        context: &Context,
+    ) -> Result<Self, CliError> {
         if args.logs.is_empty() {
             return Ok(Self::default());
         }
-        let machine = LoggedRobot::new(&given.name, given.value.robot.clone());
+        let machine = given.value.machine();
         let logs: Vec<Log> = args.logs.iter().map(Log::from).collect();
         let whole = identify::read_whole(&machine, &logs, context.control())?;
-        let refined = identify::refined(&given.value, &given.name)?;
+        let refined = given.value.numbers()?;
         machine.check_temperatures(&refined, &logs, &whole.stretches)?;
         Ok(Self {
             stretches: whole.stretches,
@@ -265,7 +269,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = inputs.chain(args.urdf_source.as_deref()).collect();
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model, context)?;
-    for effect in &given.value.effects {
+    for effect in &given.value.file.effects {
         if let (Some(reason), false) = (no_torque(&effect.name), args.without_effects) {
             return Err(CliError::input(format!(
                 "{}: the effect {} cannot be a torque: {reason}",
@@ -277,15 +281,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let (refined, left_out) = match args.without_effects {
         true => {
-            let model = given.value.model(&given.name)?;
-            (AugmentedModel::plain(model), effects(&given.value))
+            let model = given.value.file.model(&given.name)?;
+            (AugmentedModel::plain(model), effects(&given.value.file))
         }
-        false => (identify::refined(&given.value, &given.name)?, Vec::new()),
+        false => (given.value.numbers()?, Vec::new()),
     };
     let model = &refined.model;
     let failed = |error: ExportError| CliError::input(error.explanation().of(&given.name));
     let mut program = Program::with_effects(&refined).map_err(failed)?;
-    program.rest_by(&given.value.robot);
+    program.rest_by(&given.value.file.robot);
     if let Some(rate_hz) = args.observer {
         if args.c.is_none() && args.rust.is_none() {
             return Err(CliError::usage("--observer belongs to --c and --rust"));
@@ -296,9 +300,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             )
             .hint("leave --without-effects out, or fit a model without effects"));
         }
-        let machine = LoggedRobot::new(&given.name, given.value.robot.clone());
-        let of = (given.name.as_str(), &given.value, &refined);
-        let recipe = identify::watch_recipe(&machine, of, 1.0 / rate_hz, args.false_alarms)?;
+        let recipe = identify::watch_recipe(&given.value, 1.0 / rate_hz, args.false_alarms)?;
         program.observer = Some(recipe);
     }
     let mut lines = vec![
@@ -316,7 +318,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let never_driving = never_driving(&program);
     lines.extend(never_driving.iter().cloned());
     let torque_units: Vec<String> = (0..program.joints.len())
-        .map(|j| given.value.robot.torque_unit(j).to_owned())
+        .map(|j| given.value.file.robot.torque_unit(j).to_owned())
         .collect();
     let along = Along::read(args, &given, context)?;
     let source = args.urdf_source.as_deref().map(source).transpose()?;
@@ -325,7 +327,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut texts: Vec<(&Path, &str, String)> = Vec::new();
     let mut beyond = Vec::new();
     if let (Some(path), Some(side)) = (&args.urdf, &side) {
-        let kept = without(&given.value, args.without_effects);
+        let kept = without(&given.value.file, args.without_effects);
         // of the model alone: effects are in the file beside it
         let arm = Arm::of(&kept, &AugmentedModel::plain(model.clone()));
         let mut beside = true;
@@ -352,7 +354,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 &arm,
                 &source.value.robot,
                 &source.name,
-                &controller_names(&given.value),
+                &controller_names(&given.value.file),
             );
             let replacement = UrdfReplacement {
                 notes: urdf_lines.clone(),
@@ -372,7 +374,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     }
     if !formats.is_empty() {
-        let arm = Arm::of(&given.value, &refined).map_err(failed)?;
+        let arm = Arm::of(&given.value.file, &refined).map_err(failed)?;
         for format in &formats {
             let says = format.says;
             let found = export::left_out::left_out(&arm, &refined, says, &along.stretches);
@@ -381,7 +383,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 let all = left_out.join(", ");
                 head.push(format!("NOT in here, though the model has it: {all}."));
             }
-            head.extend(below_zero(&given.value, model));
+            head.extend(below_zero(&given.value.file, model));
             let side = export::left_out::side_file(&found, &head, &along.names).map_err(failed)?;
             head.extend(left_out::lines(&found, &along.names, Elsewhere::Nowhere));
             head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
@@ -411,7 +413,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         texts.push((path, "Rust module", export::module::module(&program, &note)));
     }
     if let Some(path) = &args.ros2_control {
-        let of = (given.name.as_str(), &given.value, model);
+        let of = (given.name.as_str(), &given.value.file, model);
         let text = controller::ros2_control(of, args.bandwidth, &base_lines)?;
         texts.push((path, "parameters of ros2_control", text));
     }
@@ -428,7 +430,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         false => vec![format!("left out: {}", left_out.join(", "))],
     };
     if args.urdf.is_some() || !formats.is_empty() {
-        warnings.extend(below_zero(&given.value, model));
+        warnings.extend(below_zero(&given.value.file, model));
     }
     if args.c.is_some() || args.rust.is_some() {
         warnings.extend(never_driving);

@@ -7,6 +7,7 @@ use super::error::CliError;
 use cft_ident_files::config::candidates::{self, CandidateSection};
 use cft_ident_files::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
 use cft_ident_logs::log::{Provenance, escape};
+use cft_ident_stages::identify::GivenModel;
 
 /// A configuration file that was read.
 #[derive(Debug, Clone)]
@@ -42,13 +43,12 @@ pub fn robot(path: &Path) -> Result<ReadFile<RobotFile>, CliError> {
 }
 
 /// A model file; what is reported of it becomes a warning of the command.
-pub fn model(path: &Path, context: &Context) -> Result<ReadFile<ModelFile>, CliError> {
+pub fn model(path: &Path, context: &Context) -> Result<ReadFile<GivenModel>, CliError> {
     let model = read(path, Wanted::Own, |name, text| {
-        ModelFile::parse_in(name, text, path.parent())
+        let file = ModelFile::parse_in(name, text, path.parent())?;
+        Ok(GivenModel::new(name, file))
     })?;
-    model
-        .value
-        .robot
+    (model.value.file.robot)
         .notes
         .0
         .iter()
@@ -66,9 +66,9 @@ pub(crate) fn model_of(
     path: &Path,
     robot: &RobotFile,
     context: &Context,
-) -> Result<ReadFile<ModelFile>, CliError> {
+) -> Result<ReadFile<GivenModel>, CliError> {
     let model = model(path, context)?;
-    model.value.belongs_to(&model.name, robot)?;
+    model.value.file.belongs_to(&model.name, robot)?;
     Ok(model)
 }
 
@@ -78,7 +78,7 @@ pub(super) fn friction(
     path: Option<&Path>,
     robot: &RobotFile,
     context: &Context,
-) -> Result<Option<ReadFile<ModelFile>>, CliError> {
+) -> Result<Option<ReadFile<GivenModel>>, CliError> {
     if path.is_none() && robot.needs_friction_first() {
         let what = format!("{command} needs the friction of every joint");
         return Err(CliError::usage(what)

@@ -9,7 +9,7 @@ use super::{
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{self, FrictionSettings, LoggedRobot};
+use cft_ident_stages::identify::{self, Dataset, FrictionSettings, LoggedRobot};
 
 const EXAMPLE: &str = "\
 Example:
@@ -65,17 +65,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         Some(path) => {
             let model = files::model_of(path, &machine.file, context)?;
             given.push(model.provenance);
-            Some(model.value)
+            Some(model.value.file)
         }
     };
     let settings = FrictionSettings {
         joint: args.joint.clone(),
     };
-    let logs = logs_of(&args.logs);
+    let data = Dataset::new(&machine, &logs_of(&args.logs));
     let robot = Path::new(&args.robot);
-    let checked = setup::checked(machine, (robot, &[]), &logs, &args.setup, context)?;
-    let machine = &checked.machine;
-    let mut found = identify::friction(machine, &logs, &settings, context.control())?;
+    let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
+    let machine = &checked.data.machine;
+    let mut found = identify::friction(&checked.data, &settings, context.control())?;
     found.setup.clone_from(&checked.report.findings);
     found
         .warnings

@@ -20,8 +20,8 @@ use cft_ident_report::report::sections::residual;
 use cft_ident_report::report::stages;
 use cft_ident_report::report::stages::identify::ShownLogs;
 use cft_ident_stages::identify::{
-    self, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, IdentifySettings,
-    LoggedRobot, RoleLogs, StageEnd, Validated,
+    self, Dataset, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction,
+    IdentifySettings, LoggedRobot, StageEnd, Validated,
 };
 use cft_ident_stages::replay::ReplayedDiagnosis;
 use cft_ident_stages::setup::Finding;
@@ -278,11 +278,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     let mut training = logs(base, &roles.identification, &roles.started)?;
     let unseen = logs(base, &roles.validation, &roles.started)?;
     let title = names_of(&unseen).join(", ");
-    let role_logs = RoleLogs {
-        friction: logs_of(&one_joint),
-        identification: logs_of(&training),
-        validation: logs_of(&unseen),
-    };
+    let (of_friction, fitted_logs) = (logs_of(&one_joint), logs_of(&training));
     let fitted = typed::logs(training.iter().map(LogSpec::to_string));
     training.extend(one_joint.iter().cloned());
     let mut with_draft = args.setup.clone();
@@ -291,9 +287,8 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         with_draft.fix_setup = Some(robot.clone());
     }
     let checked = setup::checked(
-        machine,
+        Dataset::new(&machine, &logs_of(&training)),
         (&robot, &[]),
-        &logs_of(&training),
         &with_draft,
         context,
     )?;
@@ -314,15 +309,18 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     if let Some(text) = shipped {
         write((folder, context), "robot.toml", text, &mut files)?;
     }
-    let machine = checked.machine;
+    let machine = checked.data.machine;
+    let data = Dataset {
+        one_joint: of_friction,
+        ..Dataset::new(&machine, &fitted_logs).with_held_out(&logs_of(&unseen))
+    };
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
         consistent: !campaign.settings.unconstrained,
         hold_friction: args.hold_friction,
-        ..IdentifySettings::default()
     };
     let control = context.control();
-    let found = identify::identify(&machine, &role_logs, &settings, control, &mut |end| {
+    let found = identify::identify(&data, &settings, control, &mut |end| {
         keep(end, &machine, &title, (folder, context), &mut files)
     })?;
     warnings.extend(found.warnings.iter().cloned());
@@ -368,7 +366,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     let numbers = (&found.model, &found.numbers);
     let replayed = match &replayed_diagnosis {
         None if !unseen.is_empty() => {
-            let logs = &role_logs.validation;
+            let logs = &data.held_out;
             let smoothed = machine.smoothed_for(logs, &found.numbers, control)?;
             let in_memory = pictures::in_memory(&smoothed, logs, context)?;
             pictures::replayed(&smoothed, in_memory.as_ref(), &unseen_names, numbers, &[])?

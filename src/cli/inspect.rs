@@ -18,7 +18,7 @@ use cft_ident_logs::log::{
 use cft_ident_report::report::Detail;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{IdentifyError, LoggedRobot, repeated_rows};
+use cft_ident_stages::identify::{Dataset, IdentifyError, LoggedRobot, repeated_rows};
 use cft_ident_stages::setup::{Finding, SetupReport};
 
 const EXAMPLE: &str = "\
@@ -309,7 +309,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         model: None,
     }) = &known
     {
-        report = setup::report(machine, &logs_of(&args.logs), context)?;
+        report = setup::report(&Dataset::new(machine, &logs_of(&args.logs)), context)?;
     }
     let mut text = stages::inspect::inspect(&logs, &report.findings);
     stages::setup::section(&mut text.everywhere(), &report);

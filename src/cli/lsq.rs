@@ -8,7 +8,7 @@ use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{self, LoggedRobot, LsqSettings, refined};
+use cft_ident_stages::identify::{self, Dataset, LoggedRobot, LsqSettings, refined};
 
 const EXAMPLE: &str = "\
 Example:
@@ -83,47 +83,43 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut given = vec![robot.provenance];
     let friction = files::friction("lsq", args.model.as_deref(), &machine.file, context)?;
     given.extend(friction.iter().map(|model| model.provenance.clone()));
-    let known = friction.as_ref();
-    let known = known.map(|model| (model.name.as_str(), &model.value));
-    let logs = logs(&args.leave_out.of(&args.logs))?;
+    let known = friction.as_ref().map(|model| &model.value);
+    let data = Dataset::new(&machine, &logs(&args.leave_out.of(&args.logs))?);
     let fitted = match &args.fit_gains {
         None => None,
         Some(payload) => {
             let payload = payload.as_ref().map(KnownPayload::known);
             let control = context.control();
-            Some(identify::fit_gains(
-                &machine,
-                &logs,
-                payload.as_ref(),
-                control,
-            )?)
+            Some(identify::fit_gains(&data, payload.as_ref(), control)?)
         }
     };
-    let (machine, gains, edits) = match fitted {
-        None => (machine, None, Vec::new()),
-        Some(fitted) => (fitted.machine, Some(fitted.gains), fitted.edits),
+    let (data, gains, edits) = match fitted {
+        None => (data, None, Vec::new()),
+        Some(fitted) => (
+            Dataset::new(&fitted.machine, &data.logs),
+            Some(fitted.gains),
+            fitted.edits,
+        ),
     };
     let settings = LsqSettings {
         estimator: args.estimator,
         consistent: !args.unconstrained && args.open_loop.is_none(),
         friction: known,
         hold_friction: args.hold_friction,
+        open_loop: args.open_loop,
         gains: gains.as_ref(),
     };
     let robot = Path::new(&args.robot);
-    let checked = setup::checked(machine, (robot, &edits), &logs, &args.setup, context)?;
-    let machine = &checked.machine;
-    let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
-    if let Some(window) = args.open_loop {
-        identify::by_motion(machine, &mut found, &logs, window, context.control())?;
-    }
+    let checked = setup::checked(data, (robot, &edits), &args.setup, context)?;
+    let (machine, logs) = (&checked.data.machine, &checked.data.logs);
+    let mut found = identify::lsq(&checked.data, &settings, context.control())?;
     found
         .setup
         .splice(0..0, checked.report.findings.iter().cloned());
     found
         .warnings
         .splice(0..0, checked.warnings.iter().cloned());
-    let mut model = found.model(machine, known.map(|k| k.1));
+    let mut model = found.model(machine, known.map(|given| &given.file));
     if args.open_loop.is_some() && !args.unconstrained {
         identify::project(&mut model)?;
     }
@@ -142,7 +138,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let smoothed = machine.smoothed_as(&found.position_cutoffs);
         let in_memory = match logs.iter().any(|log| log.reduced().is_some()) {
             true => None,
-            false => pictures::in_memory(&smoothed, &logs, context)?,
+            false => pictures::in_memory(&smoothed, logs, context)?,
         };
         let numbers = refined(&model, &args.output.to_string_lossy())?;
         let replayed = pictures::replayed(

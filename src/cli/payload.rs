@@ -8,7 +8,7 @@ use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 use cft_ident_stages::identify::{
-    self, LoggedRobot, Number95, Payload, PayloadReading, PayloadVerdict, refined,
+    self, Dataset, Number95, Payload, PayloadReading, PayloadVerdict,
 };
 
 const EXAMPLE: &str = "\
@@ -43,17 +43,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs: Vec<&Path> = args.output.as_deref().into_iter().collect();
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model, context)?;
-    let (name, file) = (given.name, given.value);
-    let model = refined(&file, &name)?;
-    let machine = LoggedRobot::new(&name, file.robot.clone());
-    let logs = logs_of(&args.logs);
-    let of_model = (name.as_str(), &file, &model);
-    let found = identify::payload(&machine, of_model, &logs, context.control())?;
+    let given = given.value;
+    let data = Dataset::new(&given.machine(), &logs_of(&args.logs));
+    let found = identify::payload(&data, &given, context.control())?;
     let brief = sentences(&found).join("\n");
     let tables = text_of(&found, &names_of(&args.logs).join(", "));
     let mut text = format!("{brief}\n\n{tables}");
     if let Some(path) = &args.output {
-        let (model, how) = match found.loaded(&file) {
+        let (model, how) = match found.loaded(&given.file) {
             Some(loaded) => (loaded.to_toml()?, ""),
             None => (files::text(&args.model)?, ", the given model byte for byte"),
         };

@@ -10,7 +10,7 @@ use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::Report;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, FORMAT, LoggedRobot, MadeWith, ReducedLogs};
+use cft_ident_stages::identify::{self, Dataset, FORMAT, LoggedRobot, MadeWith, ReducedLogs};
 use cft_ident_stages::setup::Finding;
 
 const EXAMPLE: &str = "\
@@ -83,17 +83,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
     let friction = files::friction("reduce", args.model.as_deref(), &machine.file, context)?;
-    let known = friction.as_ref();
-    let known = known.map(|model| (model.name.as_str(), &model.value));
-    let logs = logs(&args.logs)?;
-    let checked = setup::checked(
-        machine,
-        (Path::new(&args.robot), &[]),
-        &logs,
-        &args.setup,
-        context,
-    )?;
-    let found = identify::reduce(&checked.machine, &logs, known, context.control())?;
+    let known = friction.as_ref().map(|model| &model.value);
+    let data = Dataset::new(&machine, &logs(&args.logs)?);
+    let robot = Path::new(&args.robot);
+    let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
+    let found = identify::reduce(&checked.data, known, context.control())?;
     context.check()?;
     let bytes = found.to_bytes().map_err(identify::IdentifyError::from)?;
     let result = Reduced {

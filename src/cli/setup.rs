@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{CliError, Context};
 use cft_ident_files::config::correction::{Edit, edited};
 use cft_ident_files::config::{self, RobotFile};
-use cft_ident_stages::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
+use cft_ident_stages::identify::{CheckedSetup, Dataset, IdentifyError, LoggedRobot, check_setup};
 use cft_ident_stages::setup::{Finding, FindingSeverity, SetupReport};
 
 /// What to do with a set-up that the torques contradict.
@@ -21,8 +21,8 @@ pub struct SetupArgs {
 
 /// A set-up that was checked.
 pub struct Checked {
-    /// The robot to go on with.
-    pub machine: LoggedRobot,
+    /// The robot to go on with, and the logs.
+    pub data: Dataset,
     /// What was found, for the document.
     pub report: SetupReport,
     pub warnings: Vec<String>,
@@ -41,25 +41,25 @@ impl Checked {
     }
 }
 
-/// Checks the set-up by these logs. `robot` is the path of the robot file, in which `before` is what the
+/// Checks the set-up by the logs. `robot` is the path of the robot file, in which `before` is what the
 /// machine has that the file lacks.
 pub fn checked(
-    machine: LoggedRobot,
+    data: Dataset,
     (robot, before): (&Path, &[Edit]),
-    logs: &[Log],
     args: &SetupArgs,
     context: &Context,
 ) -> Result<Checked, CliError> {
-    let machine = match args.as_declared {
-        true => machine.as_declared(),
-        false => machine,
+    let data = match args.as_declared {
+        true => Dataset::new(&data.machine.as_declared(), &data.logs),
+        false => data,
     };
+    let machine = &data.machine;
     machine.check_gains()?;
     let CheckedSetup {
         report,
         corrected,
         edits,
-    } = check(&machine, logs, context)?;
+    } = check(&data, context)?;
     let mut warnings: Vec<String> = report
         .findings
         .iter()
@@ -81,7 +81,7 @@ pub fn checked(
             None => None,
         };
         return Ok(Checked {
-            machine,
+            data,
             report,
             warnings,
             new_file,
@@ -98,7 +98,10 @@ pub fn checked(
             .map(|f| format!("put right in {}: {}", path.display(), f.in_words())),
     );
     Ok(Checked {
-        machine: LoggedRobot::new(&path.to_string_lossy(), corrected),
+        data: Dataset::new(
+            &LoggedRobot::new(&path.to_string_lossy(), corrected),
+            &data.logs,
+        ),
         report,
         warnings,
         new_file: Some((path.clone(), text)),
@@ -106,20 +109,16 @@ pub fn checked(
 }
 
 /// The check; logs that cannot be checked are reported by the fit itself.
-fn check(machine: &LoggedRobot, logs: &[Log], context: &Context) -> Result<CheckedSetup, CliError> {
-    match check_setup(machine, logs, context.control()) {
+fn check(data: &Dataset, context: &Context) -> Result<CheckedSetup, CliError> {
+    match check_setup(data, context.control()) {
         Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
         found => Ok(found.unwrap_or_default()),
     }
 }
 
 /// What the check says of these logs, for a command that only reports it.
-pub fn report(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    context: &Context,
-) -> Result<SetupReport, CliError> {
-    Ok(check(machine, logs, context)?.report)
+pub fn report(data: &Dataset, context: &Context) -> Result<SetupReport, CliError> {
+    Ok(check(data, context)?.report)
 }
 
 /// Text of the new robot file: the user's with the lines that differ, else the whole anew.

@@ -10,7 +10,7 @@ use cft_ident_files::config::model_file::{EffectSection, Parameter};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{JointInUse, LoggedRobot, in_use, refined};
+use cft_ident_stages::identify::{JointInUse, in_use};
 
 const EXAMPLE: &str = "\
 Example:
@@ -49,9 +49,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs: Vec<&Path> = args.report.as_deref().into_iter().collect();
     context.check_outputs(&[&args.model], &outputs)?;
     let given = files::model(&args.model, context)?;
-    let (name, file) = (given.name, given.value);
-    let model = refined(&file, &name)?;
-    let machine = LoggedRobot::new(&name, file.robot.clone());
+    let (model, machine) = (given.value.numbers()?, given.value.machine());
+    let file = given.value.file;
     let found = in_use(&machine, &file, &model.model);
     let of = stages::show::Show {
         machine: &machine,

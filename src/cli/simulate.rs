@@ -145,13 +145,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut robot = robot;
     if let (Experiment::Usual | Experiment::OneJoint { .. }, Some(model)) = (&experiment, &model) {
-        model.value.travel_of_seen(&mut robot.limits);
+        model.value.file.travel_of_seen(&mut robot.limits);
     }
     let order = Order {
         robot: &robot,
         model: model
             .as_ref()
-            .map(|model| (model.name.as_str(), &model.value)),
+            .map(|model| (model.name.as_str(), &model.value.file)),
         experiment,
         seconds: args.seconds,
         effects: effects.map(|effect| effect.or_own(&own)).collect(),

@@ -11,7 +11,7 @@ use cft_ident_logs::output::LogWriter;
 use cft_ident_plant::excite::{self, ExciteError, Motion};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, Log, LoggedRobot, refined};
+use cft_ident_stages::identify::{self, Log};
 
 const EXAMPLE: &str = "\
 Example:
@@ -78,9 +78,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: [&Path; 2] = [&args.log.path, &args.model];
     context.check_outputs(&inputs, &[args.output.as_path()])?;
     let given = files::model(&args.model, context)?;
-    let (name, file) = (given.name, given.value);
-    let refined = refined(&file, &name)?;
-    let machine = LoggedRobot::new(&name, file.robot.clone());
+    let (name, file) = (&given.value.name, &given.value.file);
+    let machine = given.value.machine();
     let joints = machine.robot.joint_names();
     let named = |kind: &'static str| joints.iter().map(move |j| format!("{kind}_{j}"));
     let band = match file.held_out.is_empty() {
@@ -94,14 +93,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .chain(band.into_iter().flat_map(named))
         .collect();
     let (log, trajectory) = match args.log.path.extension().is_some_and(|end| end == "toml") {
-        true => planned(&args.log.path, (&name, &file), context)?,
+        true => planned(&args.log.path, (name, file), context)?,
         false => (Log::from(&args.log), None),
     };
     let mut out = LogWriter::create(&args.output, &columns)?;
     let mut failed = None;
     let found = identify::torque(
-        &machine,
-        (&file, &refined),
+        &given.value,
         &log,
         context.control(),
         &mut |t, values, origin| {

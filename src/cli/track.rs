@@ -93,7 +93,7 @@ fn robots(args: &Args, context: &Context) -> Result<Vec<RobotSources>, CliError>
         let given = files::model(path, context)?;
         sources.push(TrackSource::Model {
             name: given.name,
-            file: Box::new(given.value),
+            file: Box::new(given.value.file),
             provenance: given.provenance,
         });
     }

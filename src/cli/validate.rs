@@ -10,7 +10,7 @@ use cft_ident_logs::output::LogWriter;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, Log, LoggedRobot, refined};
+use cft_ident_stages::identify::{self, Dataset, Log, ValidateSettings};
 use cft_ident_stages::open_loop::OpenLoop;
 
 const EXAMPLE: &str = "\
@@ -145,9 +145,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model, context)?;
-    let (name, file) = (given.name, given.value);
-    let model = refined(&file, &name)?;
-    let machine = LoggedRobot::new(&name, file.robot.clone());
+    let (file, model) = (&given.value.file, given.value.numbers()?);
+    let machine = given.value.machine();
     let band = !file.held_out.is_empty();
     let mut residual = match &args.output {
         None => None,
@@ -168,10 +167,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             CliError::input(text).hint("give the log itself, or leave -o, --plot and --report out")
         );
     }
-    let mut found = identify::validate(
-        &machine,
-        (&model, Some(&file)),
-        &logs,
+    let settings = ValidateSettings {
+        free_run: true,
+        open_loop: args.open_loop,
+        ..ValidateSettings::of(&given.value)
+    };
+    let found = identify::validate(
+        &Dataset::new(&machine, &logs),
+        &settings,
         context.control(),
         &mut |r, origin| {
             if let Some(file) = &mut residual
@@ -185,24 +188,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(error) = failed {
         return Err(error.into());
     }
-    let inputs = (&logs[..], &found.inputs[..]);
-    found.free_run = identify::free_run(&machine, &model, inputs, context.control())?;
-    if let Some(window) = args.open_loop {
-        let control = context.control();
-        let simulated = identify::open_loop(&machine, &model, &logs, window, control)?;
-        if simulated.astray > 0 {
-            found.warnings.push(format!(
-                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit again without --unconstrained",
-                simulated.astray, simulated.windows
-            ));
-        }
-        found.open_loop = Some(simulated);
-    }
     let names = names_of(&args.logs);
     let document = Document::new("validate", &found.inputs, &found.warnings, &found)?;
     let of = stages::validate::Validate {
         machine: &machine,
-        file: &file,
+        file,
         model: &model,
         logs: &names,
         found: &found,
@@ -218,14 +208,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let smoothed = machine.smoothed_for(&logs, &model, context.control())?;
         let in_memory = pictures::in_memory(&smoothed, &logs, context)?;
         let used = match found.by_use {
-            Some(_) => identify::used_for(&file, &found.inputs),
+            Some(_) => identify::used_for(file, &found.inputs),
             None => Vec::new(),
         };
         let mut named = names.clone();
         for (name, _) in named.iter_mut().zip(&used).filter(|(_, used)| **used) {
             *name += " (which made the model)";
         }
-        let of_model = (&file, &model);
+        let of_model = (file, &model);
         let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &named, of_model, &used)?;
         let quality = pictures::inspected(&args.logs, &machine, context)?;
         let mut page = report.page();

@@ -9,9 +9,7 @@ use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{
-    self, Log, LoggedRobot, STREAM, WatchLine, WatchSettings, Watchable, Watched, refined,
-};
+use cft_ident_stages::identify::{self, Log, STREAM, WatchLine, WatchSettings, Watchable, Watched};
 
 const EXAMPLE: &str = "\
 Example:
@@ -161,9 +159,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs: Vec<&Path> = args.output.as_deref().into_iter().collect();
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model, context)?;
-    let (name, file) = (given.name, given.value);
-    let refined = refined(&file, &name)?;
-    let machine = LoggedRobot::new(&name, file.robot.clone());
+    let machine = given.value.machine();
     let joints = machine.robot.joint_names();
     let mut sink = match &args.output {
         Some(path) => {
@@ -202,8 +198,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut failed: Option<CliError> = None;
     let mut found = identify::watch(
-        &machine,
-        (&name, &file, &refined),
+        &given.value,
         input,
         &settings,
         context.control(),

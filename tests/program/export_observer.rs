@@ -4,14 +4,13 @@
 use crate::export_support;
 
 use assert_cmd::Command as Tool;
-use cft_ident::config::ModelFile;
-use cft_ident::effect::AugmentedModel;
+use cft_ident::config::model_file::{EffectParameter, EffectSection};
 use cft_ident::export::{self, Program};
 use cft_ident::identify::{
-    Control, Log, LoggedRobot, LsqSettings, WatchSettings, Watchable, lsq, refined, watch,
-    watch_recipe,
+    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, WatchSettings, Watchable, lsq,
+    watch, watch_recipe,
 };
-use export_support::{named, note, run, there};
+use export_support::{note, run, there};
 use std::path::Path;
 use std::process::Command;
 
@@ -47,11 +46,26 @@ struct Case {
     lines: Lines,
 }
 
-fn case(
-    machine: &LoggedRobot,
-    (file, model): (&ModelFile, &AugmentedModel),
-    unseen: &[[[f64; N]; 2]],
-) -> Case {
+/// An effect as a model file holds it.
+fn effect(name: &str, joint: &str, numbers: &[(&str, f64)]) -> EffectSection {
+    let number = |value| EffectParameter {
+        value,
+        std: None,
+        unit: String::new(),
+        bound: false,
+    };
+    EffectSection {
+        name: name.to_owned(),
+        joint: Some(joint.to_owned()),
+        shrinkage: None,
+        accepted_by_user: false,
+        parameters: (numbers.iter())
+            .map(|(key, value)| ((*key).to_owned(), number(*value)))
+            .collect(),
+    }
+}
+
+fn case(given: &GivenModel, unseen: &[[[f64; N]; 2]]) -> Case {
     let control = Control::default();
     let settings = WatchSettings {
         per_hour: PER_HOUR,
@@ -63,16 +77,16 @@ fn case(
         lines.push((line.t, of(line.external), of(line.std)));
         true
     };
-    let of = ("model.toml", file, model);
     let input = Watchable::Log(log("unseen", unseen));
-    let found = watch(machine, of, input, &settings, &control, &mut take).unwrap();
-    let recipe = watch_recipe(machine, of, STEP, PER_HOUR).unwrap();
+    let found = watch(given, input, &settings, &control, &mut take).unwrap();
+    let recipe = watch_recipe(given, STEP, PER_HOUR).unwrap();
     assert!((found.delay_s.unwrap() - recipe.delay_s).abs() < 1e-9);
     for (joint, own) in found.joints.iter().zip(&recipe.joints) {
         let most = own.std.iter().fold(0.0f64, |m, std| m.max(*std)) * own.limit;
         assert!((joint.threshold[1] - most).abs() <= 1e-12 * most);
     }
-    let mut program = Program::with_effects(model).unwrap();
+    let model = given.numbers().unwrap();
+    let mut program = Program::with_effects(&model).unwrap();
     program.observer = Some(recipe);
     Case {
         program,
@@ -139,29 +153,26 @@ fn compiled_observers_give_the_lines_of_watch_and_models_without_held_out_data_g
     let machine = LoggedRobot::load("configs/ur10.toml").unwrap();
     let logs = [log("fitted", fitted)];
     let found = lsq(
-        &machine,
-        &logs,
+        &Dataset::new(&machine, &logs),
         &LsqSettings::default(),
         &Control::default(),
     )
     .unwrap();
-    let mut file = found.model(&machine, None);
-    let plain = refined(&file, "model.toml").unwrap();
+    let plain = GivenModel::new("model.toml", found.model(&machine, None));
     // torques that come late and early, and one that remembers the motion
     let mut late = plain.clone();
-    let robot = &machine.robot;
-    late.effects.extend([
-        named(robot, "delay", Some("q1"), &[("d", 0.0113)]),
-        named(robot, "delay", Some("q3"), &[("d", -0.0051)]),
-        named(robot, "backlash", Some("q2"), &[("c", 3.0), ("gap", 0.004)]),
+    late.file.effects.extend([
+        effect("delay", "q1", &[("d", 0.0113)]),
+        effect("delay", "q3", &[("d", -0.0051)]),
+        effect("backlash", "q2", &[("c", 3.0), ("gap", 0.004)]),
     ]);
     let bytes = unseen.iter().flatten().flatten().copied();
     let bytes: Vec<u8> = bytes.flat_map(f64::to_ne_bytes).collect();
     std::fs::write(path.join("rows.bin"), bytes).unwrap();
     std::fs::write(path.join("driver.c"), IN_C).unwrap();
     std::fs::write(path.join("driver.rs"), IN_RUST).unwrap();
-    for model in [&plain, &late] {
-        let case = case(&machine, (&file, model), unseen);
+    for given in [&plain, &late] {
+        let case = case(given, unseen);
         let header = export::header::header(&case.program, "arm", &case.units);
         let module = export::module::module(&case.program, &case.units);
         for forbidden in ["alloc(", "Vec<", "vec!", "Box"] {
@@ -183,8 +194,9 @@ fn compiled_observers_give_the_lines_of_watch_and_models_without_held_out_data_g
             compare("Rust", &case, &by("by_rust"), unseen.len());
         }
     }
-    file.held_out.clear();
-    let shown = watch_recipe(&machine, ("old.toml", &file, &plain), STEP, PER_HOUR);
+    let mut old = GivenModel::new("old.toml", plain.file);
+    old.file.held_out.clear();
+    let shown = watch_recipe(&old, STEP, PER_HOUR);
     let shown = shown.unwrap_err().to_string();
     assert!(
         shown.contains("old.toml") && shown.contains("fit it again"),

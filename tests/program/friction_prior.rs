@@ -5,7 +5,7 @@ use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::config::model_file::{FrictionPrior, Parameter};
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, IdentifiedDynamics, Log, LoggedRobot, LsqSettings, lsq, new_model,
+    Control, Dataset, GivenModel, IdentifiedDynamics, Log, LoggedRobot, LsqSettings, lsq, new_model,
 };
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::verdict::Verdict;
@@ -98,13 +98,19 @@ fn with(
     estimator: EstimatorKind,
     hold_friction: bool,
 ) -> IdentifiedDynamics {
+    let given = GivenModel::new("friction.toml", friction.clone());
     let settings = LsqSettings {
         estimator,
-        friction: Some(("friction.toml", friction)),
+        friction: Some(&given),
         hold_friction,
         ..LsqSettings::default()
     };
-    lsq(&machine(), &[log(seed)], &settings, &Control::default()).unwrap()
+    lsq(
+        &Dataset::new(&machine(), &[log(seed)]),
+        &settings,
+        &Control::default(),
+    )
+    .unwrap()
 }
 
 /// Value and standard deviation of the friction after a fit, in the order of the law.

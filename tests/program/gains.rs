@@ -8,8 +8,8 @@ use std::path::Path;
 
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, ErrorKind, GainError, IdentifyError, Log, LoggedRobot, LsqSettings, PayloadLog,
-    fit_gains, lsq,
+    Control, Dataset, ErrorKind, GainError, IdentifyError, Log, LoggedRobot, LsqSettings,
+    PayloadLog, fit_gains, lsq,
 };
 use cft_ident::log::LogSpec;
 use currents_arm::{Chance, DECLARED, JOINTS, Payload, log, log_section, plant, robot_file};
@@ -62,7 +62,12 @@ fn the_deviation_of_the_mass_is_that_of_all_gains() {
             mass: payload.mass,
             std: std * payload.mass,
         };
-        fit_gains(&machine(None), &empty, Some(&known), &Control::default()).unwrap()
+        fit_gains(
+            &Dataset::new(&machine(None), &empty),
+            Some(&known),
+            &Control::default(),
+        )
+        .unwrap()
     };
     let (exact, vague) = (fitted(0.0), fitted(0.1));
     for (a, b) in exact.gains.joints.iter().zip(&vague.gains.joints) {
@@ -77,7 +82,12 @@ fn ratios_of_gains_show_without_a_payload_and_leave_the_model_in_amperes() {
     let folder = tempfile::tempdir().unwrap();
     let (gains, _) = logs(folder.path(), 7, 0.002);
     let empty = [of(folder.path(), "empty.csv")];
-    let found = fit_gains(&machine(None), &empty, None, &Control::default()).unwrap();
+    let found = fit_gains(
+        &Dataset::new(&machine(None), &empty),
+        None,
+        &Control::default(),
+    )
+    .unwrap();
     let reference = found.gains.reference.clone().unwrap();
     let base = JOINTS.iter().position(|j| *j == reference).unwrap();
     for (gain, truth) in found.gains.joints.iter().zip(gains) {
@@ -89,7 +99,12 @@ fn ratios_of_gains_show_without_a_payload_and_leave_the_model_in_amperes() {
         gains: Some(&found.gains),
         ..LsqSettings::default()
     };
-    let fit = lsq(&found.machine, &empty, &settings, &Control::default()).unwrap();
+    let fit = lsq(
+        &Dataset::new(&found.machine, &empty),
+        &settings,
+        &Control::default(),
+    )
+    .unwrap();
     let units: Vec<&str> = fit.unknowns.iter().map(|u| u.unit.as_str()).collect();
     assert!(
         units
@@ -111,7 +126,12 @@ fn a_log_that_carries_no_load_and_exchanged_logs_are_told() {
         };
         let empty = [of(folder.path(), empty)];
         gain_error(
-            fit_gains(&machine(None), &empty, Some(&known), &Control::default()).unwrap_err(),
+            fit_gains(
+                &Dataset::new(&machine(None), &empty),
+                Some(&known),
+                &Control::default(),
+            )
+            .unwrap_err(),
         )
     };
     let same = tried("empty.csv", "empty.csv");
@@ -141,7 +161,12 @@ fn a_joint_whose_channel_has_the_other_sign_is_named() {
     };
     let empty = [of(folder.path(), "empty.csv")];
     let turned = LoggedRobot::new("arm.toml", file);
-    let error = fit_gains(&turned, &empty, Some(&known), &Control::default()).unwrap_err();
+    let error = fit_gains(
+        &Dataset::new(&turned, &empty),
+        Some(&known),
+        &Control::default(),
+    )
+    .unwrap_err();
     match gain_error(error) {
         GainError::Negative { joints, .. } => assert_eq!(joints, "elbow"),
         error => panic!("{error}"),
@@ -298,6 +323,11 @@ fn a_turn_about_the_vertical_shows_no_mass() {
     };
     let empty = [of(folder.path(), "empty.csv")];
     let turn = LoggedRobot::new("turn.toml", file);
-    let error = fit_gains(&turn, &empty, Some(&known), &Control::default()).unwrap_err();
+    let error = fit_gains(
+        &Dataset::new(&turn, &empty),
+        Some(&known),
+        &Control::default(),
+    )
+    .unwrap_err();
     assert_eq!(gain_error(error), GainError::MassHidden);
 }

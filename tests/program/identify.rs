@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex};
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, ErrorKind, IdentifiedDynamics, IdentifyError, Log, LoggedRobot, LsqSettings, Progress,
-    lsq, refined, validate,
+    Control, Dataset, ErrorKind, GivenModel, IdentifiedDynamics, IdentifyError, Log, LoggedRobot,
+    LsqSettings, Progress, ValidateSettings, lsq, validate,
 };
 use cft_ident::log::LogSpec;
 use cft_ident::validate::TorqueErrors;
@@ -45,8 +45,7 @@ fn motion() -> [Vec<f64>; 3] {
 
 fn fitted(log: Log) -> Result<IdentifiedDynamics, IdentifyError> {
     lsq(
-        &robot(),
-        &[log],
+        &Dataset::new(&robot(), &[log]),
         &LsqSettings::default(),
         &Control::default(),
     )
@@ -84,13 +83,17 @@ fn a_model_that_was_fitted_is_validated_without_a_file() {
     let robot = robot();
     let log = [Log::of_rows("screw", &t, &q, &tau).unwrap()];
     let control = Control::default();
-    let found = lsq(&robot, &log, &LsqSettings::default(), &control).unwrap();
-    let model = refined(&found.model(&robot, None), "model").unwrap();
-    let mut rows = 0;
-    let validated = validate(&robot, (&model, None), &log, &control, &mut |_, _| {
-        rows += 1
-    })
+    let found = lsq(
+        &Dataset::new(&robot, &log),
+        &LsqSettings::default(),
+        &control,
+    )
     .unwrap();
+    let model = GivenModel::new("model", found.model(&robot, None));
+    let mut rows = 0;
+    let data = Dataset::new(&robot, &log);
+    let settings = ValidateSettings::of(&model);
+    let validated = validate(&data, &settings, &control, &mut |_, _| rows += 1).unwrap();
     assert!(validated.validation.errors.joints[0].relative_error < 0.01);
     assert!(rows > 3000, "{rows}");
 }
@@ -104,12 +107,16 @@ fn fitted_logs_do_not_lend_their_error_to_unseen_ones() {
     let unseen = Log::of_rows("unseen", &t, &q, &loaded).unwrap();
     let (robot, control) = (robot(), Control::default());
     let settings = LsqSettings::default();
-    let found = lsq(&robot, std::slice::from_ref(&seen), &settings, &control).unwrap();
-    let file = found.model(&robot, None);
-    let model = refined(&file, "model").unwrap();
+    let found = lsq(
+        &Dataset::new(&robot, std::slice::from_ref(&seen)),
+        &settings,
+        &control,
+    )
+    .unwrap();
+    let model = GivenModel::new("model", found.model(&robot, None));
     let on = |logs: &[Log]| {
-        let of = (&model, Some(&file));
-        validate(&robot, of, logs, &control, &mut |_, _| {}).unwrap()
+        let (data, settings) = (Dataset::new(&robot, logs), ValidateSettings::of(&model));
+        validate(&data, &settings, &control, &mut |_, _| {}).unwrap()
     };
     let alone = [
         on(std::slice::from_ref(&seen)),
@@ -146,12 +153,21 @@ fn a_callback_stops_a_stage_and_hears_of_its_progress() {
             heard.lock().unwrap().push(work.to_owned());
         }
     });
-    lsq(&robot(), &log, &LsqSettings::default(), &control).unwrap();
+    lsq(
+        &Dataset::new(&robot(), &log),
+        &LsqSettings::default(),
+        &control,
+    )
+    .unwrap();
     assert_eq!(*said.lock().unwrap(), ["least squares", "held-out data"]);
     let stopped = Control::default().stopped_by(|| true);
-    let error = lsq(&robot(), &log, &LsqSettings::default(), &stopped)
-        .err()
-        .unwrap();
+    let error = lsq(
+        &Dataset::new(&robot(), &log),
+        &LsqSettings::default(),
+        &stopped,
+    )
+    .err()
+    .unwrap();
     assert_eq!(error.kind(), ErrorKind::Interrupted);
 }
 
@@ -163,7 +179,11 @@ fn errors_know_what_they_are_about() {
     wrong[7] = f64::NAN;
     let log = Log::of_rows("screw", &t, &wrong, &tau).unwrap();
     assert_eq!(kind(log), ErrorKind::Input);
-    let none = lsq(&robot(), &[], &LsqSettings::default(), &Control::default());
+    let none = lsq(
+        &Dataset::new(&robot(), &[]),
+        &LsqSettings::default(),
+        &Control::default(),
+    );
     assert_eq!(none.err().unwrap().kind(), ErrorKind::Usage);
     assert!(Log::of_rows("screw", &t, &q, &tau[1..]).is_err());
 }

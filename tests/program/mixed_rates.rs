@@ -2,10 +2,9 @@
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, GivenModel, Log, LoggedRobot,
-    LsqSettings, compare, diagnose, lsq, refined, validate,
+    Control, Dataset, DiagnoseEnd, DiagnoseSettings, GivenModel, Log, LoggedRobot, LsqSettings,
+    ValidateSettings, compare, diagnose, lsq, validate,
 };
-use cft_ident::log::Provenance;
 
 const MASS: f64 = 12.0;
 const VISCOUS: f64 = 30.0;
@@ -61,18 +60,19 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let control = Control::default();
     let train = [slide("fast", 1000.0, 1), slide("slow", 400.0, 2)];
     let held_out = [slide("slowest", 250.0, 3)];
-    let found = lsq(&robot, &train, &LsqSettings::default(), &control).unwrap();
+    let found = lsq(
+        &Dataset::new(&robot, &train),
+        &LsqSettings::default(),
+        &control,
+    )
+    .unwrap();
     let mass = &found.unknowns[0];
     assert!((mass.fitted - MASS).abs() < 0.02 * MASS, "{mass:?}");
     let file = found.model(&robot, None);
 
-    let logs = DiagnoseLogs {
-        train: &train,
-        holdout: &held_out,
-        ..DiagnoseLogs::default()
-    };
-    let settings = DiagnoseSettings::default();
-    let end = diagnose(&robot, ("slide.toml", &file), &logs, &settings, &control).unwrap();
+    let given = GivenModel::new("slide.toml", file);
+    let data = Dataset::new(&robot, &train).with_held_out(&held_out);
+    let end = diagnose(&data, &DiagnoseSettings::of(&given), &control).unwrap();
     let DiagnoseEnd::Diagnosed(end) = end else {
         panic!("no fault of the data is there");
     };
@@ -95,15 +95,22 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let rows = end.diagnosis.after.holdout.as_ref().unwrap().joints[0].samples;
     assert!((7000..7500).contains(&rows), "{rows}");
 
-    let model = refined(&file, "slide.toml").unwrap();
+    let settings = ValidateSettings::of(&given);
     let all = [train.as_slice(), &held_out].concat();
     let apart = |log: &Log| {
         let one = std::slice::from_ref(log);
-        let found = validate(&robot, (&model, None), one, &control, &mut |_, _| {}).unwrap();
+        let found = validate(
+            &Dataset::new(&robot, one),
+            &settings,
+            &control,
+            &mut |_, _| {},
+        )
+        .unwrap();
         found.validation.errors.joints[0].clone()
     };
     let each: Vec<_> = all.iter().map(apart).collect();
-    let together = validate(&robot, (&model, None), &all, &control, &mut |_, _| {}).unwrap();
+    let data = Dataset::new(&robot, &all);
+    let together = validate(&data, &settings, &control, &mut |_, _| {}).unwrap();
     let together = &together.validation.errors.joints[0];
     assert_eq!(
         together.samples,
@@ -113,18 +120,6 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let pooled = (squares / together.samples as f64).sqrt();
     assert!((together.rmse / pooled - 1.0).abs() < 1e-9);
 
-    let given = || GivenModel {
-        name: "slide.toml".to_owned(),
-        file: file.clone(),
-        provenance: Provenance {
-            role: None,
-            name: "slide.toml".to_owned(),
-            span: None,
-            sha256: "0".repeat(64),
-            samples: 0,
-            duration_s: 0.0,
-        },
-    };
-    let compared = compare([given(), given()], &all, &control).unwrap();
+    let compared = compare([given.clone(), given], &all, &control).unwrap();
     assert!(compared.tried.is_some());
 }

@@ -9,8 +9,8 @@ use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::config::model_file::Parameter;
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, IdentifiedDynamics, Log, LoggedRobot, LsqSettings, ReducedLogs, lsq, new_model,
-    reduce, refined, validate,
+    Control, Dataset, GivenModel, IdentifiedDynamics, Log, LoggedRobot, LsqSettings, ReducedLogs,
+    ValidateSettings, Validated, lsq, new_model, reduce, validate,
 };
 use cft_ident::log::LogSpec;
 use cft_ident::robot::friction::DoubleTanh;
@@ -64,12 +64,19 @@ fn jump(v: f64) -> f64 {
 }
 
 fn fitted(machine: &LoggedRobot, logs: &[Log], settings: &LsqSettings) -> IdentifiedDynamics {
-    lsq(machine, logs, settings, &Control::default()).unwrap()
+    lsq(&Dataset::new(machine, logs), settings, &Control::default()).unwrap()
 }
 
 fn reduced(machine: &LoggedRobot, logs: &[Log], friction: Option<&ModelFile>) -> ReducedLogs {
-    let friction = friction.map(|model| ("friction.toml", model));
-    reduce(machine, logs, friction, &Control::default()).unwrap()
+    let friction = friction.map(|model| GivenModel::new("friction.toml", model.clone()));
+    let data = Dataset::new(machine, logs);
+    reduce(&data, friction.as_ref(), &Control::default()).unwrap()
+}
+
+fn errors(machine: &LoggedRobot, model: &ModelFile, logs: &[Log]) -> Validated {
+    let given = GivenModel::new("model.toml", model.clone());
+    let (data, settings) = (Dataset::new(machine, logs), ValidateSettings::of(&given));
+    validate(&data, &settings, &Control::default(), &mut |_, _| {}).unwrap()
 }
 
 /// By how much two fits differ: parameters and deviations in parts of themselves, or of the deviation where that is
@@ -197,8 +204,9 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
         model
     };
     let model = friction(LAW);
+    let given = GivenModel::new("friction.toml", model.clone());
     let settings = |hold_friction| LsqSettings {
-        friction: Some(("friction.toml", &model)),
+        friction: Some(&given),
         hold_friction,
         ..LsqSettings::default()
     };
@@ -216,11 +224,7 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
     assert!(std > 2.0 * whole.fit.textbook[(0, 0)].sqrt(), "{std}");
     // validation of the model that was fitted, by the parts and by the logs
     let model = of_parts.model(&machine, Some(&model));
-    let augmented = refined(&model, "model.toml").unwrap();
-    let errors = |logs: &[Log]| {
-        let control = Control::default();
-        validate(&machine, (&augmented, None), logs, &control, &mut |_, _| {}).unwrap()
-    };
+    let errors = |logs: &[Log]| errors(&machine, &model, logs);
     let (a, b) = (errors(&parts), errors(&logs));
     let [a, b] = [&a, &b].map(|v| &v.validation.errors.joints[0]);
     assert!(a.max_abs.is_nan() && a.r2.is_nan() && a.relative_error_raw.is_nan());
@@ -230,11 +234,17 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
     // other friction, and none
     let other = friction(LAW.map(|x| 1.01 * x));
     for (friction, word) in [(Some(&other), "other values"), (None, "")] {
+        let given = friction.map(|f| GivenModel::new("other.toml", f.clone()));
         let settings = LsqSettings {
-            friction: friction.map(|f| ("other.toml", f)),
+            friction: given.as_ref(),
             ..LsqSettings::default()
         };
-        let error = lsq(&machine, &parts, &settings, &Control::default()).unwrap_err();
+        let error = lsq(
+            &Dataset::new(&machine, &parts),
+            &settings,
+            &Control::default(),
+        )
+        .unwrap_err();
         assert!(error.to_string().contains(word), "{error}");
     }
 }
@@ -363,11 +373,7 @@ fn measured_logs_keep_the_limits_of_size_and_give_the_same_numbers() {
         same_fit(&of_part, &of_log);
         // the model of a part judged by the part, and by the log
         let model = of_part.model(&machine, None);
-        let augmented = refined(&model, "model.toml").unwrap();
-        let errors = |logs: &[Log]| {
-            let control = Control::default();
-            validate(&machine, (&augmented, None), logs, &control, &mut |_, _| {}).unwrap()
-        };
+        let errors = |logs: &[Log]| errors(&machine, &model, logs);
         let (a, b) = (errors(&parts.as_logs()), errors(&logs));
         for (a, b) in a
             .validation

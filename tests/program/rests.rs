@@ -3,7 +3,8 @@
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Log, LoggedRobot, LsqSettings, lsq, read_whole, refined, validate,
+    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, ValidateSettings, lsq, read_whole,
+    validate,
 };
 
 const MASS: f64 = 12.0;
@@ -74,7 +75,12 @@ fn rests_do_not_move_the_friction_and_are_told_apart_in_the_errors() {
     let robot = robot();
     let control = Control::default();
     let log = [slide("resting", 1.0, 3)];
-    let found = lsq(&robot, &log, &LsqSettings::default(), &control).unwrap();
+    let found = lsq(
+        &Dataset::new(&robot, &log),
+        &LsqSettings::default(),
+        &control,
+    )
+    .unwrap();
     for (u, truth) in found.unknowns.iter().zip([MASS, VISCOUS, COULOMB, OFFSET]) {
         let off = (u.fitted - truth).abs();
         assert!(
@@ -93,9 +99,11 @@ fn rests_do_not_move_the_friction_and_are_told_apart_in_the_errors() {
     assert!(rest.unwrap() > 0.5, "{fitted:?}");
     assert!(fitted.relative_error > moving.unwrap() && fitted.relative_error < rest.unwrap());
 
-    let model = refined(&found.model(&robot, None), "slide.toml").unwrap();
+    let model = GivenModel::new("slide.toml", found.model(&robot, None));
     let unseen = [slide("unseen", 0.6, 8)];
-    let all = validate(&robot, (&model, None), &unseen, &control, &mut |_, _| {}).unwrap();
+    let data = Dataset::new(&robot, &unseen);
+    let settings = ValidateSettings::of(&model);
+    let all = validate(&data, &settings, &control, &mut |_, _| {}).unwrap();
     let e = &all.validation.errors.joints[0];
     assert!(e.relative_error_moving.unwrap() < 0.06, "{e:?}");
     assert!(e.relative_error_rest.unwrap() > 0.5, "{e:?}");
@@ -129,7 +137,12 @@ fn a_log_without_rests_has_no_error_at_rest() {
     }
     let log = Log::of_rows("moving", &t, &q, &tau).unwrap();
     let settings = LsqSettings::default();
-    let found = lsq(&robot(), &[log], &settings, &Control::default()).unwrap();
+    let found = lsq(
+        &Dataset::new(&robot(), &[log]),
+        &settings,
+        &Control::default(),
+    )
+    .unwrap();
     assert_eq!(found.joints[0].relative_error_rest, None);
     assert_eq!(
         found.joints[0].relative_error_moving,

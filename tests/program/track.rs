@@ -8,7 +8,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Log, LoggedRobot, RobotSources, TrackSource, Tracked, reduce, track,
+    Control, Dataset, Log, LoggedRobot, RobotSources, TrackSource, Tracked, reduce, track,
 };
 use measured_support::{run, shared};
 use rand::{RngExt, SeedableRng};
@@ -47,8 +47,7 @@ fn sources(name: &str, logs: &[Log]) -> RobotSources {
     let machine = slide();
     let of = |(file, log): (usize, &Log)| {
         let parts = reduce(
-            &machine,
-            std::slice::from_ref(log),
+            &Dataset::new(&machine, std::slice::from_ref(log)),
             None,
             &Control::default(),
         )

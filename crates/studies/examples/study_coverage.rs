@@ -13,7 +13,7 @@ mod study;
 use std::f64::consts::TAU;
 
 use cft_ident::config::RobotFile;
-use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq, reduce};
+use cft_ident::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq, reduce};
 use cft_ident::robot::friction::sign;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -151,15 +151,20 @@ fn campaign(seed: u64) -> Value {
 /// Intervals of a fit against the parameters that made its logs.
 fn judged(machine: &LoggedRobot, logs: &[Log], truth: &[f64]) -> Value {
     let (control, settings) = (Control::default(), LsqSettings::default());
-    let parts = reduce(machine, logs, None, &control).expect("parts");
+    let parts = reduce(&Dataset::new(machine, logs), None, &control).expect("parts");
     let blocks = parts
         .logs()
         .iter()
         .map(|log| log.blocks())
         .max()
         .unwrap_or(0);
-    let found = lsq(machine, &parts.as_logs(), &settings, &control).expect("a fit");
-    let of_logs = lsq(machine, logs, &settings, &control).expect("a fit");
+    let found = lsq(
+        &Dataset::new(machine, &parts.as_logs()),
+        &settings,
+        &control,
+    )
+    .expect("a fit");
+    let of_logs = lsq(&Dataset::new(machine, logs), &settings, &control).expect("a fit");
     let (mut intervals, mut covered, mut textbook, mut squares, mut apart) =
         (0, 0, 0, 0.0, 0.0_f64);
     for (i, truth) in truth

@@ -19,7 +19,9 @@ use std::fs;
 use std::path::Path;
 
 use cft_ident::config::{ModelFile, RobotFile};
-use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, PayloadLog, fit_gains, lsq};
+use cft_ident::identify::{
+    Control, Dataset, Log, LoggedRobot, LsqSettings, PayloadLog, fit_gains, lsq,
+};
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::accumulate::BlockFactors;
 use cft_ident::inertia::columns::{Own, RegressorColumns};
@@ -69,13 +71,13 @@ fn run(seed: u64) -> Value {
     };
     let control = Control::default();
     let logs = [empty];
-    let fitted = fit_gains(&machine, &logs, Some(&known), &control).expect("gains");
-    let ratios = fit_gains(&machine, &logs, None, &control).ok();
+    let fitted = fit_gains(&Dataset::new(&machine, &logs), Some(&known), &control).expect("gains");
+    let ratios = fit_gains(&Dataset::new(&machine, &logs), None, &control).ok();
     let settings = LsqSettings {
         gains: Some(&fitted.gains),
         ..LsqSettings::default()
     };
-    let found = lsq(&fitted.machine, &logs, &settings, &control).expect("a fit");
+    let found = lsq(&Dataset::new(&fitted.machine, &logs), &settings, &control).expect("a fit");
     let linear = linear(&machine, [&logs[0], &loaded], given_mass, &control);
     fs::remove_dir_all(&folder).expect("the folder is there");
     let gain = |g: &cft_ident::identify::Gain| json!([g.value, g.std]);

@@ -16,7 +16,7 @@ mod study;
 use std::ops::Range;
 
 use cft_ident::config::RobotFile;
-use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq, reduce};
+use cft_ident::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq, reduce};
 use cft_ident::track::{LogEstimate, follow_together};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -303,10 +303,15 @@ fn whole_way(seed: u64) -> Vec<f64> {
     }
     let control = Control::default();
     let log = Log::of_rows("part", &t, &q, &tau).expect("a log");
-    let part = reduce(&machine, &[log], None, &control)
+    let part = reduce(&Dataset::new(&machine, &[log]), None, &control)
         .expect("a part")
         .as_logs();
-    let found = lsq(&machine, &part, &LsqSettings::default(), &control).expect("a fit");
+    let found = lsq(
+        &Dataset::new(&machine, &part),
+        &LsqSettings::default(),
+        &control,
+    )
+    .expect("a fit");
     let pairs = truth.iter().enumerate();
     pairs
         .map(|(i, truth)| (found.fit.theta[i] - truth) / found.fit.covariance[(i, i)].sqrt())

@@ -8,7 +8,7 @@ use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, out
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{self, GivenModel};
+use cft_ident_stages::identify;
 use cft_ident_stages::replay::ReplayedPair;
 
 const EXAMPLE: &str = "\
@@ -71,15 +71,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
         _ => return documents::run([&args.a, &args.b], context),
     }
-    let given = |path: &Path| {
-        let given = files::model(path, context)?;
-        Ok::<_, CliError>(GivenModel {
-            name: given.name,
-            file: given.value,
-            provenance: given.provenance,
-        })
-    };
-    let models = [given(&args.a)?, given(&args.b)?];
+    let (a, b) = (
+        files::model(&args.a, context)?,
+        files::model(&args.b, context)?,
+    );
+    let models = [a.value, b.value];
     let of = identify::compare(models, &logs_of(&args.logs), context.control())?;
     if of.curves.is_empty() && !args.plot.is_empty() {
         return Err(
@@ -87,11 +83,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 .hint("leave --plot out; --report shows the rest"),
         );
     }
-    let mut read: Vec<_> = of
-        .sides
-        .iter()
-        .map(|s| s.given.provenance.clone())
-        .collect();
+    let mut read = vec![a.provenance, b.provenance];
     if let Some(tried) = &of.tried {
         read.extend(tried.in_memory.inputs.iter().cloned());
     }

@@ -229,7 +229,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let model = model.map(|path| files::model(path, context)).transpose()?;
     let mut inputs = Vec::new();
     let (robot, mut file) = match (&args.robot, &model) {
-        (None, Some(given)) => (given.name.clone(), given.value.robot.clone()),
+        (None, Some(given)) => (given.name.clone(), given.value.file.robot.clone()),
         (path, _) => {
             let path = path.as_deref().unwrap_or(Path::new(ROBOT));
             let given = files::robot(path)?;
@@ -239,12 +239,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     };
     if let Some(given) = &model {
-        given.value.belongs_to(&given.name, &file)?;
+        given.value.file.belongs_to(&given.name, &file)?;
         inputs.push(given.provenance.clone());
     }
     let named = model
         .as_ref()
-        .map(|given| (given.name.as_str(), &given.value));
+        .map(|given| (given.name.as_str(), &given.value.file));
     let aim = args
         .aim
         .as_ref()
@@ -283,7 +283,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         file,
         machine,
         robot,
-        model: model.map(|given| given.value),
+        model: model.map(|given| given.value.file),
         aim,
         inputs,
     };

@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_is_told_in_deviations_and_a_verdict_where_it_changed() {
+    fn a_parameter_is_shown_in_deviations_and_a_verdict_where_it_changed() {
         let (a, b) = (fit(10.0, "identified", 0.05), fit(11.0, "weak", 0.04));
         let found = runs(("a.json", &a), ("b.json", &b)).unwrap();
         let [mass] = found.table.parameters.as_slice() else {

@@ -3,18 +3,19 @@
 use nalgebra::DMatrix;
 
 use super::control::Control;
+use super::dataset::{Dataset, GivenModel};
+use super::dynamics::IdentifiedDynamics;
 use super::error::IdentifyError;
 use super::hold_out::{hold_out, or_warning};
 use super::in_memory::read_each;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::lsq::IdentifiedDynamics;
 use super::model::{in_file, refined};
 use super::motion_fit::MotionFit;
 use super::position_cutoff::known;
 use super::reduced::error::ReducedError;
 use super::residual::JointResidual;
-use super::validate::validate;
+use super::validate::{ValidateSettings, validate};
 use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
 use cft_ident_core::effect::{Added, AugmentedModel};
 use cft_ident_core::inertia::verdict::verdict;
@@ -33,7 +34,7 @@ const MIN_WINDOWS_PER_NUMBER: f64 = 4.0;
 /// # Errors
 /// [`IdentifyError::NotByMotion`] for robots of several axes and friction of another law, logs that are too short, and
 /// a motion that goes astray.
-pub fn by_motion(
+pub(super) fn by_motion(
     machine: &LoggedRobot,
     found: &mut IdentifiedDynamics,
     logs: &[Log],
@@ -87,7 +88,14 @@ pub fn by_motion(
     take(found, &fit);
     let file = found.model(machine, None);
     let model = refined(&file, &machine.name)?;
-    let errors = validate(machine, (&model, None), logs, control, &mut |_, _| {})?;
+    let data = Dataset::new(machine, logs);
+    let given = GivenModel::new(&machine.name, file);
+    let errors = validate(
+        &data,
+        &ValidateSettings::of(&given),
+        control,
+        &mut |_, _| {},
+    )?;
     let errors = errors.validation.errors.joints.into_iter();
     for (j, (joint, error)) in found.joints.iter_mut().zip(errors).enumerate() {
         found.fit.residual_std[j] *= error.rmse / joint.rmse;

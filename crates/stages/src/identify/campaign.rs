@@ -1,31 +1,20 @@
 //! The whole way: friction of single joints, inertias, validation, and what the model lacks.
 
 use super::control::Control;
-use super::diagnose::{DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, diagnose};
+use super::dataset::{Dataset, GivenModel};
+use super::diagnose::{DiagnoseEnd, DiagnoseSettings, diagnose};
+use super::dynamics::IdentifiedDynamics;
 use super::error::IdentifyError;
 use super::error_kind::ErrorKind;
 use super::friction::{FrictionSettings, IdentifiedFriction, friction};
-use super::log::Log;
-use super::logged_robot::LoggedRobot;
-use super::lsq::{IdentifiedDynamics, LsqSettings, lsq};
-use super::model::{new_model, refined};
+use super::lsq::{LsqSettings, lsq};
+use super::model::new_model;
 use super::repeated::{each_row_once, without_rows_of};
-use super::validate::{Validated, validate};
+use super::validate::{ValidateSettings, Validated, validate};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::{DataRole, Provenance};
-
-/// Logs by role.
-#[derive(Debug, Clone, Default)]
-pub struct RoleLogs {
-    /// One-joint logs for the friction filter; without any, friction is fitted with the inertias.
-    pub friction: Vec<Log>,
-    /// Logs that the inertial parameters are fitted to.
-    pub identification: Vec<Log>,
-    /// Held-out logs: what the model is tried on.
-    pub validation: Vec<Log>,
-}
 
 /// How a campaign is run.
 #[derive(Debug, Clone, Default)]
@@ -36,8 +25,6 @@ pub struct IdentifySettings {
     pub consistent: bool,
     /// The friction of the one-joint logs stays as it is.
     pub hold_friction: bool,
-    /// How effects are looked for.
-    pub diagnose: DiagnoseSettings,
 }
 
 /// A stage of a campaign that has ended, with the model that it leaves.
@@ -68,21 +55,21 @@ pub struct Campaigned {
     pub warnings: Vec<String>,
 }
 
-/// Runs a campaign. Friction is fitted again beside an effect, so the diagnosis has the one-joint logs
+/// Runs a campaign; without one-joint logs friction is fitted with the inertias. Friction is fitted again beside an effect, so the diagnosis has the one-joint logs
 /// too; the validation logs are held out of it. `ended` receives each stage's result as it is there,
 /// so that what was finished can be kept whatever follows.
 pub fn identify<E: From<IdentifyError>>(
-    machine: &LoggedRobot,
-    logs: &RoleLogs,
+    data: &Dataset,
     settings: &IdentifySettings,
     control: &Control,
     ended: &mut dyn FnMut(StageEnd) -> Result<(), E>,
 ) -> Result<Campaigned, E> {
+    let machine = &data.machine;
     // a one-joint log may serve both fits, but no log of a fit the validation
-    let validation = ("validation", logs.validation.as_slice());
+    let validation = ("validation", data.held_out.as_slice());
     for (role, fitted) in [
-        ("friction", &logs.friction),
-        ("identification", &logs.identification),
+        ("friction", &data.one_joint),
+        ("identification", &data.logs),
     ] {
         each_row_once(machine, &[(role, fitted), validation])?;
     }
@@ -91,50 +78,48 @@ pub fn identify<E: From<IdentifyError>>(
         inputs.extend(from.iter().cloned().map(|input| input.used_as(role)));
         warnings.extend_from_slice(shown);
     };
-    let known = match logs.friction.as_slice() {
+    let known = match data.one_joint.as_slice() {
         [] => None,
         some => {
-            let found = friction(machine, some, &FrictionSettings::default(), control)?;
+            let alone = Dataset::new(machine, some);
+            let found = friction(&alone, &FrictionSettings::default(), control)?;
             let mut model = new_model(machine, "identify", &found.inputs);
             found.write_into(&mut model);
             ended(StageEnd::Friction(&found, &model))?;
             keep(&found.inputs, &found.warnings, DataRole::Fitted);
-            Some((found, model))
+            Some((found, GivenModel::new("friction.toml", model)))
         }
     };
-    let of_friction = known.as_ref().map(|(_, model)| model);
+    let of_friction = known.as_ref().map(|(_, given)| given);
     let lsq_settings = LsqSettings {
         estimator: settings.estimator,
         consistent: settings.consistent,
-        friction: of_friction.map(|model| ("friction.toml", model)),
+        friction: of_friction,
         hold_friction: settings.hold_friction,
-        gains: None,
+        ..LsqSettings::default()
     };
-    let dynamics = lsq(machine, &logs.identification, &lsq_settings, control)?;
-    let model = dynamics.model(machine, of_friction);
-    ended(StageEnd::Dynamics(&dynamics, &model))?;
+    let dynamics = lsq(data, &lsq_settings, control)?;
+    let model = dynamics.model(machine, of_friction.map(|given| &given.file));
+    let given = GivenModel::new("model.toml", model);
+    ended(StageEnd::Dynamics(&dynamics, &given.file))?;
     keep(&dynamics.inputs, &dynamics.warnings, DataRole::Fitted);
-    let numbers = refined(&model, "model.toml")?;
+    let numbers = given.numbers()?;
     let mut validated = None;
-    if !logs.validation.is_empty() {
-        let given = (&numbers, Some(&model));
-        let found = validate(machine, given, &logs.validation, control, &mut |_, _| {})?;
+    if !data.held_out.is_empty() {
+        let unseen = Dataset::new(machine, &data.held_out);
+        let settings = ValidateSettings::of(&given);
+        let found = validate(&unseen, &settings, control, &mut |_, _| {})?;
         ended(StageEnd::Validated(&found))?;
         keep(&found.inputs, &found.warnings, DataRole::HeldOut);
         validated = Some(found);
     }
-    let one_joint = without_rows_of(machine, &logs.friction, &logs.identification);
-    let train = [logs.identification.as_slice(), &one_joint].concat();
-    let roles = DiagnoseLogs {
-        train: &train,
-        veto: &[],
-        holdout: &logs.validation,
-    };
-    let given = ("model.toml", &model);
-    let diagnosed = diagnose(machine, given, &roles, &settings.diagnose, control);
+    let one_joint = without_rows_of(machine, &data.one_joint, &data.logs);
+    let train = [data.logs.as_slice(), &one_joint].concat();
+    let roles = Dataset::new(machine, &train).with_held_out(&data.held_out);
+    let diagnosed = diagnose(&roles, &DiagnoseSettings::of(&given), control);
     let refined = match &diagnosed {
         Ok(DiagnoseEnd::Diagnosed(found)) if found.diagnosis.written().next().is_some() => {
-            let refined = found.model(machine, &model);
+            let refined = found.model(machine, &given.file);
             ended(StageEnd::Refined(&refined))?;
             Some(refined)
         }
@@ -146,9 +131,9 @@ pub fn identify<E: From<IdentifyError>>(
         ended => ended,
     };
     Ok(Campaigned {
-        friction: known,
+        friction: known.map(|(found, given)| (found, given.file)),
         dynamics,
-        model,
+        model: given.file,
         numbers,
         validated,
         diagnosed,

@@ -5,11 +5,12 @@ use serde::Serialize;
 
 use super::control::Control;
 use super::curve::friction_curve;
+use super::dataset::GivenModel;
 use super::error::IdentifyError;
 use super::in_memory::{InMemory, read_whole};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::model::{refined, refined_or_friction};
+use super::model::refined_or_friction;
 use super::position_cutoff::known;
 use super::repeated::repeated_rows;
 use crate::compare::{self, Difference, ErrorDifferences, ParameterPair, SideBySide};
@@ -24,16 +25,6 @@ use cft_ident_logs::log::{Provenance, escape};
 
 /// Deviation from which on two estimates are called different: 95 % of a normal distribution.
 pub const DIFFERENT: f64 = 1.96;
-
-/// A model file that is given.
-#[derive(Debug, Clone)]
-pub struct GivenModel {
-    /// The file as the user named it, for messages.
-    pub name: String,
-    pub file: ModelFile,
-    /// Its entry among the inputs of the result.
-    pub provenance: Provenance,
-}
 
 /// A model file with what it stands for.
 pub struct Side {
@@ -172,7 +163,7 @@ impl TriedOnLogs {
 /// A model; without logs one of friction alone will do.
 fn side(given: GivenModel, logs: bool) -> Result<Side, IdentifyError> {
     let model = match logs {
-        true => refined(&given.file, &given.name)?,
+        true => given.numbers()?,
         false => refined_or_friction(&given.file, &given.name)?,
     };
     Ok(Side { given, model })
@@ -245,7 +236,7 @@ pub fn compare(
     let sides = [side(a, !logs.is_empty())?, side(b, !logs.is_empty())?];
     one_robot(sides.each_ref())?;
     let first = &sides[0].given;
-    let machine = LoggedRobot::new(&first.name, first.file.robot.clone());
+    let machine = first.machine();
     let mut warnings = cautions(sides.each_ref(), !logs.is_empty());
     warnings.extend(repeated_rows(logs, Some(&machine.file.layout())));
     let tried = match logs {
@@ -344,7 +335,7 @@ impl Compared {
         let model = |side: &Side| {
             let from = &side.given.file.provenance;
             ComparedModel {
-                name: side.given.provenance.name.clone(),
+                name: side.given.file_name().to_owned(),
                 version: from.version.clone(),
                 command: from.command.clone(),
                 inputs: from.inputs.clone(),
@@ -399,7 +390,7 @@ impl Compared {
 
     /// Name of a model's file.
     pub fn name(&self, side: usize) -> String {
-        escape(&self.sides[side].given.provenance.name)
+        self.sides[side].given.file_name().to_owned()
     }
 
     /// Parameters that differ by more than chance explains, the largest deviation first.

@@ -108,7 +108,7 @@ mod tests {
     use std::sync::Mutex;
 
     #[test]
-    fn work_is_told_from_its_begin_to_its_end() {
+    fn work_is_reported_from_its_begin_to_its_end() {
         let said = Arc::new(Mutex::new(Vec::new()));
         let heard = Arc::clone(&said);
         let control =

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::contact::contacts;
 use super::control::{Control, Progress};
+use super::dataset::{Dataset, GivenModel};
 use super::error::IdentifyError;
 use super::hold_out::{Held, hold_out, or_warning};
 use super::in_memory::{InMemory, read_each};
@@ -34,20 +35,10 @@ use cft_ident_files::config::candidates::CandidateSection;
 use cft_ident_files::config::model_file::{FrictionPrior, Parameter};
 use cft_ident_logs::log::DataRole;
 
-/// Logs by what they are for.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct DiagnoseLogs<'a> {
-    /// Fitted.
-    pub train: &'a [Log],
-    /// Judge what is added, and are never fitted.
-    pub veto: &'a [Log],
-    /// Evaluated once, after everything is decided; without any, blocks are set aside.
-    pub holdout: &'a [Log],
-}
-
-/// How effects are looked for.
-#[derive(Debug, Clone, Default)]
-pub struct DiagnoseSettings {
+/// How effects are looked for that a model lacks.
+#[derive(Debug, Clone)]
+pub struct DiagnoseSettings<'a> {
+    pub model: &'a GivenModel,
     /// The inertial parameters of the given model stay: finds payload, gain and tilt.
     pub keep: bool,
     /// What the user asks for besides.
@@ -102,45 +93,54 @@ pub struct DataFault {
     pub remedy: String,
 }
 
-/// Refuses effects of a user's own that cannot be tried beside a model, whose file is called `name`.
-///
-/// # Errors
-/// Formulas that are none on this robot, and a name that the model has for another effect.
-pub fn check_candidates(
-    candidates: &[CandidateSection],
-    machine: &LoggedRobot,
-    (name, file): (&str, &ModelFile),
-) -> Result<(), IdentifyError> {
-    own_laws(candidates, &machine.robot)?;
-    let other = |own: &&CandidateSection| {
-        let mut known = file.candidates.iter();
-        known.any(|known| known.name == own.name && known != *own)
-    };
-    match candidates.iter().find(other) {
-        Some(own) => Err(IdentifyError::CandidateOfModel {
-            name: own.name.clone(),
-            model: name.to_owned(),
-        }),
-        None => Ok(()),
+impl<'a> DiagnoseSettings<'a> {
+    /// What is looked for where the user asks for nothing else.
+    pub fn of(model: &'a GivenModel) -> Self {
+        DiagnoseSettings {
+            model,
+            keep: false,
+            wishes: Wishes::default(),
+            candidates: Vec::new(),
+            hold_friction: false,
+        }
+    }
+
+    /// Refuses effects of a user's own that cannot be tried beside the model.
+    ///
+    /// # Errors
+    /// Formulas that are none on this robot, and a name that the model has for another effect.
+    pub fn check_candidates(&self) -> Result<(), IdentifyError> {
+        own_laws(&self.candidates, &self.model.file.robot.robot())?;
+        let other = |own: &&CandidateSection| {
+            let mut known = self.model.file.candidates.iter();
+            known.any(|known| known.name == own.name && known != *own)
+        };
+        match self.candidates.iter().find(other) {
+            Some(own) => Err(IdentifyError::CandidateOfModel {
+                name: own.name.clone(),
+                model: self.model.name.clone(),
+            }),
+            None => Ok(()),
+        }
     }
 }
 
-/// Diagnoses a model, whose file is called `name`, on logs.
+/// Diagnoses a model on logs; without held-out ones, blocks of the others are set aside.
 ///
 /// # Errors
 /// Logs or a model that cannot be used, and logs too short to look for effects.
 pub fn diagnose(
-    machine: &LoggedRobot,
-    (name, file): (&str, &ModelFile),
-    logs: &DiagnoseLogs,
+    data: &Dataset,
     settings: &DiagnoseSettings,
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
+    let machine = &data.machine;
+    let (name, as_given) = (settings.model.name.as_str(), &settings.model.file);
     // what is looked for stands beside the plain fit
-    let (as_given, plain) = (file, file.as_fitted());
+    let plain = as_given.as_fitted();
     let file = &plain;
     let given = refined(file, name)?;
-    check_candidates(&settings.candidates, machine, (name, file))?;
+    settings.check_candidates()?;
     let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
     let mut judged = file.parameters.iter().filter(judged).peekable();
     let determined = |p: &Parameter| matches!(p.verdict, Some(Verdict::Identified | Verdict::Weak));
@@ -149,31 +149,31 @@ pub fn diagnose(
             model: name.to_owned(),
         });
     }
-    if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
+    if let Some(fault) = without_gains(machine).or(refused(machine, &data.logs, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
     each_row_once(
         machine,
         &[
-            ("fit", logs.train),
-            ("veto", logs.veto),
-            ("holdout", logs.holdout),
+            ("fit", &data.logs),
+            ("veto", &data.veto),
+            ("holdout", &data.held_out),
         ],
     )?;
     let groups = [
-        (logs.train, LogRole::Train),
-        (logs.veto, LogRole::Veto),
-        (logs.holdout, LogRole::Holdout),
+        (&data.logs, LogRole::Train),
+        (&data.veto, LogRole::Veto),
+        (&data.held_out, LogRole::Holdout),
     ];
-    let roles = |(logs, role): &(&[Log], LogRole)| vec![*role; logs.len()];
+    let roles = |(logs, role): &(&Vec<Log>, LogRole)| vec![*role; logs.len()];
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
-    let all = [logs.train, logs.veto, logs.holdout].concat();
+    let all = [&*data.logs, &data.veto, &data.held_out].concat();
     let laws = known(&given.model);
     let together = machine.with_position_cutoffs(&all, &laws, control)?;
     let each = machine.settings_of_each(&all, &laws, &together, control)?;
     let machine = &together;
     let mut in_memory = read_each(machine, &each, &all, control)?;
-    let contact = contacts(machine, logs.train, control)?;
+    let contact = contacts(machine, &data.logs, control)?;
     in_memory.warnings.splice(0..0, contact.iter().cloned());
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
@@ -183,13 +183,13 @@ pub fn diagnose(
     machine.check_taken(&taken, &all, &in_memory.stretches)?;
     let fitted = match settings.keep {
         true => &[],
-        false => &in_memory.inputs[..logs.train.len()],
+        false => &in_memory.inputs[..data.logs.len()],
     };
     let (before, friction_prior) = match settings.hold_friction {
         true => (file.clone(), file.friction_prior.clone()),
         false => before_these((name, file), fitted)?,
     };
-    let (fitted, vetoed) = (logs.train.len(), logs.train.len() + logs.veto.len());
+    let (fitted, vetoed) = (data.logs.len(), data.logs.len() + data.veto.len());
     for (at, input) in in_memory.inputs.iter_mut().enumerate() {
         input.role = Some(match at {
             at if at < fitted => DataRole::Fitted,
@@ -224,9 +224,8 @@ pub fn diagnose(
         Err(error) => return Err(IdentifyError::Diagnose(error)),
     };
     in_memory.stretches = std::mem::take(&mut case.stretches);
-    let train = logs.train;
     // beside a log that vetoes, held-out data measure and choose nothing
-    let holdout_chooses = logs.veto.is_empty();
+    let holdout_chooses = data.veto.is_empty();
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
         if aside.role == LogRole::Holdout {
@@ -257,7 +256,7 @@ pub fn diagnose(
         let tried = hold_out(
             machine,
             (&refined, &found.diagnosis.model),
-            (train, &found.in_memory.inputs),
+            (&data.logs, &found.in_memory.inputs),
             control,
         );
         found.held = or_warning(tried, &mut found.in_memory.warnings)?;

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_free_swing_is_told_from_a_dead_channel() {
+    fn a_free_swing_is_no_dead_channel() {
         let wavers = |drive: f64| drive + 0.3 * (17.0 * drive).sin();
         assert_eq!(judged(&[rows(wavers, true)], 5, 2, &|_| true), Some(true));
         assert_eq!(judged(&[rows(wavers, false)], 5, 2, &|_| true), Some(false));

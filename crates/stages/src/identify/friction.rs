@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::control::Control;
+use super::dataset::Dataset;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
@@ -142,11 +143,11 @@ impl FrictionOfJoint {
 /// # Errors
 /// Logs that cannot be used, and logs that do not move one joint through zero speed.
 pub fn friction(
-    machine: &LoggedRobot,
-    logs: &[Log],
+    data: &Dataset,
     settings: &FrictionSettings,
     control: &Control,
 ) -> Result<IdentifiedFriction, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
     machine.check_gains()?;
     each_row_once(machine, &[("fit", logs)])?;
     let (groups, inputs, found) = by_joint(machine, logs, settings, control)?;

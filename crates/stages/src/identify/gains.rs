@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::control::Control;
+use super::dataset::Dataset;
 use super::error::IdentifyError;
 use super::gain_error::GainError;
 use super::log::Log;
@@ -88,11 +89,11 @@ impl FittedGains {
 /// # Errors
 /// [`GainError`] where the data do not fix them, and logs that cannot be used.
 pub fn fit_gains(
-    machine: &LoggedRobot,
-    logs: &[Log],
+    data: &Dataset,
     payload: Option<&PayloadLog>,
     control: &Control,
 ) -> Result<FittedGains, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
     usable(machine, payload)?;
     let shape = payload
         .map(|_| PayloadColumns::of(&machine.robot))

@@ -1,51 +1,39 @@
 //! The inertial parameters by linear least squares, and friction with them where it is not known.
 
-use nalgebra::DMatrix;
-use schemars::JsonSchema;
-use serde::Serialize;
-
+use super::by_motion::by_motion;
 use super::consistent::{ConsistentLinks, consistent, or_plain_fit};
 use super::contact::hangs_on_bridged;
 use super::control::Control;
+use super::dataset::{Dataset, GivenModel};
+use super::dynamics::{EssentialFit, IdentifiedDynamics};
 use super::error::IdentifyError;
-use super::estimate::{Account, Basis, Estimated, estimate};
+use super::estimate::{Basis, Estimated, estimate};
 use super::gain_error::GainError;
-use super::gains::{CurrentGains, Gain};
+use super::gains::CurrentGains;
 use super::geometry::geometry;
 use super::hold_out::{Held, hold_out, or_warning};
-use super::known_friction::{FrictionBefore, FrictionOfFit};
+use super::known_friction::FrictionBefore;
 use super::log::Log;
-use super::logged_robot::LoggedRobot;
 use super::lsq_warnings::{confounded, negative, rests, with_friction};
-use super::model::{new_model, refined};
-use super::motion_fit::MotionFit;
+use super::model::refined;
 use super::open_loop::is_in_si;
 use super::own_settings::CutoffCosts;
 use super::passes::Passes;
-use super::position_cutoff::PositionCutoff;
 use super::reduced::error::ReducedError;
 use super::reduced::reduced_log::{MadeWith, ReducedLog};
 use super::repeated::each_row_once;
 use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{FittedUnknown, columns, unknowns};
-use super::weakest::{WeakestPart, weakest};
-use crate::setup::Finding;
+use super::weakest::weakest;
 use cft_ident_core::inertia::accumulate::RelativeResidual;
-use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::essential::{Essential, essential};
 use cft_ident_core::inertia::gains::by_gains;
-use cft_ident_core::inertia::solution::{ConditionNumbers, FitError};
-use cft_ident_core::inertia::solve::{Fit, factor, residual_of, weights_of};
-use cft_ident_core::motion::Summary;
-use cft_ident_core::robot::friction::DoubleTanh;
+use cft_ident_core::inertia::solution::FitError;
+use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::Verdict;
-use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::campaign::EstimatorKind;
-use cft_ident_files::config::identified::friction_meaning;
-use cft_ident_files::config::model_file::{FrictionPrior, Parameter};
 use cft_ident_files::config::robot_file::FrictionLawKind;
-use cft_ident_logs::log::Provenance;
 
 /// How the inertial parameters are fitted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -54,78 +42,15 @@ pub struct LsqSettings<'a> {
     pub estimator: EstimatorKind,
     /// Physically consistent parameters beside those of the plain fit.
     pub consistent: bool,
-    /// The model that holds the friction of every joint, and its name for messages; without one,
-    /// friction is fitted together with the inertias.
-    pub friction: Option<(&'a str, &'a ModelFile)>,
+    /// The model that holds the friction of every joint; without one, friction is fitted together with the inertias.
+    pub friction: Option<&'a GivenModel>,
     /// The friction of `friction` stays as it is; otherwise it is refined with the inertias, but for `ols`.
     pub hold_friction: bool,
+    /// Then fit a single axis to the motion that its torques make, in windows of so many seconds that begin at measured
+    /// states; without a length, blocks that are set aside choose it.
+    pub open_loop: Option<Option<f64>>,
     /// Gains that were fitted before, whose uncertainty the parameters share.
     pub gains: Option<&'a CurrentGains>,
-}
-
-/// What `lsq` found.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct IdentifiedDynamics {
-    #[serde(rename = "parameters")]
-    pub unknowns: Vec<FittedUnknown>,
-    /// The friction that was known, before and after the fit.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub friction: Vec<FrictionOfFit>,
-    /// Gains of the torque channels, where they were fitted.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub gains: Vec<Gain>,
-    pub essential: EssentialFit,
-    /// Physically consistent links and what they cost, where they were asked for.
-    #[serde(rename = "feasible")]
-    pub consistent: Option<ConsistentLinks>,
-    pub condition: ConditionNumbers,
-    /// Directions of the parameters that the rows determine.
-    pub rank: usize,
-    /// The combination of parameters that they determine least.
-    pub weakest_direction: Vec<WeakestPart>,
-    /// Rows of all joints.
-    pub samples: u64,
-    /// Effective sample size, of all joints.
-    pub effective_samples: f64,
-    /// Residual of the fit.
-    pub joints: Vec<JointResidual>,
-    /// The fit to the motion, where one was asked for; `parameters` and `joints` are its own then.
-    #[serde(rename = "open_loop", skip_serializing_if = "Option::is_none")]
-    pub by_motion: Option<MotionFit>,
-    /// By which filter positions became velocities; joints that never move are left out.
-    pub position_cutoffs: Vec<PositionCutoff>,
-    #[serde(rename = "estimator")]
-    pub account: Account,
-    #[serde(rename = "processing")]
-    pub summary: Summary,
-    /// What the check of the set-up found, where it was made.
-    pub setup: Vec<Finding>,
-    #[serde(skip)]
-    pub columns: RegressorColumns,
-    #[serde(skip)]
-    pub fit: Fit,
-    /// Covariance of the unknowns and of the known friction of each joint.
-    #[serde(skip)]
-    pub covariance: DMatrix<f64>,
-    /// What a model file keeps of the friction before the fit.
-    #[serde(skip)]
-    pub friction_prior: Vec<FrictionPrior>,
-    /// What the model leaves of data set aside.
-    #[serde(skip)]
-    pub held: Held,
-    #[serde(skip)]
-    pub inputs: Vec<Provenance>,
-    #[serde(skip)]
-    pub warnings: Vec<String>,
-}
-
-/// The unknowns that the data are really about.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct EssentialFit {
-    /// How many they are.
-    pub count: usize,
-    /// Residual of the fit with those alone.
-    pub joints: Vec<RelativeError>,
 }
 
 /// Fits the inertial parameters.
@@ -134,16 +59,13 @@ pub struct EssentialFit {
 /// Logs that cannot be used, settings that contradict the robot file, and data that determine none
 /// of the parameters.
 pub fn lsq(
-    machine: &LoggedRobot,
-    logs: &[Log],
+    data: &Dataset,
     settings: &LsqSettings,
     control: &Control,
 ) -> Result<IdentifiedDynamics, IdentifyError> {
-    let LsqSettings {
-        estimator,
-        friction,
-        ..
-    } = *settings;
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let estimator = settings.estimator;
+    let friction = (settings.friction).map(|given| (given.name.as_str(), &given.file));
     machine.check_gains()?;
     each_row_once(machine, &[("fit", logs)])?;
     if settings.gains.is_some() && friction.is_some() {
@@ -316,6 +238,9 @@ pub fn lsq(
             .and_then(|model| hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control));
         found.held = or_warning(tried, &mut found.warnings)?;
     }
+    if let Some(window) = settings.open_loop {
+        by_motion(machine, &mut found, logs, window, control)?;
+    }
     Ok(found)
 }
 
@@ -370,56 +295,4 @@ fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyEr
         .map(|(a, w)| if *w > 0.0 { a / w } else { 1.0 });
     let error = growth.zip(&fit.relative_error).map(|(g, e)| g * e.all);
     Ok((found, error.collect()))
-}
-
-impl IdentifiedDynamics {
-    /// The model: friction as it was known, and what was fitted, with their joint covariance.
-    pub fn model(&self, machine: &LoggedRobot, friction: Option<&ModelFile>) -> ModelFile {
-        let mut model = new_model(machine, "lsq", &self.inputs);
-        model.parameters = self.unknowns.iter().map(FittedUnknown::parameter).collect();
-        let robot = &machine.robot;
-        let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
-        if let Some(friction) = friction {
-            let known = &self.columns.known;
-            let names = robot.joint_names().iter().enumerate();
-            // where it was refined it is among what was fitted
-            for (j, joint) in names.filter(|(j, _)| known[*j].is_some()) {
-                for name in DoubleTanh::NAMES {
-                    let Some(p) = friction.find(name, Some(joint)) else {
-                        continue;
-                    };
-                    keys.push(p.key());
-                    let found = self.friction.get(j).and_then(|f| f.parameters.get(name));
-                    model.parameters.push(match found {
-                        Some(found) if !found.held => Parameter {
-                            value: found.value,
-                            std: found.std,
-                            verdict: found.verdict,
-                            meaning: friction_meaning(name).to_owned(),
-                            ..p.clone()
-                        },
-                        found => Parameter {
-                            value: found.map_or(p.value, |found| found.value),
-                            ..p.clone()
-                        },
-                    });
-                }
-            }
-            model.effects = friction.effects.clone();
-            model.friction_prior.clone_from(&self.friction_prior);
-        }
-        if let Some(by_motion) = &self.by_motion {
-            model.effects.clone_from(&by_motion.effects);
-        }
-        let fit = &self.fit;
-        model.replace_covariance(&keys, &|a, b| self.covariance[(a, b)]);
-        for (joint, std) in robot.joint_names().iter().zip(&fit.residual_std) {
-            model.residual_std.insert(joint.clone(), *std);
-        }
-        if let Some(consistent) = &self.consistent {
-            consistent.write_into(&mut model);
-        }
-        self.held.write_into(&mut model);
-        model
-    }
 }

@@ -1,22 +1,25 @@
-//! The stages of an identification as functions of a robot and its logs.
+//! The stages of an identification as functions of a dataset and a request.
 //!
-//! A [`LoggedRobot`] is a robot file with all that it says of logs, a [`Log`] a file or arrays in
-//! memory, a [`Control`] the callbacks for progress and cancellation. Each stage returns its result as
-//! plain data, with warnings as sentences; it reads logs and writes nothing.
+//! A [`Dataset`] is a robot as its file describes it ([`LoggedRobot`]) with its logs by what they are for; a [`Log`] is a
+//! file, arrays in memory or a reduced log. Of a file the rows are parsed once and serve every stage. A [`GivenModel`] is
+//! a model file, a [`Control`] the callbacks for progress and cancellation. Each stage returns its result as plain data,
+//! with warnings as sentences; it writes nothing. `validate`, `torque` and `watch` hand over single rows as they come.
 //!
 //! | stage | from | to |
 //! |---|---|---|
+//! | [`check_setup()`] | logs | [`CheckedSetup`]: mistakes of the robot file that the torques show |
 //! | [`friction()`] | one-joint logs | [`IdentifiedFriction`]: theta 13..32 with covariance |
 //! | [`fit_gains()`] | logs of currents, one with a known payload | [`FittedGains`]: torque per ampere of each joint |
 //! | [`lsq()`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
 //! | [`diagnose()`] | a model, logs | [`Diagnosed`]: effects that the model lacks, the refined model |
 //! | [`reduce()`] | logs | [`ReducedLogs`]: what a linear fit needs of each, for a small file |
 //! | [`validate()`] | logs that were not used, a model | [`Validated`]: torque errors |
+//! | [`payload()`] | logs with a load, a model without it | [`Payload`]: mass, centre and inertia of the load |
 //! | [`track()`] | reduced logs or models in order of time | [`Tracked`]: courses of parameters, changes, robots that differ |
 //! | [`compare()`] | two models, logs | [`Compared`]: differences of parameters and of errors |
 //! | [`torque()`] | positions, a model | [`FeedForward`]: torques with their band |
 //! | [`watch()`] | rows as they come, a model | [`Watched`]: external torques, alarms |
-//! | [`identify()`] | logs by role | [`Campaigned`]: all of it, one after the other |
+//! | [`identify()`] | logs by what they are for | [`Campaigned`]: all of it, one after the other |
 
 mod by_motion;
 mod campaign;
@@ -25,8 +28,10 @@ mod consistent;
 mod contact;
 mod control;
 mod curve;
+mod dataset;
 mod diagnose;
 mod diagnosis;
+mod dynamics;
 mod error;
 mod error_kind;
 mod estimate;
@@ -78,18 +83,15 @@ mod validate;
 mod watch;
 mod weakest;
 
-pub use by_motion::by_motion;
-pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
-pub use compare::{
-    Compared, ComparisonResult, Curves, DIFFERENT, GivenModel, Side, TriedOnLogs, compare,
-};
+pub use campaign::{Campaigned, IdentifySettings, StageEnd, identify};
+pub use compare::{Compared, ComparisonResult, Curves, DIFFERENT, Side, TriedOnLogs, compare};
 pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior, project};
 pub use control::{Control, Progress};
 pub use curve::friction_curve;
-pub use diagnose::{
-    DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, check_candidates, diagnose,
-};
+pub use dataset::{Dataset, GivenModel};
+pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseSettings, Diagnosed, diagnose};
 pub use diagnosis::{DiagnosisResult, DiagnosisVerdict, signal_words};
+pub use dynamics::{EssentialFit, IdentifiedDynamics};
 pub use error::{IdentifyError, ReadError};
 pub use error_kind::ErrorKind;
 pub use estimate::{Account, JointAccount};
@@ -105,12 +107,11 @@ pub use in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use known_friction::{FrictionOfFit, FrictionParameter};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};
-pub use lsq::{EssentialFit, IdentifiedDynamics, LsqSettings, lsq};
+pub use lsq::{LsqSettings, lsq};
 pub use model::{new_model, refined, refined_or_friction};
 pub use motion_fit::MotionFit;
 pub use next_motion::{narrowing_command, separating_command};
 pub use open_log::OpenLog;
-pub use open_loop::{free_run, open_loop};
 pub use passes::SimulatedLoop;
 pub use payload::payload;
 pub use payload_result::{GainOff, LeftOfJoint, Number95, Payload, PayloadReading, PayloadVerdict};
@@ -129,7 +130,9 @@ pub use track::{
 pub use track_error::TrackError;
 pub use track_source::TrackSource;
 pub use unknowns::FittedUnknown;
-pub use validate::{ErrorsByUse, ErrorsOfLogs, Validated, not_a_validation, used_for, validate};
+pub use validate::{
+    ErrorsByUse, ErrorsOfLogs, ValidateSettings, Validated, not_a_validation, used_for, validate,
+};
 pub use watch::{
     STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch, watch_recipe,
 };

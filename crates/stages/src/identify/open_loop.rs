@@ -18,7 +18,7 @@ const WINDOW_S: f64 = 0.25;
 
 /// Simulates the motion of logs from their torques, in windows that begin at measured states; without a length
 /// single axes run from the begin of each stretch to its end, and other robots in windows of 0.25 s.
-pub fn open_loop(
+pub(super) fn open_loop(
     machine: &LoggedRobot,
     refined: &AugmentedModel,
     logs: &[Log],
@@ -42,9 +42,9 @@ pub fn open_loop(
     Ok(along(refined, &whole.stretches, length))
 }
 
-/// The free run of a model on logs, which are these inputs; nothing where torques are in no SI unit, where a log is
+/// The free run of a model on logs that were read as `inputs`; nothing where torques are in no SI unit, where a log is
 /// reduced, or where the logs are too short.
-pub fn free_run(
+pub(super) fn free_run(
     machine: &LoggedRobot,
     refined: &AugmentedModel,
     (logs, inputs): (&[Log], &[Provenance]),

@@ -8,9 +8,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::control::Control;
+use super::dataset::{Dataset, GivenModel};
 use super::error::IdentifyError;
 use super::in_memory::{InMemory, read_whole};
-use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::payload_result::{
     GainOff, LeftOfJoint, Number95, Payload, PayloadReading, PayloadVerdict,
@@ -59,11 +59,12 @@ struct Rows {
 /// # Errors
 /// Logs that cannot be used, and a robot whose last link has no place for a body.
 pub fn payload(
-    machine: &LoggedRobot,
-    (name, file, model): (&str, &ModelFile, &AugmentedModel),
-    logs: &[Log],
+    data: &Dataset,
+    given: &GivenModel,
     control: &Control,
 ) -> Result<Payload, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let (name, file, model) = (given.name.as_str(), &given.file, &given.numbers()?);
     let robot = &machine.robot;
     if robot.tool_stays_level() {
         return Err(IdentifyError::NoPayload {

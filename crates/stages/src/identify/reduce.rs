@@ -4,17 +4,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::control::Control;
+use super::dataset::{Dataset, GivenModel};
 use super::error::IdentifyError;
 use super::known_friction::FrictionBefore;
 use super::log::Log;
-use super::logged_robot::LoggedRobot;
 use super::passes::{Passes, PositionFilter};
 use super::reduced::{MadeWith, Readings, ReducedLog, ReducedLogs};
 use super::repeated::each_row_once;
 use super::unknowns::columns;
 use cft_ident_core::inertia::encoder::GRIDS;
 use cft_ident_core::robot::model::JointFriction;
-use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::robot_file::FrictionLawKind;
 
@@ -32,17 +31,18 @@ impl ReducedLogs {
     }
 }
 
-/// Reduces logs. With `friction`, a model and its name, the friction of that model is known to a fit and held.
+/// Reduces logs. With `friction`, the friction of that model is known to a fit and held.
 ///
 /// # Errors
 /// Logs that cannot be used, a friction law that is not linear and that no model gives, and rows that are
 /// given twice.
 pub fn reduce(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
+    data: &Dataset,
+    friction: Option<&GivenModel>,
     control: &Control,
 ) -> Result<ReducedLogs, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let friction = friction.map(|given| (given.name.as_str(), &given.file));
     machine.check_gains()?;
     each_row_once(machine, &[("reduce", logs)])?;
     if friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh {

@@ -10,6 +10,7 @@ use cft_ident_core::robot::friction::sign;
 use cft_ident_logs::log::{DeclaredChannels as Logged, Layout};
 
 use super::control::Control;
+use super::dataset::Dataset;
 use super::error::IdentifyError;
 use super::gains;
 use super::log::Log;
@@ -32,11 +33,8 @@ pub struct CheckedSetup {
 
 /// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
 /// logs are passed over: they hold no rows to look at, and were checked when they were made.
-pub fn check_setup(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    control: &Control,
-) -> Result<CheckedSetup, IdentifyError> {
+pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
     if machine.as_declared {
         return Ok(CheckedSetup::default());
     }

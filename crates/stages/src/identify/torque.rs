@@ -4,12 +4,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::control::Control;
+use super::dataset::GivenModel;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::position_cutoff::known;
 use crate::band::{Band, Deviation, NO_BAND, Reach};
-use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{self, FilterSettings, Summary};
 use cft_ident_core::robot::model::Model;
 use cft_ident_files::config::ModelFile;
@@ -43,16 +43,16 @@ pub struct FeedForward {
     pub warnings: Vec<String>,
 }
 
-/// Torques along a log of positions by a model, `refined` being what its `file` stands for. `row` gets
+/// Torques along a log of positions by a model. `row` gets
 /// the time of each sample \[s\], the torque of every joint, their standard deviations and, where the file holds what
 /// it takes, half the widths of their 95 % bands \[N or Nm\], and the instant from which time is counted.
 pub fn torque(
-    machine: &LoggedRobot,
-    (file, refined): (&ModelFile, &AugmentedModel),
+    given: &GivenModel,
     log: &Log,
     control: &Control,
     row: &mut dyn FnMut(f64, &[f64], Instant),
 ) -> Result<FeedForward, IdentifyError> {
+    let (machine, file, refined) = (&given.machine(), &given.file, &given.numbers()?);
     let model = &refined.model;
     let n = machine.robot.joints();
     let band = Band::new(file, model);

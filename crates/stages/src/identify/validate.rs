@@ -4,10 +4,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::control::Control;
+use super::dataset::{Dataset, GivenModel};
 use super::error::IdentifyError;
 use super::in_memory::read_whole;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::open_loop::{free_run, open_loop};
 use super::position_cutoff::known;
 use super::reduced::error::ReducedError;
 use super::reduced::reduced_log::ReducedLog;
@@ -80,7 +82,7 @@ impl Validated {
 
 /// Which inputs hold rows that a model was made from.
 ///
-/// OneEstimate by checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
+/// By checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
 /// model was fitted to into an unseen one.
 pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
     let held_out = |made: &Provenance| made.role == Some(DataRole::HeldOut);
@@ -89,18 +91,68 @@ pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
     inputs.iter().map(used).collect()
 }
 
-/// Reconstructs the torque of logs, with a band where the model's `file` holds what it takes; `row` gets every raw
+/// What a model is tried by.
+#[derive(Debug, Clone, Copy)]
+pub struct ValidateSettings<'a> {
+    pub model: &'a GivenModel,
+    /// Simulate the motion from the measured torques in short windows too.
+    pub free_run: bool,
+    /// Simulate the motion in windows of so many seconds that begin at measured states; without a length single axes
+    /// run from begin to end, and other robots in windows of 0.25 s.
+    pub open_loop: Option<Option<f64>>,
+}
+
+impl<'a> ValidateSettings<'a> {
+    /// The errors of torques alone.
+    pub fn of(model: &'a GivenModel) -> Self {
+        ValidateSettings {
+            model,
+            free_run: false,
+            open_loop: None,
+        }
+    }
+}
+
+/// Reconstructs the torque of logs, with a band where the model file holds what it takes; `row` gets every raw
 /// sample, and the instant from which its time is counted.
 ///
 /// Band and rows are of positions that came through the filter by which the band was found: where these logs call for
 /// another, they are read again.
+///
+/// # Errors
+/// Logs or a model that cannot be used, and positions where a joint of this robot cannot stand.
 pub fn validate(
-    machine: &LoggedRobot,
-    (refined, file): (&AugmentedModel, Option<&ModelFile>),
-    logs: &[Log],
+    data: &Dataset,
+    settings: &ValidateSettings,
     control: &Control,
     row: &mut dyn FnMut(&Reconstructed, Instant),
 ) -> Result<Validated, IdentifyError> {
+    let logs = data.logs.as_slice();
+    let refined = &settings.model.numbers()?;
+    let mut found = errors_of(data, (refined, &settings.model.file), control, row)?;
+    if settings.free_run {
+        found.free_run = free_run(&data.machine, refined, (logs, &found.inputs), control)?;
+    }
+    if let Some(window) = settings.open_loop {
+        let simulated = open_loop(&data.machine, refined, logs, window, control)?;
+        if simulated.astray > 0 {
+            found.warnings.push(format!(
+                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit again without --unconstrained",
+                simulated.astray, simulated.windows
+            ));
+        }
+        found.open_loop = Some(simulated);
+    }
+    Ok(found)
+}
+
+fn errors_of(
+    data: &Dataset,
+    (refined, file): (&AugmentedModel, &ModelFile),
+    control: &Control,
+    row: &mut dyn FnMut(&Reconstructed, Instant),
+) -> Result<Validated, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
     let whole = not_reduced(logs);
     let machine = match whole.is_empty() {
         true => machine.clone(),
@@ -109,8 +161,8 @@ pub fn validate(
     smoothed_alike(&machine, logs)?;
     let of_model = (refined, file);
     // a band is of single rows, which a reduced log has not
-    let file = file.filter(|_| whole.len() == logs.len());
-    let band = file.and_then(|file| Band::new(file, &refined.model));
+    let rows = whole.len() == logs.len();
+    let band = Band::new(file, &refined.model).filter(|_| rows);
     let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
     let mut places = Places::new(&machine);
@@ -149,7 +201,7 @@ pub fn validate(
     }
     match &reach {
         Some(reach) => found.warnings.extend(reach.in_words()),
-        None if file.is_some() => found.warnings.push(NO_BAND.to_owned()),
+        None if rows => found.warnings.push(NO_BAND.to_owned()),
         None => {}
     }
     Ok(found)
@@ -317,7 +369,7 @@ fn not_reduced(logs: &[Log]) -> Vec<Log> {
 
 fn reconstruct(
     machine: &LoggedRobot,
-    (refined, file): (&AugmentedModel, Option<&ModelFile>),
+    (refined, file): (&AugmentedModel, &ModelFile),
     band: Option<&Band>,
     logs: &[Log],
     control: &Control,
@@ -383,7 +435,7 @@ fn reconstruct(
         ));
     }
     let summary = last.ok_or(IdentifyError::NoLog)?;
-    let used = file.map_or(Vec::new(), |file| used_for(file, &inputs));
+    let used = used_for(file, &inputs);
     let part = |of_use: bool| ErrorsOfLogs {
         logs: (logs.iter().zip(&used).filter(|(_, used)| **used == of_use))
             .map(|(log, _)| log.name())

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::control::Control;
+use super::dataset::GivenModel;
 use super::error::IdentifyError;
 use super::hold_out::{Held, on_other_logs};
 use super::in_use::levers;
@@ -15,11 +16,9 @@ use super::logged_robot::LoggedRobot;
 use super::temperatures;
 use crate::band::Directions;
 use crate::observe::{Alarm, Alarms, Explainer, Explanation, Observer, Recipe, recipe};
-use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{FilterSettings, ZeroOrderHold};
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
-use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::held_out::{Excesses, HeldOut};
 use cft_ident_logs::log::{Block, Instant, LogSpec, Provenance, Reader};
 
@@ -128,11 +127,12 @@ fn learnt<'a>(
 /// # Errors
 /// A model without data set aside, filters that the rate does not carry.
 pub fn watch_recipe(
-    machine: &LoggedRobot,
-    (name, file, refined): (&str, &ModelFile, &AugmentedModel),
+    given: &GivenModel,
     step_s: f64,
     per_hour: f64,
 ) -> Result<Recipe, IdentifyError> {
+    let (name, file) = (given.name.as_str(), &given.file);
+    let (machine, refined) = (&given.machine(), &given.numbers()?);
     let held = &file.held_out;
     let excesses = learnt(name, held, file.excesses.as_ref())?;
     let settings = processing(machine, excesses);
@@ -142,20 +142,20 @@ pub fn watch_recipe(
         .map_err(|error| IdentifyError::motion(name, error))
 }
 
-/// Watches rows as they come; `line` gets what each shows and says whether to go on. `refined` is what the model
-/// `file`, called `name`, stands for.
+/// Watches rows as they come; `line` gets what each shows and says whether to go on.
 ///
 /// # Errors
 /// A model without data set aside, an input whose first lines cannot be used, and interruption. An error behind the
 /// first rows ends it with what was seen so far.
 pub fn watch(
-    machine: &LoggedRobot,
-    (name, file, refined): (&str, &ModelFile, &AugmentedModel),
+    given: &GivenModel,
     input: Watchable,
     settings: &WatchSettings,
     control: &Control,
     line: &mut dyn FnMut(&WatchLine) -> bool,
 ) -> Result<Watched, IdentifyError> {
+    let (name, file) = (given.name.as_str(), &given.file);
+    let (machine, refined) = (&given.machine(), &given.numbers()?);
     let (held, mut inputs) = match settings.unloaded {
         [] => (
             Held {

@@ -99,7 +99,7 @@ impl Free {
 
 impl SetupEstimate {
     /// Whether it is said where it is no mistake.
-    pub(super) fn is_told(&self) -> bool {
+    pub(super) fn is_known(&self) -> bool {
         !matches!(self.free, Free::Begins(_))
     }
 
@@ -188,14 +188,14 @@ fn best(
         x -= (score / curvature).clamp(-STEP, STEP);
         h = std.clamp(1e-4, 0.2 * STEP);
     }
-    let told = |x: f64| match free {
+    let from_log = |x: f64| match free {
         Free::Factor(..) => x.exp(),
         _ => x,
     };
     (std > 0.0).then(|| SetupEstimate {
         change: free.change(problem, x),
-        value: told(x),
-        interval_95: [-TWO_SIDED, TWO_SIDED].map(|k| told(x + k * std)),
+        value: from_log(x),
+        interval_95: [-TWO_SIDED, TWO_SIDED].map(|k| from_log(x + k * std)),
         free,
     })
 }

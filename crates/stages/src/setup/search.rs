@@ -164,15 +164,15 @@ impl Look<'_> {
             let both = self.decide(declared, &list, (None, free.as_ref()));
             found = both.filter(|f| f.sure).or(found);
         }
-        let told = fitted
+        let estimated = fitted
             .filter(|_| found.is_none())
             .and_then(|(estimate, trial)| {
                 let before = &declared?.trial;
                 let compared = Compared::of(self.problem, before, &trial);
                 let clear = compared.agreed >= NUMBERS.confirmed && !compared.harms;
-                (clear && estimate.is_told()).then(|| (estimate, [before.errors(), trial.errors()]))
+                (clear && estimate.is_known()).then(|| (estimate, [before.errors(), trial.errors()]))
             });
-        (found, told)
+        (found, estimated)
     }
 
     /// The hypotheses of a list that few rows like best, fitted to all rows; with them those that turn what drives.
@@ -389,7 +389,7 @@ impl Look<'_> {
     }
 
     /// A mistake that the errors do not show, and the limits of the file do: as declared joints are beyond them, with it
-    /// none is, and no joint fits worse. A factor is for the fit to tell.
+    /// none is, and no joint fits worse. A factor is for the fit to estimate.
     fn within_limits(&self, declared: &Judged) -> Option<Found> {
         let beyond_limits = self.problem.beyond_limits(&declared.trial.by);
         if beyond_limits.is_empty() {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use cft_ident::config::ModelFile;
 use cft_ident::identify::{
-    Control, Log, LoggedRobot, LsqSettings, WatchSettings, Watchable, lsq, refined, validate, watch,
+    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, ValidateSettings, WatchSettings,
+    Watchable, lsq, validate, watch,
 };
 use cft_ident::log::LogSpec;
 use cft_ident::motion::FilterSettings;
@@ -79,7 +80,12 @@ impl Machine {
         let control = Control::default();
         for rotation in 0..3 {
             let (fitted, unseen) = self.rotation(rotation);
-            let found = lsq(&machine, &fitted, &LsqSettings::default(), &control).expect("a fit");
+            let found = lsq(
+                &Dataset::new(&machine, &fitted),
+                &LsqSettings::default(),
+                &control,
+            )
+            .expect("a fit");
             let model = found.model(&machine, None);
             scored.score(&model, &unseen);
         }
@@ -117,16 +123,16 @@ impl Scored {
     }
 
     pub fn score(&mut self, model: &ModelFile, logs: &[Log]) {
-        let machine = LoggedRobot::new("model", model.robot.clone());
-        let numbers = refined(model, "model").expect("a model");
+        let given = GivenModel::new("model", model.clone());
+        let machine = given.machine();
         let control = Control::default();
-        let given = (&numbers, Some(model));
+        let (data, tried) = (Dataset::new(&machine, logs), ValidateSettings::of(&given));
         let mut band = vec![[0.0; 3]; self.band.len()];
         // times and positions, by which forces act
         let mut positions: Vec<(f64, Vec<f64>)> = Vec::new();
         let errors = &mut self.errors;
         errors.iter_mut().for_each(Vec::clear);
-        validate(&machine, given, logs, &control, &mut |r, _| {
+        validate(&data, &tried, &control, &mut |r, _| {
             positions.push((r.t, r.q.to_vec()));
             for (j, band) in band.iter_mut().enumerate() {
                 let error = (r.measured[j] - r.reconstructed[j]).abs();
@@ -152,8 +158,7 @@ impl Scored {
             };
             let input = Watchable::Log(log.clone());
             let mut rows: Vec<(f64, Vec<f64>, Vec<f64>)> = Vec::new();
-            let of = ("model", model, &numbers);
-            let found = watch(&machine, of, input, &settings, &control, &mut |line| {
+            let found = watch(&given, input, &settings, &control, &mut |line| {
                 for (j, held) in model.held_out.iter().enumerate() {
                     self.beyond[0] += 1.0;
                     let beyond = line.external[j].abs() > line.std[j] * held.external_99;

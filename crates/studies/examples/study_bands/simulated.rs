@@ -1,7 +1,7 @@
 //! The simulated CFT robot: a model of twenty minutes, and minutes that it did not see.
 
 use cft_ident::config::{ModelFile, RobotFile};
-use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq};
+use cft_ident::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq};
 use cft_ident::motion::ZeroOrderHold;
 use cft_ident::robot::cft::Setup;
 use cft_ident::simulate::CftTruth;
@@ -40,7 +40,12 @@ impl Campaign {
             .map(|seed| minute(&machine, 1_000_000 + seed))
             .collect();
         let settings = LsqSettings::default();
-        let found = lsq(&machine, &logs, &settings, &Control::default()).expect("a fit");
+        let found = lsq(
+            &Dataset::new(&machine, &logs),
+            &settings,
+            &Control::default(),
+        )
+        .expect("a fit");
         let model = found.model(&machine, None);
         Campaign { machine, model }
     }

@@ -1,0 +1,89 @@
+//! What a stage works on: a robot and its logs, and a model of it.
+
+use std::path::Path;
+
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::model::refined;
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_files::config::ModelFile;
+
+/// A robot and its logs, by what they are for.
+#[derive(Debug, Clone)]
+pub struct Dataset {
+    pub machine: LoggedRobot,
+    /// Logs that are fitted; those that are looked at, where a stage fits nothing.
+    pub logs: Vec<Log>,
+    /// Logs of one moving joint each, which a campaign gives to the friction filter.
+    pub one_joint: Vec<Log>,
+    /// Logs that judge what is added to a model, and are never fitted.
+    pub veto: Vec<Log>,
+    /// Logs that are evaluated once, after everything is decided.
+    pub held_out: Vec<Log>,
+}
+
+impl Dataset {
+    /// Logs of a robot, all of them to be fitted or looked at.
+    pub fn new(machine: &LoggedRobot, logs: &[Log]) -> Self {
+        Dataset {
+            machine: machine.clone(),
+            logs: logs.to_vec(),
+            one_joint: Vec::new(),
+            veto: Vec::new(),
+            held_out: Vec::new(),
+        }
+    }
+
+    /// The same with logs that judge what is added.
+    pub fn with_veto(self, veto: &[Log]) -> Self {
+        Dataset {
+            veto: veto.to_vec(),
+            ..self
+        }
+    }
+
+    /// The same with logs that are held out.
+    pub fn with_held_out(self, held_out: &[Log]) -> Self {
+        Dataset {
+            held_out: held_out.to_vec(),
+            ..self
+        }
+    }
+}
+
+/// A model file that a stage is given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenModel {
+    /// The file as the user named it, for messages.
+    pub name: String,
+    pub file: ModelFile,
+}
+
+impl GivenModel {
+    pub fn new(name: &str, file: ModelFile) -> Self {
+        GivenModel {
+            name: name.to_owned(),
+            file,
+        }
+    }
+
+    /// The robot of the model, its set-up kept as it is declared where that of the model was.
+    pub fn machine(&self) -> LoggedRobot {
+        LoggedRobot::of_model(&self.name, &self.file)
+    }
+
+    /// What torques are computed with.
+    ///
+    /// # Errors
+    /// A file that lacks a parameter, or an effect that cannot be.
+    pub fn numbers(&self) -> Result<AugmentedModel, IdentifyError> {
+        refined(&self.file, &self.name)
+    }
+
+    /// Name of the file, without folders.
+    pub fn file_name(&self) -> &str {
+        let name = Path::new(&self.name).file_name();
+        name.and_then(|name| name.to_str()).unwrap_or(&self.name)
+    }
+}
