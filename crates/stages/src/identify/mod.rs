@@ -53,6 +53,7 @@ mod lsq_warnings;
 mod model;
 mod motion_fit;
 mod next_motion;
+mod of_robot;
 mod one_joint;
 mod one_log;
 mod open_log;

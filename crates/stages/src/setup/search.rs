@@ -170,7 +170,8 @@ impl Look<'_> {
                 let before = &declared?.trial;
                 let compared = Compared::of(self.problem, before, &trial);
                 let clear = compared.agreed >= NUMBERS.confirmed && !compared.harms;
-                (clear && estimate.is_known()).then(|| (estimate, [before.errors(), trial.errors()]))
+                (clear && estimate.is_known())
+                    .then(|| (estimate, [before.errors(), trial.errors()]))
             });
         (found, estimated)
     }
