@@ -4,39 +4,19 @@
 //! at most those of the period. Accelerations have the clock's own in them: a blend must be long
 //! enough, and begin where that costs least.
 
-use crate::simulate::reference::Clock;
+pub use crate::simulate::reference::Blend;
 
 use super::series::{Kinematics, Series};
-
-/// A series from rest to rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Blend {
-    /// Time of the series' clock at which the motion begins \[s\].
-    pub start: f64,
-    /// Duration of either blend \[s\].
-    pub seconds: f64,
-    /// Whole periods at full rate; without a number the motion does not end by itself.
-    pub periods: Option<u32>,
-}
 
 impl Blend {
     /// Duration of the whole motion \[s\]; of the first blend and period where it does not end.
     pub fn duration(&self, period: f64) -> f64 {
-        let end = self.clock().seconds(period);
-        end.unwrap_or(self.seconds + period)
-    }
-
-    fn clock(&self) -> Clock {
-        Clock {
-            start: self.start,
-            blend: self.seconds,
-            periods: self.periods,
-        }
+        self.end(period).unwrap_or(self.seconds + period)
     }
 
     /// All coordinates at the time t of the motion \[s\], at rest before and behind it.
     pub fn at(&self, series: &Series, t: f64) -> Kinematics {
-        let [clock, rate, rise] = self.clock().at(series.period(), t);
+        let [clock, rate, rise] = self.clock(series.period(), t);
         let mut k = series.at(clock);
         for i in 0..series.coordinates() {
             k.xdd[i] = rate * rate * k.xdd[i] + rise * k.xd[i];

@@ -89,40 +89,34 @@ fn soft_max(x: &[f64], s: f64) -> (f64, Vec<f64>) {
     let most = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if s.is_infinite() {
         let first = x.iter().position(|v| *v == most).unwrap_or(0);
-        let weights = (0..x.len())
-            .map(|k| f64::from(u8::from(k == first)))
-            .collect();
+        let mut weights = vec![0.0; x.len()];
+        weights[first] = 1.0;
         return (most, weights);
     }
     let parts: Vec<f64> = x.iter().map(|v| (s * (v - most)).exp()).collect();
     let sum: f64 = parts.iter().sum();
-    (
-        most + sum.ln() / s,
-        parts.iter().map(|part| part / sum).collect(),
-    )
+    let weights = parts.iter().map(|part| part / sum);
+    (most + sum.ln() / s, weights.collect())
 }
 
 fn normalised(g: &DMatrix<f64>, sharpness: f64) -> Result<Slope, MathError> {
     let p = g.nrows();
-    let scale: Vec<f64> = (0..p)
-        .map(|i| g[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip())
-        .collect();
+    let size = |i: usize| g[(i, i)].max(f64::MIN_POSITIVE);
+    let scale: Vec<f64> = (0..p).map(|i| size(i).sqrt().recip()).collect();
     let scaled = DMatrix::from_fn(p, p, |i, j| g[(i, j)] * scale[i] * scale[j]);
     let inner = condition(&scaled, sharpness)?;
     // The scales themselves depend on the diagonal of G.
     let rows = inner.matrix.component_mul(&scaled);
     let matrix = DMatrix::from_fn(p, p, |i, j| {
         let through = if i == j {
-            rows.row(i).sum() / g[(i, i)].max(f64::MIN_POSITIVE)
+            rows.row(i).sum() / size(i)
         } else {
             0.0
         };
         inner.matrix[(i, j)] * scale[i] * scale[j] - through
     });
-    Ok(Slope {
-        value: inner.value,
-        matrix,
-    })
+    let value = inner.value;
+    Ok(Slope { value, matrix })
 }
 
 fn determinant(g: &DMatrix<f64>) -> Result<Slope, MathError> {

@@ -35,20 +35,16 @@ pub fn machine(
     let robot = file.robot();
     let n = robot.joints();
     let (model, source) = TorqueSource::of(file, &robot, model)?;
-    let mut own = vec![Vec::new(); n];
-    if file.friction.fitted_with_inertias {
-        for own in &mut own {
-            own.extend([Own::Viscous, Own::Coulomb]);
-            if file.friction.offset {
-                own.push(Own::Offset);
-            }
-        }
-    }
+    let own = match (file.friction.fitted_with_inertias, file.friction.offset) {
+        (false, _) => Vec::new(),
+        (true, false) => vec![Own::Viscous, Own::Coulomb],
+        (true, true) => vec![Own::Viscous, Own::Coulomb, Own::Offset],
+    };
     let mut machine = ForeseenRobot {
         columns: RegressorColumns {
             joints: n,
             shared: robot.parameters().len(),
-            own,
+            own: vec![own; n],
             known: vec![None; n],
             rest_speed: Vec::new(),
         },
@@ -68,10 +64,7 @@ pub fn machine(
     machine.space = space;
     machine.channels.extend(of_places);
     for i in 0..n {
-        let of = |quantity| {
-            let mut all = machine.channels.iter();
-            all.find(|c| c.index == i && c.quantity == quantity)
-        };
+        let of = |quantity| BoundedQuantity::find(&machine.channels, quantity, i);
         let speed = of(Quantity::Speed).map(|c| c.upper);
         let travel = of(Quantity::Position).map(|c| c.upper - c.lower);
         machine.coulomb_speed[i] = SIGN * speed.or(travel).unwrap_or(1.0);
@@ -79,8 +72,7 @@ pub fn machine(
     Ok(machine)
 }
 
-/// What a motion must keep: limits of the motors' coordinates, of joints that are none of these, and where the
-/// motors could lose hold of a joint.
+/// Limits of the motors' coordinates, of joints that are none of these, and where motors could lose hold of a joint.
 fn channels(
     file: &RobotFile,
     mechanism: &Mechanism<MAX_COORDINATES>,
@@ -102,26 +94,21 @@ fn channels(
                 joint: name.clone(),
             });
         }
-        let transmission = robot.transmission();
-        let of_motors = (0..robot.joints()).filter_map(|i| transmission.joint_of(i));
-        let same = of_motors.into_iter().any(|(own, _)| own == joint);
-        of_joint(
-            given,
-            joint,
-            name,
-            robot.joint_kind(joint),
-            same,
-            &mut channels,
-        );
+        let mut of_motors = (0..robot.joints()).filter_map(|i| robot.transmission().joint_of(i));
+        let same = of_motors.any(|(own, _)| own == joint);
+        let kind = robot.joint_kind(joint);
+        of_joint(given, joint, name, kind, same, &mut channels);
     }
     if let Some(practice) = &mechanism.practice {
         let (joint, least) = practice.clearance;
-        let name = &robot.joint_names()[joint];
-        channels.push(BoundedQuantity {
-            lower: least,
-            upper: f64::INFINITY,
-            ..BoundedQuantity::symmetric(Quantity::Clearance, joint, name, "", 0.0)
-        });
+        let (name, open) = (&robot.joint_names()[joint], [least, f64::INFINITY]);
+        channels.push(BoundedQuantity::between(
+            Quantity::Clearance,
+            joint,
+            name,
+            "",
+            open,
+        ));
     }
     Ok(channels)
 }
@@ -154,11 +141,14 @@ fn of_coordinate(
     let symmetric =
         |quantity, unit: &str, most: f64| BoundedQuantity::symmetric(quantity, i, name, unit, most);
     if lower.is_finite() && upper.is_finite() {
-        channels.push(BoundedQuantity {
-            lower,
-            upper,
-            ..symmetric(Quantity::Position, unit, 0.0)
-        });
+        let span = [lower, upper];
+        channels.push(BoundedQuantity::between(
+            Quantity::Position,
+            i,
+            name,
+            unit,
+            span,
+        ));
     }
     if speed.is_finite() {
         channels.push(symmetric(Quantity::Speed, &format!("{unit}/s"), speed));
@@ -202,12 +192,9 @@ fn of_joint(
     if same {
         return;
     }
-    if let Some([lower, upper]) = given.position {
-        channels.push(BoundedQuantity {
-            lower,
-            upper,
-            ..symmetric(Quantity::JointPosition, unit, 0.0)
-        });
+    if let Some(span) = given.position {
+        let of = Quantity::JointPosition;
+        channels.push(BoundedQuantity::between(of, joint, name, unit, span));
     }
     if let Some(speed) = given.speed {
         channels.push(symmetric(Quantity::JointSpeed, &format!("{unit}/s"), speed));
@@ -234,9 +221,8 @@ pub fn series_of(machine: &ForeseenRobot, file: &FourierSection) -> Result<Serie
     let harmonics = file.series.iter().map(|c| c.a.len()).max().unwrap_or(0);
     let mut series = Series::still(TAU * file.fundamental_hz, names.len(), harmonics);
     for (i, offset) in series.offset.iter_mut().enumerate() {
-        let mut all = machine.channels.iter();
-        let position = all.find(|c| c.quantity == Quantity::Position && c.index == i);
-        *offset = position.map_or(0.0, |c| 0.5 * (c.lower + c.upper));
+        let position = BoundedQuantity::find(&machine.channels, Quantity::Position, i);
+        *offset = position.map_or(0.0, BoundedQuantity::middle);
     }
     for given in &file.series {
         let Some(i) = names.iter().position(|name| *name == given.name) else {
@@ -254,6 +240,7 @@ pub fn series_of(machine: &ForeseenRobot, file: &FourierSection) -> Result<Serie
 
 /// The trajectory file of a series in the machine's designed coordinates.
 pub fn trajectory(machine: &ForeseenRobot, series: &Series) -> FourierSection {
+    let names = machine.coordinate_names();
     let of = |(i, name): (usize, String)| FourierCoordinate {
         name,
         offset: series.offset[i],
@@ -266,11 +253,6 @@ pub fn trajectory(machine: &ForeseenRobot, series: &Series) -> FourierSection {
         start_s: None,
         blend_s: None,
         periods: None,
-        series: machine
-            .coordinate_names()
-            .into_iter()
-            .enumerate()
-            .map(of)
-            .collect(),
+        series: names.into_iter().enumerate().map(of).collect(),
     }
 }

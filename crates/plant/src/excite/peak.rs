@@ -34,7 +34,7 @@ pub fn highest(
 }
 
 /// [`highest`] of a function whose values at the ends of equal parts are there already.
-pub(crate) fn highest_from(
+pub(super) fn highest_from(
     f: &mut dyn FnMut(f64) -> f64,
     [from, to]: [f64; 2],
     samples: &[f64],
@@ -63,11 +63,9 @@ pub(crate) fn highest_from(
         peak.bound = f64::INFINITY;
         return peak;
     }
-    let mut open: Vec<(f64, f64, f64, f64)> = samples
-        .windows(2)
-        .enumerate()
-        .map(|(k, pair)| (at(k), at(k + 1), pair[0], pair[1]))
-        .collect();
+    let parts = samples.windows(2).enumerate();
+    let parts = parts.map(|(k, pair)| (at(k), at(k + 1), pair[0], pair[1]));
+    let mut open: Vec<(f64, f64, f64, f64)> = parts.collect();
     while let Some((a, b, left, right)) = open.pop() {
         let top = left.max(right);
         if let Some(most) = curvature {

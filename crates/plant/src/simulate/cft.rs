@@ -50,22 +50,16 @@ impl CftTruth {
     /// [`SimulateError::NotPositiveDefinite`] when no draw of a thousand is.
     pub fn varied(&self, spread: f64, seed: u64) -> Result<Self, SimulateError> {
         let mut chance = stream(seed, Purpose::Plant);
-        let mut outcome = Ok(*self);
-        for _ in 0..DRAWS {
+        let mut draw = || {
             let mut near = |x: f64| x * (1.0 + spread * chance.random_range(-1.0..=1.0));
             let mut drawn = *self;
-            for value in &mut drawn.theta {
-                *value = near(*value);
-            }
+            drawn.theta = drawn.theta.map(&mut near);
             for law in &mut drawn.friction {
                 *law = DoubleTanh::from_parameters(law.parameters().map(&mut near));
             }
-            outcome = drawn.check().map(|()| drawn);
-            if outcome.is_ok() {
-                break;
-            }
-        }
-        outcome
+            drawn.check().map(|()| drawn)
+        };
+        (1..DRAWS).fold(draw(), |found, _| found.or_else(|_| draw()))
     }
 
     pub fn check(&self) -> Result<(), SimulateError> {
@@ -145,22 +139,6 @@ pub fn follow(
     run(&plant, effects, &Start::Settled, &drive, settings)
 }
 
-/// Largest distance between the wanted and the actual motor coordinates, and its root mean square.
-pub fn tracking_error(plant: &Plant<4>, recording: &SimulatedRun<4>) -> ([f64; 4], [f64; 4]) {
-    let mut worst = [0.0; 4];
-    let mut squares = [0.0; 4];
-    for (q, target) in recording.actual.q.iter().zip(&recording.actual.target) {
-        let x = plant.mechanism.coordinates(q);
-        for i in 0..4 {
-            let error = (x[i] - target[i]).abs();
-            worst[i] = f64::max(worst[i], error);
-            squares[i] += error * error;
-        }
-    }
-    let rows = recording.rows().max(1) as f64;
-    (worst, squares.map(|s| (s / rows).sqrt()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,15 +176,10 @@ mod tests {
     }
 
     #[test]
-    fn friction_parameters_come_back_in_the_order_of_the_report() {
+    fn cft_parameters_carry_the_numbers_of_the_report() {
         let truth = CftTruth::synthetic(Setup::Tuedacs);
         assert_eq!(truth.friction_theta(), practice::FRICTION);
         assert_eq!(truth.printed(), practice::INERTIA);
-    }
-
-    #[test]
-    fn cft_parameters_carry_the_numbers_of_the_report() {
-        let truth = CftTruth::synthetic(Setup::Tuedacs);
         let parameters = truth.plant().expect("a pose").parameters();
         assert_eq!(parameters.len(), 32);
         let mut numbers: Vec<u32> = parameters.iter().filter_map(|p| p.theta).collect();

@@ -13,8 +13,7 @@ use cft_ident_files::config::trajectory::{self, Coordinates, Trajectory};
 /// Duration of a motion that sets none \[s\].
 pub const SECONDS: f64 = 20.0;
 
-/// Fundamental of the usual motion of several joints \[Hz\], its harmonics, and the share of a joint's half
-/// travel that their amplitudes sum to.
+/// The usual motion of several joints: fundamental \[Hz\], harmonics, share of a half travel that amplitudes sum to.
 const FUNDAMENTAL_HZ: f64 = 0.1;
 const HARMONICS: usize = 4;
 const SHARE: f64 = 0.8;
@@ -97,12 +96,10 @@ fn fourier<const J: usize>(
     frame: ReferenceFrame,
 ) -> Result<Reference<J>, SimulateError> {
     let middle = mechanism.middle();
+    let robot = &mechanism.robot;
     let (names, rest) = match frame {
-        ReferenceFrame::Motors => (mechanism.robot.coordinate_names(), middle),
-        ReferenceFrame::Joints => (
-            mechanism.robot.joint_names().to_vec(),
-            mechanism.pose(&middle)?,
-        ),
+        ReferenceFrame::Motors => (robot.coordinate_names(), middle),
+        ReferenceFrame::Joints => (robot.joint_names().to_vec(), mechanism.pose(&middle)?),
     };
     let terms = file.series.iter().map(|series| series.a.len());
     let terms = terms.max().unwrap_or(0);
@@ -143,15 +140,11 @@ fn points<const J: usize>(
     let first = file.points.first().map_or(0.0, |point| point.t);
     for (k, point) in file.points.iter().enumerate() {
         let Some(pose) = mechanism.widened(&point.position, 0.0) else {
-            return Err(SimulateError::Reference {
-                what: format!(
-                    "point {} has {} coordinates and the robot has {}",
-                    k + 1,
-                    point.position.len(),
-                    mechanism.joints()
-                )
-                .into(),
-            });
+            let (given, n) = (point.position.len(), mechanism.joints());
+            return Err(SimulateError::reference(format!(
+                "point {} has {given} coordinates and the robot has {n}",
+                k + 1
+            )));
         };
         list.push((point.t - first, pose));
     }
@@ -205,8 +198,7 @@ fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
     }
 }
 
-/// Own frequency \[rad/s\], damping, and corner frequency \[Hz\] of each joint under the usual gains: of one
-/// joint alone, and of several that push each other.
+/// Own frequency \[rad/s\], damping and corner frequency \[Hz\] under the usual gains, of one joint alone and of several.
 const USUAL_GAINS_ALONE: [f64; 3] = [45.0, 0.6, 50.0];
 const SEVERAL: [f64; 3] = [30.0, 0.8, 100.0];
 /// Corner frequency \[Hz\] with gains that are known.
@@ -230,12 +222,9 @@ impl<const J: usize> Plant<J> {
             _ => SEVERAL,
         };
         let stiffness = |j: usize| self.inertia[j] * frequency * frequency / m.gain[j];
-        let mut proportional = [1.0; J];
-        for (j, gain) in proportional.iter_mut().enumerate().take(m.joints()) {
-            *gain = stiffness(j);
-        }
+        let n = m.joints();
         ControllerSettings {
-            proportional,
+            proportional: std::array::from_fn(|j| if j < n { stiffness(j) } else { 1.0 }),
             derivative: m.filled(|j| 2.0 * damping / frequency * stiffness(j)),
             filter_hz,
         }

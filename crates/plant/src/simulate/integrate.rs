@@ -180,13 +180,7 @@ impl DormandPrince {
                 rates_known = !system.accepted(t, y);
             } else {
                 self.effort.rejected += 1;
-                // A NaN error also lands here: `error` is then not comparable and the step shrinks.
-                let factor = (SAFETY / shrink).max(SHRINK_AT_MOST);
-                self.step = h * if factor.is_finite() {
-                    factor
-                } else {
-                    SHRINK_AT_MOST
-                };
+                self.step = h * (SAFETY / shrink).max(SHRINK_AT_MOST);
             }
         }
         Ok(())
@@ -219,6 +213,7 @@ impl DormandPrince {
             sum += (h * e / allowed).powi(2);
         }
         let error = (sum / N as f64).sqrt();
+        // an error that is not a number is refused as any large one
         (next, if error.is_nan() { f64::INFINITY } else { error })
     }
 }

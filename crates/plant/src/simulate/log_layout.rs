@@ -5,8 +5,7 @@ use super::temperature::PlantTemperatures;
 use cft_ident_files::config::robot_file::RobotFile;
 use cft_ident_logs::log::{Channel, DeclaredChannels, Layout};
 
-/// Names, signs, scales and offsets with which the robot file reads logs: joint channels where it reads those,
-/// and for the CFT robot the raw channels and status behind them.
+/// How the robot file reads logs: joint channels where it reads those, the raw channels and status behind them.
 pub(super) struct LogLayout {
     layout: Layout,
     pub header: Vec<String>,
@@ -98,12 +97,8 @@ fn parts(layout: &Layout) -> (Option<&Layout>, Option<&Layout>) {
 }
 
 fn extend(values: &mut Vec<f64>, channels: &[Channel], numbers: &[f64]) {
-    values.extend(
-        channels
-            .iter()
-            .zip(numbers)
-            .map(|(channel, x)| logged(channel, *x)),
-    );
+    let pairs = channels.iter().zip(numbers);
+    values.extend(pairs.map(|(channel, x)| logged(channel, *x)));
 }
 
 /// The number that the channel shows for an SI value.

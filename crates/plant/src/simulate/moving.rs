@@ -27,9 +27,20 @@ struct Balance<const J: usize> {
 }
 
 impl<const J: usize> Moving<'_, J> {
-    /// Positions and speeds where the motors and their encoders sit: those of the links, and beyond them
-    /// the deflections of elastic joints.
-    pub(crate) fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
+    /// What effects see of a motion.
+    fn seen<'a>(&self, t: f64, [q, v]: [&'a [f64; J]; 2], z: &'a [f64]) -> PlantState<'a> {
+        let n = self.plant.joints();
+        PlantState {
+            t,
+            q: &q[..n],
+            v: &v[..n],
+            z,
+            ..PlantState::default()
+        }
+    }
+
+    /// Positions and speeds of the motors and their encoders: beyond the links by the deflections of elastic joints.
+    pub(super) fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
         let (mut q, mut v) = (*q, *v);
         for twist in self.effects.twists(z) {
             q[twist.joint] += twist.deflection;
@@ -51,19 +62,13 @@ impl<const J: usize> Moving<'_, J> {
         self.balance(t, &q, &v, &y[2 * J..]).acceleration
     }
 
-    /// The balance with effects: what the motors give, friction and added torques take; what is left is the
-    /// load tau_l with what depends on it, and where a joint is elastic the load is what the spring passes on.
+    /// The balance with effects; where a joint is elastic the load tau_l is what the spring passes on.
     fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> Balance<J> {
         let (q, v) = self.motor_side(link, speed, z);
         let friction = self.plant.friction(&v);
-        let n = self.plant.joints();
         let motion = PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
-            friction: &friction[..n],
-            ..PlantState::default()
+            friction: &friction[..self.plant.joints()],
+            ..self.seen(t, [&q, &v], z)
         };
         let mut acting = [1.0; J];
         self.effects.drive(&mut acting);
@@ -79,25 +84,16 @@ impl<const J: usize> Moving<'_, J> {
             let mut net: [f64; J] =
                 std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i] - taken[i]);
             // tau_l (1 + share) = net is linear on each side of zero.
-            let mut load: [f64; J] = std::array::from_fn(|i| {
-                let [positive, negative] = share[i];
-                net[i] / (1.0 + if net[i] > 0.0 { positive } else { negative })
-            });
+            let mut load: [f64; J] =
+                std::array::from_fn(|i| net[i] / (1.0 + side(share[i], net[i])));
             for twist in self.effects.twists(z) {
-                let [positive, negative] = share[twist.joint];
                 load[twist.joint] = twist.torque;
-                net[twist.joint] -= twist.torque
-                    * if twist.torque > 0.0 {
-                        positive
-                    } else {
-                        negative
-                    };
+                net[twist.joint] -= twist.torque * side(share[twist.joint], twist.torque);
             }
             let driven: [f64; J] = std::array::from_fn(|i| load[i] - bias[i]);
-            let solved = if symmetric {
-                self.plant.solve(&mass, &driven)
-            } else {
-                eliminate(mass, driven)
+            let solved = match symmetric {
+                true => self.plant.solve(&mass, &driven),
+                false => eliminate(mass, driven),
             };
             (net, load, solved.unwrap_or([f64::NAN; J]))
         };
@@ -112,8 +108,7 @@ impl<const J: usize> Moving<'_, J> {
         }
     }
 
-    /// The torque that effects take by the accelerations and loads that are left when they have taken it: Newton's
-    /// method, by differences, on their joints; NaN where it finds none.
+    /// The torque that effects take by the accelerations and loads it leaves, by Newton's method; NaN where it finds none.
     fn implicit(
         &self,
         respond: &impl Fn(&[f64; J]) -> ([f64; J], [f64; J], [f64; J]),
@@ -128,7 +123,7 @@ impl<const J: usize> Moving<'_, J> {
             return taken;
         }
         let n = self.plant.joints();
-        let left = |taken: &[f64; J]| {
+        let left = |taken: &[f64; J]| -> ([f64; J], [f64; J]) {
             let (net, load, a) = respond(taken);
             let motion = PlantState {
                 a: &a[..n],
@@ -137,8 +132,7 @@ impl<const J: usize> Moving<'_, J> {
             };
             let mut wanted = [0.0; J];
             self.effects.implicit(&motion, &mut wanted);
-            let left: [f64; J] = std::array::from_fn(|i| wanted[i] - taken[i]);
-            (left, net)
+            (std::array::from_fn(|i| wanted[i] - taken[i]), net)
         };
         for _ in 0..MOST_STEPS {
             let (rest, net) = left(&taken);
@@ -178,15 +172,9 @@ impl<const J: usize> Moving<'_, J> {
     fn body(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([[f64; J]; J], [f64; J]) {
         let n = self.plant.joints();
         let (mut mass, mut bias) = self.plant.rigid(q, v);
-        let motion = PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
-            ..PlantState::default()
-        };
         gather(&mut mass, n);
         let flat = &mut mass.as_flattened_mut()[..n * n];
+        let motion = self.seen(t, [q, v], z);
         self.effects.inertia(&motion, flat, &mut bias[..n]);
         spread(&mut mass, n);
         (mass, bias)
@@ -198,12 +186,8 @@ impl<const J: usize> Moving<'_, J> {
         let n = self.plant.joints();
         let friction = self.plant.friction(v);
         let motion = PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
             friction: &friction[..n],
-            ..PlantState::default()
+            ..self.seen(t, [q, v], z)
         };
         let mut torque = self.plant.offset;
         self.effects.torque(&motion, &mut torque);
@@ -219,8 +203,7 @@ impl<const J: usize> Moving<'_, J> {
         let mut acting = [1.0; J];
         self.effects.drive(&mut acting);
         std::array::from_fn(|i| {
-            let [positive, negative] = share[i];
-            let beside = load[i] * if load[i] > 0.0 { positive } else { negative };
+            let beside = load[i] * side(share[i], load[i]);
             (load[i] + beside + friction[i] + torque[i]) / acting[i]
         })
     }
@@ -240,14 +223,10 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
         dydt[2 * J..].fill(0.0);
         let n = self.plant.joints();
         let motion = PlantState {
-            t,
-            q: &balance.q[..n],
-            v: &balance.v[..n],
-            z,
             friction: &balance.friction[..n],
             a: &balance.acceleration[..n],
             net: &balance.net[..n],
-            ..PlantState::default()
+            ..self.seen(t, [&balance.q, &balance.v], z)
         };
         self.effects.rates(&motion, &mut dydt[2 * J..]);
     }
@@ -257,8 +236,8 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
             return false;
         }
         let z = &y[2 * J..];
-        let n = self.plant.joints();
         let (q, v) = self.motor_side(&part::<J, N>(y, 0), &part::<J, N>(y, J), z);
+        let n = self.plant.joints();
         self.effects.moved(&PlantState {
             t,
             q: &q[..n],
@@ -267,6 +246,11 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
             ..PlantState::default()
         })
     }
+}
+
+/// The share of a load on its side of zero.
+fn side([positive, negative]: [f64; 2], load: f64) -> f64 {
+    if load > 0.0 { positive } else { negative }
 }
 
 /// x with M x = b for any invertible M, by elimination with row exchange; `None` where M is not invertible.

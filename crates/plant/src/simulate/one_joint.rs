@@ -3,7 +3,7 @@
 use super::SimulateError;
 use super::mechanism::Mechanism;
 use super::reference::{
-    LadderPlan, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
+    LadderPlan, LadderReference, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
 };
 use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::Robot;
@@ -132,17 +132,14 @@ impl OneJointMove {
         let low = room.range.0 - 1e-9;
         // what stands at the joint itself is looked at while it runs
         if !m.motors_at_joints() && (range.0 < low || range.1 > room.range.1 + 1e-9) {
-            return Err(SimulateError::Reference {
-                what: format!(
-                    "{} cannot move over [{}, {}]: at this pose the limits leave [{:.4}, {:.4}]",
-                    self.mover.name(&m.robot),
-                    range.0,
-                    range.1,
-                    room.range.0,
-                    room.range.1
-                )
-                .into(),
-            });
+            return Err(SimulateError::reference(format!(
+                "{} cannot move over [{}, {}]: at this pose the limits leave [{:.4}, {:.4}]",
+                self.mover.name(&m.robot),
+                range.0,
+                range.1,
+                room.range.0,
+                room.range.1
+            )));
         }
         let ladder = self.ladder(m, range, &room)?;
         pose[place] = ladder.at(0.0).0;
@@ -194,11 +191,10 @@ impl OneJointMove {
         let known = self.range.unwrap_or(room.range);
         if !(known.0.is_finite() && known.1.is_finite()) {
             let name = self.mover.name(&m.robot);
-            return Err(SimulateError::Reference {
-                what: ErrorText::new(format!("the travel of {name} is not known")).remedy(format!(
-                    "write `[limits.{name}] position = [low, high]` into the robot file"
-                )),
-            });
+            let remedy =
+                format!("write `[limits.{name}] position = [low, high]` into the robot file");
+            let what = ErrorText::new(format!("the travel of {name} is not known"));
+            return Err(SimulateError::reference(what.remedy(remedy)));
         }
         let frame = match self.mover {
             Mover::Joint(_) => ReferenceFrame::Joints,
@@ -212,7 +208,7 @@ impl OneJointMove {
         m: &Mechanism<J>,
         range: (f64, f64),
         room: &Travel,
-    ) -> Result<super::reference::LadderReference, SimulateError> {
+    ) -> Result<LadderReference, SimulateError> {
         let place = self.mover.index();
         let given = m.given.get(&self.mover.name(&m.robot));
         let of_practice = m.practice.as_ref().map(|practice| match self.mover {
@@ -220,8 +216,7 @@ impl OneJointMove {
             Mover::Motor(_) => practice.coordinate_ladders[place],
         });
         let whole = self.range.unwrap_or(room.range);
-        let acceleration = of_practice
-            .map(|[_, acceleration]| acceleration)
+        let acceleration = (of_practice.map(|[_, acceleration]| acceleration))
             .or_else(|| given?.acceleration)
             .unwrap_or(STROKES * (whole.1 - whole.0));
         // strokes last as long as those of the whole range, so that the controller follows them as well

@@ -121,25 +121,19 @@ pub fn simulate_from(
     order: &Order,
     initial: Option<&InitialConditions>,
 ) -> Result<SimulatedLog, SimulateError> {
-    #[derive(Default)]
-    struct InMemory {
-        header: Vec<String>,
-        values: Vec<f64>,
-    }
+    struct InMemory(Vec<String>, Vec<f64>);
     impl Rows for InMemory {
         fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()> {
-            if self.header.is_empty() {
-                self.header = header.to_vec();
-            }
-            self.values.extend_from_slice(values);
+            self.0 = header.to_vec();
+            self.1.extend_from_slice(values);
             ControlFlow::Continue(())
         }
     }
-    let mut rows = InMemory::default();
+    let mut rows = InMemory(Vec::new(), Vec::new());
     let simulated = run_any(order, initial, &mut rows, true)?;
     Ok(SimulatedLog {
-        header: rows.header,
-        values: rows.values,
+        header: rows.0,
+        values: rows.1,
         truth: simulated.truth,
         limits: simulated.limits,
         ending: simulated.ending,
@@ -299,11 +293,8 @@ fn drive<const J: usize>(
         return Ok((MotorInput::Follow { reference, control }, seconds));
     }
     let Experiment::Volts { times, volts } = experiment else {
-        return Err(SimulateError::Reference {
-            what: "there is neither a reference nor a series of volts"
-                .to_owned()
-                .into(),
-        });
+        let what = "there is neither a reference nor a series of volts";
+        return Err(SimulateError::reference(ErrorText::new(what)));
     };
     let n = mechanism.joints();
     if !volts.len().is_multiple_of(n) {
@@ -322,7 +313,7 @@ fn drive<const J: usize>(
     Ok((MotorInput::Volts(series), seconds))
 }
 
-/// Effects of the model, then those of the order. An effect of the model that cannot be run names its table.
+/// Effects of the model, then those of the order.
 fn built_effects(
     order: &Order,
     sites: &Sites,
@@ -370,25 +361,25 @@ fn truth_of<const J: usize>(
     effects: Vec<EffectValue>,
 ) -> TruthFile {
     let robot = &plant.mechanism.robot;
-    let n = robot.joints();
+    let (n, setup) = (robot.joints(), robot.transmission().setup());
     let mut ending = match recording.ending {
         RunEnding::Completed => "completed".to_owned(),
         RunEnding::StoppedAtLimit => "stopped at a limit".to_owned(),
     };
-    for event in &recording.limits {
-        ending += &format!(
-            "; {} = {:.5} at t = {:.4} s",
-            event.coordinate, event.value, event.t
-        );
+    for LimitEvent {
+        coordinate,
+        value,
+        t,
+        ..
+    } in &recording.limits
+    {
+        ending += &format!("; {coordinate} = {value:.5} at t = {t:.4} s");
     }
     TruthFile {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: order.seed,
         model: order.robot.robot.model.name().to_owned(),
-        setup: robot
-            .transmission()
-            .setup()
-            .map(|setup| setup.name().to_owned()),
+        setup: setup.map(|setup| setup.name().to_owned()),
         ending,
         volt_noise: recording.volt_noise[..n].to_vec(),
         torque_noise: recording.torque_noise[..n].to_vec(),

@@ -1,7 +1,7 @@
 //! The experiment: sample, control, hold the volts, integrate to the next sample.
 
 use super::SimulateError;
-use super::controller::{Controller, ControllerSettings};
+use super::controller::ControllerSettings;
 use super::effects::{Beginning, Effects};
 use super::integrate::DormandPrince;
 use super::mechanism::Mechanism;
@@ -35,8 +35,7 @@ pub enum Start<const J: usize> {
     State { position: [f64; J], speed: [f64; J] },
 }
 
-/// State sizes that the integrator is compiled for with J joints: the smallest that holds the plant and its
-/// effects is used.
+/// State sizes that the integrator is compiled for with J joints: the smallest with room is used.
 const fn sizes(joints: usize) -> [usize; 4] {
     if joints <= 8 {
         [2, 8, 16, 64]
@@ -77,9 +76,7 @@ pub fn run<const J: usize>(
 pub(super) type HandOn<'a, const J: usize> =
     &'a mut dyn FnMut(&mut SimulatedRun<J>) -> Result<(), SimulateError>;
 
-/// Runs one experiment as [`run`] does, and hands every `block` rows on; what comes back has the last rows,
-/// fewer than a block, or all where no block is asked for. The rows are those of a perfect log: no noise, no
-/// fault, none lost.
+/// Runs as [`run`] does without noise, faults and losses, hands every `block` rows on and gives back the last.
 pub(super) fn run_in_blocks<const J: usize>(
     plant: &Plant<J>,
     effects: Effects,
@@ -112,33 +109,6 @@ pub(super) fn run_in_blocks<const J: usize>(
     Err(SimulateError::TooManyStates { states, most })
 }
 
-/// The drive with its memory.
-enum Running<'a, const J: usize> {
-    Follow(&'a Reference<J>, Controller<J>),
-    Volts(&'a VoltSeries<J>),
-}
-
-impl<const J: usize> Running<'_, J> {
-    /// What is wanted of the motors that stand at `coordinates` and are seen at `seen`, and the volts that are
-    /// asked for.
-    fn at(
-        &mut self,
-        mechanism: &Mechanism<J>,
-        t: f64,
-        coordinates: &[f64; J],
-        seen: &[f64; J],
-    ) -> Result<([f64; J], [f64; J]), SimulateError> {
-        Ok(match self {
-            Self::Follow(reference, controller) => {
-                let target = wanted(mechanism, reference, t)?;
-                let volts = controller.volts(t, seen, &target.position, &target.velocity);
-                (target.position, volts)
-            }
-            Self::Volts(series) => (*coordinates, series.at(t)),
-        })
-    }
-}
-
 fn march<const J: usize, const N: usize>(
     mut moving: Moving<J>,
     start: &Start<J>,
@@ -156,12 +126,7 @@ fn march<const J: usize, const N: usize>(
     let mut recording = SimulatedRun::empty(mechanism, samples.min(block));
     let mut integrator = DormandPrince::new(settings.tolerance);
     let mut y = initial_state::<J, N>(&mut moving, start, drive, settings)?;
-    let mut drive = match drive {
-        MotorInput::Follow { reference, control } => {
-            Running::Follow(reference, Controller::new(*control))
-        }
-        MotorInput::Volts(series) => Running::Volts(series),
-    };
+    let mut memory = None;
     let mut t = instants.next().unwrap_or(0.0);
     for k in 0..samples {
         let beyond = limits_reached(&moving, settings.on_limit, t, &mut y, &mut recording)?;
@@ -169,7 +134,14 @@ fn march<const J: usize, const N: usize>(
         let (motors, _) = moving.motor_side(&q, &v, &y[2 * J..]);
         let coordinates = mechanism.coordinates(&motors);
         let seen = sensors.encoders(&coordinates, &mechanism.resolution);
-        let (wanted, asked) = drive.at(mechanism, t, &coordinates, &seen)?;
+        let (wanted, asked) = match drive {
+            MotorInput::Follow { reference, control } => {
+                let target = wanted(mechanism, reference, t);
+                let volts = control.volts(&mut memory, t, &seen, &target);
+                (target.position, volts)
+            }
+            MotorInput::Volts(series) => (coordinates, series.at(t)),
+        };
         let limit = settings.saturation;
         moving.volts = asked.map(|u| u.clamp(-limit, limit));
         let measured = mechanism.pose(&seen).unwrap_or(motors);
@@ -212,19 +184,15 @@ fn march<const J: usize, const N: usize>(
 }
 
 /// Target of a reference in motor coordinates.
-fn wanted<const J: usize>(
-    mechanism: &Mechanism<J>,
-    reference: &Reference<J>,
-    t: f64,
-) -> Result<Target<J>, SimulateError> {
+fn wanted<const J: usize>(mechanism: &Mechanism<J>, reference: &Reference<J>, t: f64) -> Target<J> {
     let target = reference.path.at(t);
-    Ok(match reference.frame {
+    match reference.frame {
         ReferenceFrame::Motors => target,
         ReferenceFrame::Joints => Target {
             position: mechanism.coordinates(&target.position),
             velocity: mechanism.coordinate_speeds(&target.position, &target.velocity),
         },
-    })
+    }
 }
 
 /// Marks the coordinates beyond their limits, notes the first time of each, and clamps if asked to.
@@ -248,12 +216,9 @@ fn limits_reached<const J: usize, const N: usize>(
     }
     for i in (0..J).filter(|&i| beyond[i]) {
         let coordinate = &recording.coordinates[i];
-        if !recording
-            .limits
-            .iter()
-            .any(|event| event.coordinate == *coordinate)
-        {
-            recording.limits.push(LimitEvent {
+        let limits = &mut recording.limits;
+        if limits.iter().all(|event| event.coordinate != *coordinate) {
+            limits.push(LimitEvent {
                 coordinate: coordinate.clone(),
                 t,
                 value: x[i],
@@ -329,19 +294,12 @@ fn initial_state<const J: usize, const N: usize>(
             (middle, mechanism.pose(&middle)?, [0.0; J])
         }
         (Start::Settled, MotorInput::Follow { reference, control }) => {
-            let target = wanted(mechanism, reference, 0.0)?;
+            let target = wanted(mechanism, reference, 0.0);
             settle(moving, &target, control)?
         }
     };
-    for i in 0..J {
-        if !(lower[i]..=upper[i]).contains(&x[i]) {
-            return Err(SimulateError::LimitAtStart {
-                coordinate: mechanism.robot.coordinate_names()[i].clone(),
-                value: x[i],
-                lower: lower[i],
-                upper: upper[i],
-            });
-        }
+    if let Some(i) = (0..J).find(|&i| !(lower[i]..=upper[i]).contains(&x[i])) {
+        return Err(mechanism.beyond_at_start(i, x[i]));
     }
     let mut y = [0.0; N];
     y[..J].copy_from_slice(&q);

@@ -77,32 +77,15 @@ impl<const J: usize> Settings<J> {
     /// [`SimulateError::Parameter`] for the first number that no experiment can have.
     pub fn check(&self) -> Result<(), SimulateError> {
         self.sensors.check()?;
-        let numbers = [
-            ("duration", self.seconds, "must be above 0 s and finite"),
-            ("rate", self.rate_hz, "must be above 0 Hz and finite"),
-            (
-                "absolute tolerance",
-                self.tolerance.absolute,
-                "must be above 0",
-            ),
-            (
-                "relative tolerance",
-                self.tolerance.relative,
-                "must be above 0",
-            ),
-        ];
-        for (name, value, rule) in numbers {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(SimulateError::Parameter { name, value, rule });
-            }
-        }
-        if self.saturation.is_nan() || self.saturation <= 0.0 {
-            return Err(SimulateError::Parameter {
-                name: "saturation",
-                value: self.saturation,
-                rule: "must be above 0 V",
-            });
-        }
-        Ok(())
+        let finite = |x: f64| x > 0.0 && x.is_finite();
+        let rule = "must be above 0 s and finite";
+        SimulateError::require(finite(self.seconds), "duration", self.seconds, rule)?;
+        let rule = "must be above 0 Hz and finite";
+        SimulateError::require(finite(self.rate_hz), "rate", self.rate_hz, rule)?;
+        let (Tolerance { absolute, relative }, rule) = (self.tolerance, "must be above 0");
+        SimulateError::require(finite(absolute), "absolute tolerance", absolute, rule)?;
+        SimulateError::require(finite(relative), "relative tolerance", relative, rule)?;
+        let (most, rule) = (self.saturation, "must be above 0 V");
+        SimulateError::require(most > 0.0, "saturation", most, rule)
     }
 }

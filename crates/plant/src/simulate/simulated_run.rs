@@ -26,10 +26,9 @@ impl MotorStatus {
 
     /// The state that [`Self::code`] names so.
     pub(super) fn of_code(code: f64) -> Self {
-        [Self::Running, Self::Saturated, Self::LimitReached]
-            .into_iter()
-            .find(|status| f64::from(status.code()) == code)
-            .unwrap_or_default()
+        let all = [Self::Running, Self::Saturated, Self::LimitReached];
+        let named = |status: &Self| f64::from(status.code()) == code;
+        all.into_iter().find(named).unwrap_or_default()
     }
 }
 
@@ -169,35 +168,6 @@ impl<const J: usize> SimulatedRun<J> {
             q: self.q.as_flattened_mut(),
             torque: self.torque.as_flattened_mut(),
             joints: J,
-        }
-    }
-
-    /// Column names of the log: t, q_*, tau_*, and with `raw` also the motor coordinates, u_1.. and
-    /// status_1...
-    pub fn header(&self, raw: bool) -> Vec<String> {
-        let mut names = vec!["t".to_owned()];
-        names.extend(self.joints.iter().map(|joint| format!("q_{joint}")));
-        names.extend(self.joints.iter().map(|joint| format!("tau_{joint}")));
-        if raw {
-            names.extend(self.coordinates.iter().cloned());
-            let motors = 1..=self.coordinates.len();
-            names.extend(motors.clone().map(|i| format!("u_{i}")));
-            names.extend(motors.map(|i| format!("status_{i}")));
-        }
-        names
-    }
-
-    /// Writes row k into `out`, in the order of [`Self::header`].
-    pub fn row(&self, k: usize, raw: bool, out: &mut Vec<f64>) {
-        let n = self.joints.len();
-        out.clear();
-        out.push(self.t[k]);
-        out.extend(&self.q[k][..n]);
-        out.extend(&self.torque[k][..n]);
-        if raw {
-            out.extend(&self.x[k][..n]);
-            out.extend(&self.volts[k][..n]);
-            out.extend(self.status[k][..n].iter().map(|s| f64::from(s.code())));
         }
     }
 }

@@ -172,22 +172,6 @@ fn lost_rows_and_uneven_instants_leave_times_that_are_true() {
 }
 
 #[test]
-fn header_and_rows_agree() {
-    let recording = run(Sensors::default(), 0, &[]);
-    let mut row = Vec::new();
-    for raw in [false, true] {
-        recording.row(17, raw, &mut row);
-        assert_eq!(row.len(), recording.header(raw).len());
-    }
-    let header = recording.header(true);
-    let at = |name: &str| header.iter().position(|h| h == name).expect("column");
-    assert_eq!(row[at("t")], recording.t[17]);
-    assert_eq!(row[at("tau_q4")], recording.torque[17][2]);
-    assert_eq!(row[at("x_c3")], recording.x[17][2]);
-    assert_eq!(row[at("u_4")], recording.volts[17][3]);
-}
-
-#[test]
 fn seeds_vary_the_order_of_a_ladder() {
     let ladder = |seed| {
         OneJointMove::new(0, 20.0, Some(seed))

@@ -27,7 +27,6 @@ fn build(site: &Site, _: &super::PlantRobot, values: &[f64]) -> Result<Built, Si
     })
 }
 
-#[derive(Debug)]
 struct ActuatorFriction {
     row: usize,
     viscous: f64,

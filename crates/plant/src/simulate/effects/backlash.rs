@@ -27,7 +27,6 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Share of half the gap within which contact comes about.
 const CONTACT: f64 = 0.005;
 
-#[derive(Debug)]
 struct Backlash {
     joint: usize,
     half: f64,

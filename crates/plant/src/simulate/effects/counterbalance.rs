@@ -35,12 +35,7 @@ pub static LAW: PlantLaw = PlantLaw {
 };
 
 fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
-    let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
-        effect: ENTRY.name.to_owned(),
-        key: key.to_owned(),
-        value,
-        rule: rule.to_owned(),
-    };
+    let refuse = |key, value, rule: &str| SimulateError::number(ENTRY.name, key, value, rule);
     let (stiffness, a, b) = (values[0], values[2], values[3]);
     if stiffness != 0.0 && !site.turns {
         return Err(site.refuse(
@@ -73,7 +68,6 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
     })
 }
 
-#[derive(Debug)]
 struct Counterbalance {
     joint: usize,
     stiffness: f64,

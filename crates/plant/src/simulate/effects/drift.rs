@@ -26,7 +26,6 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Time between two knots of the walk \[s\].
 const KNOT: f64 = 0.01;
 
-#[derive(Debug)]
 struct Drift {
     joint: usize,
     c: f64,

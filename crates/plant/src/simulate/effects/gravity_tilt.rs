@@ -50,7 +50,6 @@ fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Sim
     }
 }
 
-#[derive(Debug)]
 struct Tilt {
     gx: f64,
     gy: f64,
@@ -80,7 +79,6 @@ impl Effect for Tilt {
     }
 }
 
-#[derive(Debug)]
 struct Constant {
     force: f64,
 }
@@ -112,7 +110,6 @@ fn moments(robot: &Robot, theta: &[f64]) -> Vec<(f64, Vector3<f64>)> {
 }
 
 /// A serial robot in gravity that has something beside what is declared.
-#[derive(Debug)]
 struct Askew {
     chain: Tree,
     moments: Vec<(f64, Vector3<f64>)>,

@@ -9,6 +9,7 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
+use super::rotor_inertia::AtJoint;
 use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::payload::ENTRY;
@@ -26,7 +27,8 @@ fn build(_: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Simula
     let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
     let robot = machine.robot;
     if !robot.knows_links() {
-        return Built::plant(AtOneJoint {
+        return Built::plant(AtJoint {
+            joint: 0,
             inertia: match robot.joint_kind(0) {
                 JointKind::Prismatic => mass,
                 JointKind::Revolute => (mx * mx + my * my) / mass + inertia,
@@ -49,7 +51,6 @@ fn build(_: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Simula
     })
 }
 
-#[derive(Debug)]
 struct Carried {
     mass: f64,
     /// Place in the frame of link 8 \[m\]; its height does not matter, for the tool stays level.
@@ -101,22 +102,8 @@ impl Effect for Carried {
     }
 }
 
-#[derive(Debug)]
-struct AtOneJoint {
-    inertia: f64,
-}
-
-impl Effect for AtOneJoint {
-    fn inertia(&self, _motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
-        if let Some(mass) = mass.first_mut() {
-            *mass += self.inertia;
-        }
-    }
-}
-
 /// On the last link of a chain: m J'J + I J_w'J_w, and the same of what the speeds and gravity ask for. The
 /// spin of a ball has no torque of its own.
-#[derive(Debug)]
 struct LinkLoad {
     chain: Tree,
     mass: f64,
@@ -140,13 +127,12 @@ impl Effect for LinkLoad {
             let pull = self.mass * (frame.bias + frame.spin_bias.cross(&arm) + swept - gravity);
             let twist = self.inertia * frame.spin_bias;
             for i in 0..n {
-                let (turns, slides) =
-                    (frame.turns[i], frame.slides[i] + frame.turns[i].cross(&arm));
+                let moved = |j: usize| frame.slides[j] + frame.turns[j].cross(&arm);
+                let (turns, slides) = (frame.turns[i], moved(i));
                 torque[i] += slides.dot(&pull) + turns.dot(&twist);
                 for j in 0..=i {
-                    let other = frame.slides[j] + frame.turns[j].cross(&arm);
-                    let both =
-                        self.mass * slides.dot(&other) + self.inertia * turns.dot(&frame.turns[j]);
+                    let turned = self.inertia * turns.dot(&frame.turns[j]);
+                    let both = self.mass * slides.dot(&moved(j)) + turned;
                     mass[n * i + j] += both;
                     if i != j {
                         mass[n * j + i] += both;

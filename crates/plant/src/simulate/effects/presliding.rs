@@ -41,7 +41,6 @@ const fn bend(turns: bool) -> f64 {
     if turns { 1e-3 } else { 1e-4 }
 }
 
-#[derive(Debug)]
 struct Presliding {
     joint: usize,
     sigma0: f64,

@@ -32,7 +32,6 @@ fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Sim
     Built::plant(RigidBodyTerms(Coefficients::from_theta22(&theta)))
 }
 
-#[derive(Debug)]
 struct RigidBodyTerms(Coefficients);
 
 impl Effect for RigidBodyTerms {

@@ -32,7 +32,6 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
     })
 }
 
-#[derive(Debug)]
 struct Ripple {
     joint: usize,
     /// rad per m or per rad.

@@ -23,10 +23,9 @@ pub static LAW: PlantLaw = PlantLaw {
     },
 };
 
-#[derive(Debug)]
-struct AtJoint {
-    joint: usize,
-    inertia: f64,
+pub(super) struct AtJoint {
+    pub joint: usize,
+    pub inertia: f64,
 }
 
 impl Effect for AtJoint {
@@ -35,7 +34,6 @@ impl Effect for AtJoint {
     }
 }
 
-#[derive(Debug)]
 struct AtScrew {
     row: usize,
     mass: f64,

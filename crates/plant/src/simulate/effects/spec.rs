@@ -118,15 +118,12 @@ impl EffectSpec {
         sites: &'a Sites,
     ) -> Result<&'a [Site], SimulateError> {
         let whole = sites.whole.as_slice();
-        let refuse = |why: ErrorText| {
-            let first = whole.first().or(sites.joints.first());
-            first.map_or_else(
-                || SimulateError::UnknownJoint {
-                    name: String::new(),
-                    known: String::new(),
-                },
-                |site| site.refuse(effect, why),
-            )
+        let refuse = |why: ErrorText| match whole.first().or(sites.joints.first()) {
+            Some(site) => site.refuse(effect, why),
+            None => SimulateError::UnknownJoint {
+                name: String::new(),
+                known: String::new(),
+            },
         };
         let (joints, screws): (&[Site], &[Site]) = match places {
             Places::Joints | Places::JointsOrAll | Places::Pairs => (&sites.joints, &[]),
@@ -158,22 +155,33 @@ impl EffectSpec {
         })
     }
 
+    /// Refuses the first key that is none of those known.
+    pub(super) fn check_keys(&self, known: Vec<&str>) -> Result<(), SimulateError> {
+        let mut given = self.values.iter().map(|(key, _)| key);
+        match given.find(|key| !known.contains(&key.as_str())) {
+            None => Ok(()),
+            Some(key) => Err(SimulateError::UnknownKey {
+                effect: self.name.clone(),
+                key: key.clone(),
+                known: known.join(", "),
+            }),
+        }
+    }
+
+    /// The number that is given for a key.
+    pub(super) fn given(&self, key: &str) -> Option<f64> {
+        let mut all = self.values.iter();
+        all.find(|(name, _)| name == key).map(|(_, value)| *value)
+    }
+
     /// One number per key of the effect.
     pub(super) fn numbers(&self, law: &PlantLaw, site: &Site) -> Result<Vec<f64>, SimulateError> {
         let keys = law.entry.keys;
-        for (key, _) in &self.values {
-            if law.entry.key(key).is_none() {
-                return Err(SimulateError::UnknownKey {
-                    effect: law.entry.name.to_owned(),
-                    key: key.clone(),
-                    known: keys.iter().map(|k| k.name).collect::<Vec<_>>().join(", "),
-                });
-            }
-        }
-        let given = |key: &Key| self.values.iter().find(|(k, _)| k == key.name);
-        let sized = keys.iter().any(|key| key.size && given(key).is_some());
-        let number = |(key, default): (&Key, f64)| match given(key) {
-            Some((_, number)) => *number,
+        self.check_keys(keys.iter().map(|key| key.name).collect())?;
+        let sized = |key: &Key| key.size && self.given(key.name).is_some();
+        let sized = keys.iter().any(sized);
+        let number = |(key, default): (&Key, f64)| match self.given(key.name) {
+            Some(number) => number,
             None if key.size && sized => 0.0,
             None => default,
         };
