@@ -144,9 +144,7 @@ pub(super) fn foresee(
     })
 }
 
-/// Foresees what a least-squares fit to a log of `rows` rows per joint will give, with white noise
-/// of `machine.noise` on every row and the friction known; `given` is (R'R by noise) of logs that
-/// are fitted together with it.
+/// Foresees a fit to `rows` rows per joint with their noise, friction known, and what is given besides by its noise.
 pub(super) fn expected(
     machine: &ForeseenRobot,
     information: &Information,

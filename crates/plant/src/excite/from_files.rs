@@ -138,25 +138,20 @@ fn of_coordinate(
         speed = speed.min(of_joint.speed.unwrap_or(f64::INFINITY));
         acceleration = acceleration.min(of_joint.acceleration.unwrap_or(f64::INFINITY));
     }
-    let symmetric =
-        |quantity, unit: &str, most: f64| BoundedQuantity::symmetric(quantity, i, name, unit, most);
-    if lower.is_finite() && upper.is_finite() {
-        let span = [lower, upper];
-        channels.push(BoundedQuantity::between(
-            Quantity::Position,
-            i,
-            name,
-            unit,
-            span,
-        ));
-    }
-    if speed.is_finite() {
-        channels.push(symmetric(Quantity::Speed, &format!("{unit}/s"), speed));
-    }
-    if acceleration.is_finite() {
-        let unit = format!("{unit}/s^2");
-        channels.push(symmetric(Quantity::Acceleration, &unit, acceleration));
-    }
+    let mut add = |quantity, unit: &str, [low, high]: [f64; 2]| {
+        if low.is_finite() && high.is_finite() {
+            let span = [low, high];
+            channels.push(BoundedQuantity::between(quantity, i, name, unit, span));
+        }
+    };
+    add(Quantity::Position, unit, [lower, upper]);
+    add(Quantity::Speed, &format!("{unit}/s"), [-speed, speed]);
+    let most = acceleration;
+    add(
+        Quantity::Acceleration,
+        &format!("{unit}/s^2"),
+        [-most, most],
+    );
     // a limit on a motor's force is one on its volts; one volt is one unit of torque where no gain is known
     let gain = robot.transmission().gains().map_or(1.0, |gains| gains[i]);
     let force = given.torque.map(|force| force / gain);
@@ -164,13 +159,11 @@ fn of_coordinate(
     let saturation = file.control.saturation_v.or(amplifier);
     let most = [given.volts, saturation, force].into_iter().flatten();
     let most = most.fold(f64::INFINITY, f64::min);
-    if most.is_finite() {
-        let unit = match mechanism.motors_at_joints() {
-            true => kind.torque_unit(),
-            false => "V",
-        };
-        channels.push(symmetric(Quantity::Drive, unit, most));
-    }
+    let unit = match mechanism.motors_at_joints() {
+        true => kind.torque_unit(),
+        false => "V",
+    };
+    add(Quantity::Drive, unit, [-most, most]);
 }
 
 /// Limits of a joint that is no designed coordinate (torque alone where it is one, `same`).
@@ -183,25 +176,21 @@ fn of_joint(
     channels: &mut Vec<BoundedQuantity>,
 ) {
     let unit = kind.position_unit();
-    let symmetric = |quantity, unit: &str, most: f64| {
-        BoundedQuantity::symmetric(quantity, joint, name, unit, most)
+    let both = |most: f64| [-most, most];
+    let mut add = |quantity, unit: &str, span: Option<[f64; 2]>| {
+        let of = |span| BoundedQuantity::between(quantity, joint, name, unit, span);
+        channels.extend(span.map(of));
     };
-    if let Some(torque) = given.torque {
-        channels.push(symmetric(Quantity::Torque, kind.torque_unit(), torque));
-    }
-    if same {
-        return;
-    }
-    if let Some(span) = given.position {
-        let of = Quantity::JointPosition;
-        channels.push(BoundedQuantity::between(of, joint, name, unit, span));
-    }
-    if let Some(speed) = given.speed {
-        channels.push(symmetric(Quantity::JointSpeed, &format!("{unit}/s"), speed));
-    }
-    if let Some(most) = given.acceleration {
-        let unit = format!("{unit}/s^2");
-        channels.push(symmetric(Quantity::JointAcceleration, &unit, most));
+    add(Quantity::Torque, kind.torque_unit(), given.torque.map(both));
+    if !same {
+        let (speed, acceleration) = (given.speed.map(both), given.acceleration.map(both));
+        add(Quantity::JointPosition, unit, given.position);
+        add(Quantity::JointSpeed, &format!("{unit}/s"), speed);
+        add(
+            Quantity::JointAcceleration,
+            &format!("{unit}/s^2"),
+            acceleration,
+        );
     }
 }
 

@@ -239,8 +239,7 @@ impl<'a> Bench<'a> {
         Err(refused.unwrap_or_else(|| self.no_law()))
     }
 
-    /// The acceleration that a ladder may take where the motors are the joints and something bounds it: less the
-    /// reserve, as for every limit.
+    /// The acceleration that a ladder may take where the motors are the joints and something bounds it.
     fn acceleration(&self) -> Option<f64> {
         let channels = &self.machine.channels;
         let limit = BoundedQuantity::find(channels, Quantity::Acceleration, self.joint);
@@ -311,8 +310,7 @@ impl<'a> Bench<'a> {
         Ok(expected)
     }
 
-    /// Sum of the logs of the slopes' relative variances, with a little of the others': the worst of
-    /// them does not hide the rest.
+    /// Sum of the logs of the slopes' relative variances, with a little of the others': the worst does not hide the rest.
     fn score(&self, expected: &[Expected]) -> f64 {
         let slopes = matches!(self.law(), JointFriction::DoubleTanh(_));
         let one = |e: &Expected| {
@@ -353,8 +351,7 @@ impl<'a> Bench<'a> {
         Ok((expected.collect(), used))
     }
 
-    /// Squares and products of the joint's rows for inertial parameters, a constant torque and the friction law; the
-    /// largest share of a drive's limit, and which drive it is.
+    /// F'F of the joint's rows for inertia, a constant torque and friction; the largest share of a drive's limit, and whose.
     fn information(
         &self,
         along: &Reference<MAX_COORDINATES>,
@@ -397,8 +394,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Variances of the unknowns behind the first `nuisance`, whose values are unknown too; `None` where
-/// nothing distinguishes one from them.
+/// Variances of the unknowns behind the first `nuisance`; `None` where nothing distinguishes one from those.
 fn variances(g: &DMatrix<f64>, nuisance: usize) -> Result<Vec<Option<f64>>, ExciteError> {
     let (scaled, scale) = scaled_to_one(g);
     let f = g.nrows() - nuisance;

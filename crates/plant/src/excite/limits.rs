@@ -187,16 +187,15 @@ mod tests {
     #[test]
     fn use_of_a_limit_is_one_at_the_limit_on_either_side() {
         let channel = position();
-        assert!((channel.used(-0.1) - 1.0).abs() < 1e-12);
-        assert!((channel.used(0.5) - 1.0).abs() < 1e-12);
-        assert!(channel.used(0.2) < 1e-12);
+        for (value, used) in [(-0.1, 1.0), (0.5, 1.0), (0.2, 0.0)] {
+            assert!((channel.used(value) - used).abs() < 1e-12, "{value}");
+        }
         let reserved = channel.reserved(0.1);
         assert!((reserved.lower + 0.07).abs() < 1e-12 && (reserved.upper - 0.47).abs() < 1e-12);
         let open = [0.2, f64::INFINITY];
         let clearance = BoundedQuantity::between(Quantity::Clearance, 0, "q5", "", open);
-        assert_eq!(clearance.used(0.2), 1.0);
-        assert_eq!(clearance.used(0.4), 0.5);
-        assert_eq!(clearance.used(-0.1), f64::INFINITY);
+        let used = [0.2, 0.4, -0.1].map(|value| clearance.used(value));
+        assert_eq!(used, [1.0, 0.5, f64::INFINITY]);
         assert!(clearance.reserved(0.1).lower > 0.2);
     }
 

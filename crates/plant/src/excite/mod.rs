@@ -28,7 +28,7 @@ pub mod limits;
 pub mod machine;
 pub mod motion;
 mod objective;
-pub mod peak;
+mod peak;
 mod repair;
 pub mod search;
 pub mod series;

@@ -33,8 +33,7 @@ pub(super) fn repaired(
     })
 }
 
-/// Each coordinate scaled about its offset to its own limits, moved where that saves amplitude, then all of them to
-/// torques and volts; `None` where standing still breaks a limit.
+/// Each coordinate scaled and moved to its own limits, then all to torques and volts; `None` where rest breaks a limit.
 fn fitted(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],

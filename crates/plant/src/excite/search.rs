@@ -45,10 +45,6 @@ pub struct FoundMotion {
     pub series: Series,
     /// Evaluations of the criterion with its derivative, over all starts.
     pub evaluations: u64,
-    /// Start that it came from, counted from 0.
-    pub start: usize,
-    /// Starts that gave a motion within the limits.
-    pub usable: usize,
     /// Whether it was stopped before its end.
     pub stopped: bool,
 }
@@ -146,7 +142,6 @@ pub fn design(
         })
         .collect();
     searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
-    let usable = searches.iter().filter(|s| s.2.is_some()).count();
     let last = task.finalists().min(searches.len());
     searches[..last]
         .par_iter_mut()
@@ -166,10 +161,8 @@ pub fn design(
         });
     searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
     match searches.into_iter().next() {
-        Some((start, _, Some((_, series)))) => Ok(FoundMotion {
+        Some((_, _, Some((_, series)))) => Ok(FoundMotion {
             series,
-            start,
-            usable,
             stopped: effort.stopped(),
             evaluations: effort.spent.into_inner(),
         }),
@@ -294,9 +287,4 @@ fn nothing_fits(
         upper: channel.upper,
         channel: channel.name,
     }
-}
-
-/// Whether a series keeps every limit of the machine along its period.
-pub fn keeps_limits(machine: &ForeseenRobot, series: &Series) -> bool {
-    worst(&along_period(machine, &machine.channels, series)) <= 1.0
 }

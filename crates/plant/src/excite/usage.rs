@@ -4,7 +4,7 @@ use super::ExciteError;
 use super::blend::Blend;
 use super::limits::BoundedQuantity;
 use super::machine::{ForeseenRobot, Quantities, State};
-use super::peak::{Peak, highest, highest_from};
+use super::peak::{Peak, highest};
 use super::series::{Kinematics, Series};
 
 /// First parts of a period for what is not a trigonometric polynomial: friction turns round within milliseconds.
@@ -287,11 +287,13 @@ fn gathered(channel: &BoundedQuantity, most: Peak, least: Peak) -> Use {
 fn of_polynomial(channel: &BoundedQuantity, order: usize, series: &Series) -> Use {
     let i = channel.index;
     let curvature = Some(series.derivative_bound(i, order as i32 + 2));
-    let (span, parts) = ([0.0, series.period()], 8 * series.harmonics().max(1));
+    let (period, parts) = (series.period(), 8 * series.harmonics().max(1));
     let tolerance = TOLERANCE * channel.room();
     let peak = |sign: f64| {
         let mut f = |t| sign * series.one(i, t)[order];
-        highest(&mut f, span, parts, curvature, tolerance)
+        let at = |k: usize| period * k as f64 / parts as f64;
+        let samples: Vec<f64> = (0..=parts).map(|k| f(at(k))).collect();
+        highest(&mut f, [0.0, period], &samples, curvature, tolerance)
     };
     gathered(channel, peak(1.0), peak(-1.0))
 }
@@ -324,7 +326,7 @@ fn of_path(
             let samples: Vec<f64> = values.iter().copied().map(beyond).collect();
             let mut f = |t| beyond(value(channel, t));
             let tolerance = tolerance * channel.room();
-            highest_from(&mut f, path.span, &samples, None, tolerance)
+            highest(&mut f, path.span, &samples, None, tolerance)
         };
         gathered(channel, peak(1.0), peak(-1.0))
     };

@@ -3,8 +3,7 @@
 use super::limits::{BoundedQuantity, Quantity};
 use super::series::Series;
 
-/// Length of one unit of a search variable, in half spans and speed limits: the first step of a search
-/// is one unit long at most.
+/// Length of one unit of a search variable, in half spans and speed limits: the first step is one unit at most.
 const UNIT_OF_SPAN: f64 = 0.05;
 
 /// A map from search variables to a series: per coordinate a free offset in half spans, then a and b in speed limits.

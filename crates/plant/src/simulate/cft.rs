@@ -21,8 +21,7 @@ use cft_ident_core::robot::friction::DoubleTanh;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CftTruth {
     pub setup: Setup,
-    /// theta_1..theta_12, then the ten base parameters that the printed structure lacks (zero where
-    /// the robot is as the report models it), in the order of `robot::cft::EXTENDED`.
+    /// theta_1..theta_12, then the ten base parameters that the printed structure lacks, as `robot::cft::EXTENDED`.
     pub theta: [f64; 22],
     /// Friction of q1, q2, q4, q5 (theta_13..theta_32).
     pub friction: [DoubleTanh; 4],
@@ -90,9 +89,6 @@ impl CftTruth {
 }
 
 /// The CFT robot on a set-up, with the limits of Table 5.
-///
-/// # Errors
-/// None: it has four joints.
 pub fn mechanism(setup: Setup) -> Result<Mechanism<4>, SimulateError> {
     Mechanism::new(Robot::cft(setup, Structure::Printed12))
 }
@@ -108,10 +104,8 @@ pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
 }
 
 fn excitation_of(series: Fourier<4>) -> Reference<4> {
-    Reference {
-        frame: ReferenceFrame::Motors,
-        path: Path::Fourier(series),
-    }
+    let (frame, path) = (ReferenceFrame::Motors, Path::Fourier(series));
+    Reference { frame, path }
 }
 
 /// The effects on a CFT robot.
@@ -132,10 +126,8 @@ pub fn follow(
     let plant = truth.plant()?;
     plant.check()?;
     let (effects, _) = Effects::build(specs, &Sites::of(&plant)?)?;
-    let drive = MotorInput::Follow {
-        reference,
-        control: plant.control(),
-    };
+    let control = plant.control();
+    let drive = MotorInput::Follow { reference, control };
     run(&plant, effects, &Start::Settled, &drive, settings)
 }
 
@@ -151,12 +143,8 @@ mod tests {
             for seed in 0..20 {
                 let varied = nominal.varied(0.15, seed).expect("a draw is physical");
                 assert_eq!(varied, nominal.varied(0.15, seed).expect("repeats"));
-                let pairs = nominal.theta.iter().zip(&varied.theta);
-                let laws = nominal
-                    .friction_theta()
-                    .into_iter()
-                    .zip(varied.friction_theta());
-                for (a, b) in pairs.map(|(a, b)| (*a, *b)).chain(laws) {
+                let all = |truth: &CftTruth| [&truth.theta[..], &truth.friction_theta()].concat();
+                for (a, b) in all(&nominal).iter().zip(all(&varied)) {
                     assert!((b - a).abs() <= 0.15 * a.abs() + 1e-15);
                 }
             }
@@ -167,8 +155,9 @@ mod tests {
     fn impossible_inertia_is_refused_with_the_pose() {
         let mut truth = CftTruth::synthetic(Setup::Tuedacs);
         truth.theta[11] = -5.0;
+        let refused = truth.check();
         assert!(matches!(
-            truth.check(),
+            refused,
             Err(SimulateError::NotPositiveDefinite { .. })
         ));
         truth.theta[11] = f64::NAN;
@@ -188,12 +177,8 @@ mod tests {
         let friction = truth.friction_theta();
         for p in &parameters {
             let number = p.theta.expect("every parameter has a number") as usize;
-            let value = if number <= 12 {
-                truth.theta[number - 1]
-            } else {
-                friction[number - 13]
-            };
-            assert_eq!(p.value, value, "theta_{number}");
+            let all = [&truth.printed()[..], &friction].concat();
+            assert_eq!(p.value, all[number - 1], "theta_{number}");
         }
         let mut full = truth;
         full.theta[17] = 0.1;

@@ -47,16 +47,12 @@ impl<'a> Experiment<'a> {
         seconds: Option<f64>,
         seed: u64,
     ) -> Result<Option<Reference<J>>, SimulateError> {
-        let ladder = OneJointMove::new(0, seconds.unwrap_or(SECONDS), Some(seed));
+        let mut ladder = OneJointMove::new(0, seconds.unwrap_or(SECONDS), Some(seed));
         Ok(match *self {
             Self::Usual => Some(usual(mechanism, &ladder)?),
             Self::OneJoint { joint, part } => {
-                let mover = Mover::named(&mechanism.robot, joint)?;
-                let ladder = OneJointMove {
-                    mover,
-                    part,
-                    ..ladder
-                };
+                ladder.mover = Mover::named(&mechanism.robot, joint)?;
+                ladder.part = part;
                 Some(ladder.reference(mechanism)?)
             }
             Self::Trajectory(file) => Some(of_file(mechanism, file, seconds, seed)?),
@@ -65,12 +61,8 @@ impl<'a> Experiment<'a> {
     }
 }
 
-/// Reference of a trajectory file. Coordinates that a Fourier file leaves out stay in the middle of their
-/// travels.
-///
-/// # Errors
-/// [`SimulateError`] where the trajectory names what the robot does not have, or does not fit.
-pub fn of_file<const J: usize>(
+/// Reference of a trajectory file; what a Fourier file leaves out stays in the middle of its travel.
+pub(crate) fn of_file<const J: usize>(
     mechanism: &Mechanism<J>,
     file: &Trajectory,
     seconds: Option<f64>,
@@ -125,10 +117,8 @@ fn fourier<const J: usize>(
             series.b[l][i] = *b;
         }
     }
-    Ok(Reference {
-        frame,
-        path: Path::Fourier(series),
-    })
+    let path = Path::Fourier(series);
+    Ok(Reference { frame, path })
 }
 
 fn points<const J: usize>(
@@ -138,20 +128,16 @@ fn points<const J: usize>(
 ) -> Result<Reference<J>, SimulateError> {
     let mut list = Vec::with_capacity(file.points.len());
     let first = file.points.first().map_or(0.0, |point| point.t);
-    for (k, point) in file.points.iter().enumerate() {
+    for (k, point) in (1..).zip(&file.points) {
         let Some(pose) = mechanism.widened(&point.position, 0.0) else {
             let (given, n) = (point.position.len(), mechanism.joints());
-            return Err(SimulateError::reference(format!(
-                "point {} has {given} coordinates and the robot has {n}",
-                k + 1
-            )));
+            let what = format!("point {k} has {given} coordinates and the robot has {n}");
+            return Err(SimulateError::reference(what));
         };
         list.push((point.t - first, pose));
     }
-    Ok(Reference {
-        frame,
-        path: Path::Points(Points::new(&list)?),
-    })
+    let path = Path::Points(Points::new(&list)?);
+    Ok(Reference { frame, path })
 }
 
 /// What the robot does where nothing is asked for.
@@ -159,20 +145,17 @@ fn usual<const J: usize>(
     mechanism: &Mechanism<J>,
     ladder: &OneJointMove,
 ) -> Result<Reference<J>, SimulateError> {
-    if let Some(practice) = &mechanism.practice {
-        return Ok(Reference {
-            frame: ReferenceFrame::Motors,
-            path: Path::Fourier(Fourier::of(&practice.excitation)),
-        });
-    }
-    match mechanism.joints() {
-        1 => ladder.reference(mechanism),
-        _ => Ok(all_joints(mechanism)),
-    }
+    let (frame, series) = match &mechanism.practice {
+        Some(practice) => (ReferenceFrame::Motors, Fourier::of(&practice.excitation)),
+        None if mechanism.joints() == 1 => return ladder.reference(mechanism),
+        None => (ReferenceFrame::Joints, all_joints(mechanism)),
+    };
+    let path = Path::Fourier(series);
+    Ok(Reference { frame, path })
 }
 
 /// All joints over most of their travel, each with phases of its own.
-fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
+fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Fourier<J> {
     let (mut a, mut b) = (vec![[0.0; J]; HARMONICS], vec![[0.0; J]; HARMONICS]);
     let sum: f64 = (1..=HARMONICS).map(|k| 1.0 / k as f64).sum();
     for k in 0..HARMONICS {
@@ -184,17 +167,14 @@ fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
             b[k][j] = amplitude * phase.sin();
         }
     }
-    Reference {
-        frame: ReferenceFrame::Joints,
-        path: Path::Fourier(Fourier {
-            offset: mechanism.middle(),
-            a,
-            b,
-            fundamental: TAU * FUNDAMENTAL_HZ,
-            start: 0.0,
-            blend: Fourier::<J>::BLEND,
-            periods: None,
-        }),
+    Fourier {
+        offset: mechanism.middle(),
+        a,
+        b,
+        fundamental: TAU * FUNDAMENTAL_HZ,
+        start: 0.0,
+        blend: Fourier::<J>::BLEND,
+        periods: None,
     }
 }
 

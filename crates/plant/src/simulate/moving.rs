@@ -2,7 +2,7 @@
 //!
 //! Its state is (q, v, z): z are the states of the effects.
 
-use super::effects::{Effects, PlantState};
+use super::effects::{Effect, Effects, PlantState};
 use super::integrate::System;
 use super::plant::{Plant, gather, spread};
 
@@ -70,12 +70,12 @@ impl<const J: usize> Moving<'_, J> {
             friction: &friction[..self.plant.joints()],
             ..self.seen(t, [&q, &v], z)
         };
-        let mut acting = [1.0; J];
-        self.effects.drive(&mut acting);
-        let mut added = self.plant.offset;
-        self.effects.torque(&motion, &mut added);
-        let mut share = [[0.0; 2]; J];
-        self.effects.load(&motion, &mut share);
+        let (mut added, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
+        self.effects.each(&motion, |effect, m| {
+            effect.drive(&mut acting);
+            effect.torque(m, &mut added);
+            effect.load(m, &mut share);
+        });
         let torque = self.plant.mechanism.torque(&q, &self.volts);
         let (mass, bias) = self.body(t, link, speed, z);
         let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
@@ -131,7 +131,8 @@ impl<const J: usize> Moving<'_, J> {
                 ..*motion
             };
             let mut wanted = [0.0; J];
-            self.effects.implicit(&motion, &mut wanted);
+            let each = |effect: &dyn Effect, m: &PlantState| effect.implicit(m, &mut wanted);
+            self.effects.each(&motion, each);
             (std::array::from_fn(|i| wanted[i] - taken[i]), net)
         };
         for _ in 0..MOST_STEPS {
@@ -175,7 +176,8 @@ impl<const J: usize> Moving<'_, J> {
         gather(&mut mass, n);
         let flat = &mut mass.as_flattened_mut()[..n * n];
         let motion = self.seen(t, [q, v], z);
-        self.effects.inertia(&motion, flat, &mut bias[..n]);
+        let each = |effect: &dyn Effect, m: &PlantState| effect.inertia(m, flat, &mut bias[..n]);
+        self.effects.each(&motion, each);
         spread(&mut mass, n);
         (mass, bias)
     }
@@ -189,19 +191,20 @@ impl<const J: usize> Moving<'_, J> {
             friction: &friction[..n],
             ..self.seen(t, [q, v], z)
         };
-        let mut torque = self.plant.offset;
-        self.effects.torque(&motion, &mut torque);
+        let (mut torque, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
+        self.effects.each(&motion, |effect, m| {
+            effect.drive(&mut acting);
+            effect.torque(m, &mut torque);
+            effect.load(m, &mut share);
+        });
         let still = [0.0; J];
         let at_rest = PlantState {
             a: &still[..n],
             load: &load[..n],
             ..motion
         };
-        self.effects.implicit(&at_rest, &mut torque);
-        let mut share = [[0.0; 2]; J];
-        self.effects.load(&motion, &mut share);
-        let mut acting = [1.0; J];
-        self.effects.drive(&mut acting);
+        let each = |effect: &dyn Effect, m: &PlantState| effect.implicit(m, &mut torque);
+        self.effects.each(&at_rest, each);
         std::array::from_fn(|i| {
             let beside = load[i] * side(share[i], load[i]);
             (load[i] + beside + friction[i] + torque[i]) / acting[i]

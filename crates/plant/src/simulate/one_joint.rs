@@ -63,8 +63,7 @@ impl Mover {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OneJointMove {
     pub mover: Mover,
-    /// Range of the mover, m or rad; what the limits leave in the middle of the others, with a margin, where
-    /// absent.
+    /// Range of the mover, m or rad; what the limits leave with a margin, the others in their middle, where absent.
     pub range: Option<(f64, f64)>,
     /// Middle part of the range that the limits leave; all of it, 1, unless asked for.
     pub part: f64,
@@ -129,35 +128,27 @@ impl OneJointMove {
         }
         let (frame, mut pose, room) = self.room(m)?;
         let range = self.within(&room);
-        let low = room.range.0 - 1e-9;
         // what stands at the joint itself is looked at while it runs
-        if !m.motors_at_joints() && (range.0 < low || range.1 > room.range.1 + 1e-9) {
+        let beyond = range.0 < room.range.0 - 1e-9 || range.1 > room.range.1 + 1e-9;
+        if beyond && !m.motors_at_joints() {
+            let (name, (from, to)) = (self.mover.name(&m.robot), room.range);
             return Err(SimulateError::reference(format!(
-                "{} cannot move over [{}, {}]: at this pose the limits leave [{:.4}, {:.4}]",
-                self.mover.name(&m.robot),
-                range.0,
-                range.1,
-                room.range.0,
-                room.range.1
+                "{name} cannot move over [{}, {}]: at this pose the limits leave [{from:.4}, {to:.4}]",
+                range.0, range.1
             )));
         }
         let ladder = self.ladder(m, range, &room)?;
         pose[place] = ladder.at(0.0).0;
-        Ok(Reference {
-            frame,
-            path: Path::Ladder {
-                moving: place,
-                pose,
-                ladder,
-            },
-        })
+        let path = Path::Ladder {
+            moving: place,
+            pose,
+            ladder,
+        };
+        Ok(Reference { frame, path })
     }
 
     /// The range that the mover runs over.
-    ///
-    /// # Errors
-    /// [`SimulateError`] where its travel is not known.
-    pub fn travel<const J: usize>(
+    pub(crate) fn travel<const J: usize>(
         &self,
         mechanism: &Mechanism<J>,
     ) -> Result<(f64, f64), SimulateError> {

@@ -12,7 +12,6 @@ use super::plant::Plant;
 use super::recorder::{Recorder, Waiting};
 use super::reference::Path;
 use super::run::{MotorInput, Start, run_in_blocks};
-use super::settings::Settings;
 use super::settings_file;
 use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 use super::temperature::PlantTemperatures;
@@ -188,16 +187,12 @@ fn run_order<const J: usize>(
     settings.seed = order.seed;
     // A fault of the data may reach back, or ahead, as far as it likes.
     let in_memory = in_memory || effects.first_fault().is_some();
-    let length = |settings: &Settings<J>| match in_memory {
-        true => settings.samples_in_memory(),
-        false => settings.samples(),
-    };
     // before a ladder of that length is built
-    length(&settings)?;
+    settings.samples(in_memory)?;
     let (drive, own_seconds) = drive(order, &plant)?;
     let start = initial.map_or(Ok(Start::Settled), |given| given.start(mechanism))?;
     settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
-    length(&settings)?;
+    settings.samples(in_memory)?;
 
     let mut recorder = Recorder::new(&settings.sensors, settings.seed);
     let mut waiting = Waiting::new(mechanism.joints());
@@ -217,10 +212,13 @@ fn run_order<const J: usize>(
     )?;
     recorder.hear(&run);
     let layout = LogLayout::of(order.robot, &run, warm);
-    let mut saturated = Saturated::default();
+    let (mut saturated, mut given) = ([0_u64; J], 0_u64);
     let mut give = |run: &mut SimulatedRun<J>| {
         recorder.measure(run, mechanism, &effects);
-        saturated.add(run);
+        given += run.rows() as u64;
+        for (i, status) in run.status.iter().flat_map(|row| row.iter().enumerate()) {
+            saturated[i] += u64::from(*status == MotorStatus::Saturated);
+        }
         go_on(rows.take(&layout.header, &layout.values(run)))
     };
     match in_memory {
@@ -233,9 +231,10 @@ fn run_order<const J: usize>(
             }
         }
     }
+    let shares = saturated.map(|count| count as f64 / given.max(1) as f64);
     Ok(SimulationSummary {
         truth: truth_of(order, &plant, &run, effect_values),
-        saturated: saturated.shares(&run.coordinates),
+        saturated: run.coordinates.iter().cloned().zip(shares).collect(),
         ending: run.ending,
         limits: run.limits,
     })
@@ -245,33 +244,6 @@ fn go_on(wish: ControlFlow<()>) -> Result<(), SimulateError> {
     match wish {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(SimulateError::Stopped),
-    }
-}
-
-/// How often the amplifiers saturate.
-#[derive(Debug, Default)]
-struct Saturated {
-    /// Saturated rows of each motor.
-    counts: Vec<u64>,
-    rows: u64,
-}
-
-impl Saturated {
-    fn add<const J: usize>(&mut self, run: &SimulatedRun<J>) {
-        self.counts.resize(J, 0);
-        for status in &run.status {
-            for (count, status) in self.counts.iter_mut().zip(status) {
-                *count += u64::from(*status == MotorStatus::Saturated);
-            }
-        }
-        self.rows += run.rows() as u64;
-    }
-
-    /// Share of the rows, by coordinate.
-    fn shares(&self, coordinates: &[String]) -> Vec<(String, f64)> {
-        let rows = self.rows.max(1) as f64;
-        let shares = self.counts.iter().map(|count| *count as f64 / rows);
-        coordinates.iter().cloned().zip(shares).collect()
     }
 }
 

@@ -133,13 +133,15 @@ impl Waited {
         let count = self.left.min(most);
         for _ in 0..count {
             rows.t.push(number(&mut self.file)?);
-            for part in [
-                &mut rows.x,
-                &mut rows.volts,
-                &mut rows.q,
-                &mut rows.torque,
-                &mut rows.actual.v,
-            ] {
+            let SimulatedRun {
+                x,
+                volts,
+                q,
+                torque,
+                actual,
+                ..
+            } = &mut *rows;
+            for part in [x, volts, q, torque, &mut actual.v] {
                 let mut row = [0.0; J];
                 for value in &mut row[..self.joints] {
                     *value = number(&mut self.file)?;

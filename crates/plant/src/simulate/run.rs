@@ -9,7 +9,7 @@ use super::moving::{Moving, part};
 use super::plant::Plant;
 use super::recorder::Recorder;
 use super::reference::{Reference, ReferenceFrame, Target};
-use super::settings::{OnLimit, Settings};
+use super::settings::Settings;
 use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 use super::volts::VoltSeries;
 
@@ -63,7 +63,7 @@ pub fn run<const J: usize>(
     drive: &MotorInput<J>,
     settings: &Settings<J>,
 ) -> Result<SimulatedRun<J>, SimulateError> {
-    settings.samples_in_memory()?;
+    settings.samples(true)?;
     let whole = &mut |_: &mut SimulatedRun<J>| Ok(());
     let (mut run, effects) = run_in_blocks(plant, effects, start, drive, settings, None, whole)?;
     let mut recorder = Recorder::new(&settings.sensors, settings.seed);
@@ -117,9 +117,8 @@ fn march<const J: usize, const N: usize>(
     block: Option<usize>,
     hand_on: HandOn<J>,
 ) -> Result<(SimulatedRun<J>, Effects), SimulateError> {
-    let plant = moving.plant;
-    let mechanism = &plant.mechanism;
-    let samples = settings.samples()?;
+    let mechanism = &moving.plant.mechanism;
+    let samples = settings.samples(false)?;
     let block = block.unwrap_or(samples);
     let sensors = &settings.sensors;
     let mut instants = sensors.instants(settings.rate_hz, settings.seed);
@@ -129,8 +128,9 @@ fn march<const J: usize, const N: usize>(
     let mut memory = None;
     let mut t = instants.next().unwrap_or(0.0);
     for k in 0..samples {
-        let beyond = limits_reached(&moving, settings.on_limit, t, &mut y, &mut recording)?;
         let (q, v) = (part::<J, N>(&y, 0), part::<J, N>(&y, J));
+        let at_links = mechanism.coordinates(&q);
+        let beyond = limits_reached(mechanism, t, &at_links, &mut recording)?;
         let (motors, _) = moving.motor_side(&q, &v, &y[2 * J..]);
         let coordinates = mechanism.coordinates(&motors);
         let seen = sensors.encoders(&coordinates, &mechanism.resolution);
@@ -149,23 +149,21 @@ fn march<const J: usize, const N: usize>(
         recording.x.push(seen);
         recording.volts.push(moving.volts);
         recording.q.push(measured);
-        recording
-            .torque
-            .push(mechanism.torque(&measured, &moving.volts));
-        recording
-            .status
-            .push(std::array::from_fn(|i| match beyond[i] {
-                true => MotorStatus::LimitReached,
-                false if asked[i].abs() >= limit => MotorStatus::Saturated,
-                false => MotorStatus::Running,
-            }));
+        let logged = mechanism.torque(&measured, &moving.volts);
+        recording.torque.push(logged);
+        let status = |i: usize| match beyond[i] {
+            true => MotorStatus::LimitReached,
+            false if asked[i].abs() >= limit => MotorStatus::Saturated,
+            false => MotorStatus::Running,
+        };
+        recording.status.push(std::array::from_fn(status));
         let actual = &mut recording.actual;
         actual.q.push(q);
         actual.v.push(v);
         actual.torque.push(mechanism.torque(&motors, &moving.volts));
         actual.a.push(moving.acceleration(t, &y));
         actual.target.push(wanted);
-        if beyond.contains(&true) && settings.on_limit == OnLimit::Stop {
+        if beyond.contains(&true) {
             recording.ending = RunEnding::StoppedAtLimit;
             break;
         }
@@ -179,7 +177,6 @@ fn march<const J: usize, const N: usize>(
             }
         }
     }
-    recording.effort = integrator.effort();
     Ok((recording, moving.effects))
 }
 
@@ -195,81 +192,27 @@ fn wanted<const J: usize>(mechanism: &Mechanism<J>, reference: &Reference<J>, t:
     }
 }
 
-/// Marks the coordinates beyond their limits, notes the first time of each, and clamps if asked to.
-fn limits_reached<const J: usize, const N: usize>(
-    moving: &Moving<J>,
-    on_limit: OnLimit,
+/// Marks the coordinates that are at x beyond their limits, and notes where.
+fn limits_reached<const J: usize>(
+    mechanism: &Mechanism<J>,
     t: f64,
-    y: &mut [f64; N],
+    x: &[f64; J],
     recording: &mut SimulatedRun<J>,
 ) -> Result<[bool; J], SimulateError> {
-    let mechanism = &moving.plant.mechanism;
     let (lower, upper) = (&mechanism.lower, &mechanism.upper);
-    let mut q = part::<J, N>(y, 0);
-    let mut x = mechanism.coordinates(&q);
     let beyond: [bool; J] = std::array::from_fn(|i| !(lower[i]..=upper[i]).contains(&x[i]));
-    if !beyond.contains(&true) {
-        return Ok(beyond);
-    }
-    if x.iter().any(|x| !x.is_finite()) {
+    if beyond.contains(&true) && x.iter().any(|x| !x.is_finite()) {
         return Err(SimulateError::Diverged { t });
     }
-    for i in (0..J).filter(|&i| beyond[i]) {
-        let coordinate = &recording.coordinates[i];
-        let limits = &mut recording.limits;
-        if limits.iter().all(|event| event.coordinate != *coordinate) {
-            limits.push(LimitEvent {
-                coordinate: coordinate.clone(),
-                t,
-                value: x[i],
-                lower: lower[i],
-                upper: upper[i],
-            });
-        }
-        x[i] = x[i].clamp(lower[i], upper[i]);
-    }
-    if on_limit == OnLimit::Stop {
-        return Ok(beyond);
-    }
-    q = mechanism.pose(&x)?;
-    let mut v = part::<J, N>(y, J);
-    stop_at(moving.plant, &q, &x, &mut v, &beyond);
-    y[..J].copy_from_slice(&q);
-    y[J..2 * J].copy_from_slice(&v);
+    let reached = (0..J).filter(|&i| beyond[i]).map(|i| LimitEvent {
+        coordinate: recording.coordinates[i].clone(),
+        t,
+        value: x[i],
+        lower: lower[i],
+        upper: upper[i],
+    });
+    recording.limits.extend(reached);
     Ok(beyond)
-}
-
-/// Takes the outward speeds away of the motors that stand at a limit, x, by inelastic stops.
-fn stop_at<const J: usize>(
-    plant: &Plant<J>,
-    q: &[f64; J],
-    x: &[f64; J],
-    v: &mut [f64; J],
-    beyond: &[bool; J],
-) {
-    let mechanism = &plant.mechanism;
-    let (mass, _) = plant.dynamics(q, v);
-    // The stop pushes where the motor pushes: an impulse along motor i takes the outward speed away, and
-    // what it does to the other coordinates follows from the inertia. Two rounds settle two stops.
-    for i in (0..J).chain(0..J).filter(|&i| beyond[i]) {
-        let speed = mechanism.coordinate_speeds(q, v)[i];
-        let outward = if x[i] >= mechanism.upper[i] {
-            speed > 0.0
-        } else {
-            speed < 0.0
-        };
-        let mut push = [0.0; J];
-        push[i] = 1.0;
-        let Some(change) = plant.solve(&mass, &mechanism.torque(q, &push)) else {
-            continue;
-        };
-        let per_push = mechanism.coordinate_speeds(q, &change)[i];
-        if outward && per_push > 0.0 {
-            for (v, change) in v.iter_mut().zip(change) {
-                *v -= speed / per_push * change;
-            }
-        }
-    }
 }
 
 /// Joint positions, speeds and effect states at t = 0.

@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::effects::LoggedChannels;
-use super::integrate::Effort;
 use super::mechanism::Mechanism;
 
 /// State of one motor channel at a sample (the status output of the report's Figure 9).
@@ -86,41 +85,36 @@ pub struct SimulatedRun<const J: usize> {
     pub torque: Vec<[f64; J]>,
     pub status: Vec<[MotorStatus; J]>,
     pub actual: Actual<J>,
-    /// The first time that each coordinate reached a limit.
+    /// The limits at which it ended.
     pub limits: Vec<LimitEvent>,
     pub ending: RunEnding,
     /// Standard deviation of the noise on the volts \[V\].
     pub volt_noise: [f64; J],
     /// Standard deviation of the noise on the torques themselves, N or N m.
     pub torque_noise: [f64; J],
-    /// What the integration cost.
-    pub effort: Effort,
 }
 
 impl<const J: usize> SimulatedRun<J> {
     pub(super) fn empty(mechanism: &Mechanism<J>, rows: usize) -> Self {
-        Self {
+        let mut run = Self {
             joints: mechanism.robot.joint_names().to_vec(),
             coordinates: mechanism.robot.coordinate_names(),
             t: Vec::with_capacity(rows),
-            x: Vec::with_capacity(rows),
-            volts: Vec::with_capacity(rows),
-            q: Vec::with_capacity(rows),
-            torque: Vec::with_capacity(rows),
+            x: Vec::new(),
+            volts: Vec::new(),
+            q: Vec::new(),
+            torque: Vec::new(),
             status: Vec::with_capacity(rows),
-            actual: Actual {
-                q: Vec::with_capacity(rows),
-                v: Vec::with_capacity(rows),
-                torque: Vec::with_capacity(rows),
-                a: Vec::with_capacity(rows),
-                target: Vec::with_capacity(rows),
-            },
+            actual: Actual::default(),
             limits: Vec::new(),
             ending: RunEnding::Completed,
             volt_noise: [0.0; J],
             torque_noise: [0.0; J],
-            effort: Effort::default(),
+        };
+        for column in run.columns() {
+            column.reserve_exact(rows);
         }
+        run
     }
 
     /// Number of rows.

@@ -4,7 +4,7 @@ mod accuracy;
 mod data;
 mod load_and_memory;
 mod missing;
-mod orders;
+pub mod orders;
 mod serial;
 mod static_torques;
 

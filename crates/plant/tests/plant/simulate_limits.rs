@@ -1,12 +1,12 @@
 //! Starts, limits, saturation, rest, open loop: the behaviour of the report's simulation block.
 
 use cft_ident_core::robot::cft::{Setup, pantograph};
-use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
+use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::{JointKind, RobotError};
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::{
-    CftTruth, Effects, MotorInput, MotorStatus, OnLimit, Path, Reference, ReferenceFrame,
-    RunEnding, Sensors, Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
+    CftTruth, Effects, MotorInput, MotorStatus, Path, Reference, ReferenceFrame, RunEnding,
+    Sensors, Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
 };
 use cft_ident_plant::simulate::{OneJointMove, SingleJointTruth, SmoothFriction};
 
@@ -158,97 +158,6 @@ fn limit_stops_the_run_and_says_which_coordinate_and_when() {
     );
     assert!(recording.x[last - 1][place] <= upper);
     assert!(recording.t[last] < 20.0);
-}
-
-#[test]
-fn clamped_run_goes_on_and_keeps_every_coordinate_inside() {
-    let start = at_rest([-0.1343, 0.2766, 2.8, 0.4]);
-    let settings = Settings {
-        on_limit: OnLimit::Clamp,
-        ..perfect(5.0)
-    };
-    let limits = Setup::Tuedacs.limits();
-    for volts in [
-        [2.0, 2.0, 1.0, 3.0],
-        [-3.0, -2.0, -1.0, -3.0],
-        [10.0, -10.0, 10.0, -10.0],
-    ] {
-        let recording = play(&start, &constant(volts), &settings).expect("runs");
-        assert_eq!(recording.ending, RunEnding::Completed);
-        assert_eq!(recording.rows(), 5000);
-        assert!(recording.limits.len() >= 3, "{:?}", recording.limits);
-        let mut names: Vec<&String> = recording.limits.iter().map(|l| &l.coordinate).collect();
-        names.sort();
-        names.dedup();
-        assert_eq!(names.len(), recording.limits.len(), "each coordinate once");
-        for x in &recording.x {
-            for (i, x) in x.iter().enumerate() {
-                let slack = 1e-9;
-                let inside = limits.lower[i] - slack..=limits.upper[i] + slack;
-                assert!(inside.contains(x), "coordinate {i} at {x}");
-            }
-        }
-        let at_the_end = recording.status.last().expect("rows");
-        assert!(
-            at_the_end.contains(&MotorStatus::LimitReached),
-            "{at_the_end:?}"
-        );
-    }
-}
-
-#[test]
-fn stop_against_which_a_coordinate_runs_takes_energy_and_gives_none() {
-    // Without friction and gravity only the impact changes the energy.
-    let mut truth = truth();
-    let free = DoubleTanh {
-        viscous: 0.0,
-        coulomb_1: 0.0,
-        coulomb_2: 0.0,
-        slope_1: 1.0,
-        slope_2: 1.0,
-    };
-    truth.friction = [free; 4];
-    let start = Start::State {
-        position: [-0.1343, 0.2766, 2.8, 0.53],
-        speed: [0.0, 0.0, 0.5, 0.3],
-    };
-    let settings = Settings {
-        on_limit: OnLimit::Clamp,
-        ..perfect(0.05)
-    };
-    let plant = truth.plant().expect("a pose");
-    let recording = run(
-        &plant,
-        Effects::default(),
-        &start,
-        &constant([0.0; 4]),
-        &settings,
-    )
-    .expect("runs");
-    let energy = |k: usize| {
-        let (q, v) = (recording.actual.q[k], recording.actual.v[k]);
-        let (mass, _) = plant.dynamics(&q, &v);
-        (0..4)
-            .flat_map(|i| (0..4).map(move |j| (i, j)))
-            .map(|(i, j)| 0.5 * v[i] * mass[i][j] * v[j])
-            .sum::<f64>()
-    };
-    let hit = recording
-        .status
-        .iter()
-        .position(|s| s[3] == MotorStatus::LimitReached)
-        .expect("a hit");
-    assert!(
-        recording.actual.v[hit][0].abs() < 1e-12,
-        "{:?}",
-        recording.actual.v[hit]
-    );
-    assert!(
-        energy(hit) < 0.9 * energy(hit - 1),
-        "{} of {}",
-        energy(hit),
-        energy(hit - 1)
-    );
 }
 
 #[test]

@@ -232,10 +232,14 @@ impl Effects {
         self.faults.first().map(|(name, _)| *name)
     }
 
-    /// Adds every effect's torque.
-    pub(super) fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
+    /// Shows every effect the motion with its own states.
+    pub(super) fn each(
+        &self,
+        motion: &PlantState,
+        mut visit: impl FnMut(&dyn Effect, &PlantState),
+    ) {
         for (effect, states) in &self.list {
-            effect.torque(&own(motion, states), torque);
+            visit(effect.as_ref(), &own(motion, states));
         }
     }
 
@@ -243,34 +247,6 @@ impl Effects {
     pub(super) fn implicit_joints(&self) -> impl Iterator<Item = usize> {
         let each = self.list.iter();
         each.filter_map(|(effect, _)| effect.implicit_joint())
-    }
-
-    /// Adds every effect's torque that hangs on accelerations or loads.
-    pub(super) fn implicit(&self, motion: &PlantState, torque: &mut [f64]) {
-        for (effect, states) in &self.list {
-            effect.implicit(&own(motion, states), torque);
-        }
-    }
-
-    /// Adds every effect's inertia.
-    pub(super) fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
-        for (effect, states) in &self.list {
-            effect.inertia(&own(motion, states), mass, torque);
-        }
-    }
-
-    /// Adds every effect's share of the load.
-    pub(super) fn load(&self, motion: &PlantState, share: &mut [[f64; 2]]) {
-        for (effect, states) in &self.list {
-            effect.load(&own(motion, states), share);
-        }
-    }
-
-    /// Multiplies what acts per unit of logged torque.
-    pub(super) fn drive(&self, acting: &mut [f64]) {
-        for (effect, _) in &self.list {
-            effect.drive(acting);
-        }
     }
 
     /// The springs between motors and links, for the states z of all effects.

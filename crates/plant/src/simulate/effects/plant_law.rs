@@ -29,21 +29,21 @@ pub(super) struct JointState {
     pub friction: f64,
 }
 
-/// A torque of one joint that hangs on its state alone.
-struct JointTorque<F> {
-    joint: usize,
-    torque: F,
+/// [`Effect::torque`] alone.
+struct Torque<F>(F);
+
+impl<F: Fn(&PlantState, &mut [f64]) + Send> Effect for Torque<F> {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
+        (self.0)(motion, torque);
+    }
 }
 
-impl<F: Fn(JointState) -> f64 + Send> Effect for JointTorque<F> {
-    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
-        let j = self.joint;
-        torque[j] += (self.torque)(JointState {
-            t: motion.t,
-            q: motion.q[j],
-            v: motion.v[j],
-            friction: motion.friction[j],
-        });
+/// [`Effect::inertia`] alone.
+struct Inertia<F>(F);
+
+impl<F: Fn(&PlantState, &mut [f64], &mut [f64]) + Send> Effect for Inertia<F> {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
+        (self.0)(motion, mass, torque);
     }
 }
 
@@ -58,8 +58,29 @@ impl Built {
         site: &Site,
         torque: impl Fn(JointState) -> f64 + Send + 'static,
     ) -> Result<Self, SimulateError> {
-        let joint = site.joint();
-        Self::plant(JointTorque { joint, torque })
+        let j = site.joint();
+        Self::torques(move |motion, torques| {
+            torques[j] += torque(JointState {
+                t: motion.t,
+                q: motion.q[j],
+                v: motion.v[j],
+                friction: motion.friction[j],
+            });
+        })
+    }
+
+    /// Torques that are added in place.
+    pub(super) fn torques(
+        add: impl Fn(&PlantState, &mut [f64]) + Send + 'static,
+    ) -> Result<Self, SimulateError> {
+        Self::plant(Torque(add))
+    }
+
+    /// Inertia, and rigid-body torque without acceleration, that are added in place.
+    pub(super) fn inertia(
+        add: impl Fn(&PlantState, &mut [f64], &mut [f64]) + Send + 'static,
+    ) -> Result<Self, SimulateError> {
+        Self::plant(Inertia(add))
     }
 
     /// A fault of the log, behind the noise of the torque or before it.

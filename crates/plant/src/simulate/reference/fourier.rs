@@ -134,41 +134,34 @@ mod tests {
         let h = 1e-5;
         for k in 1..200 {
             let t = 0.05 * f64::from(k);
-            let (before, here, after) = (series.at(t - h), series.at(t), series.at(t + h));
+            let [before, here, after] = [t - h, t, t + h].map(|t| series.at(t));
             for i in 0..4 {
                 let slope = (after.position[i] - before.position[i]) / (2.0 * h);
-                assert!(
-                    (slope - here.velocity[i]).abs() < 1e-8,
-                    "t {t}, coordinate {i}: {slope} against {}",
-                    here.velocity[i]
-                );
+                let off = (slope - here.velocity[i]).abs();
+                assert!(off < 1e-8, "t {t}, coordinate {i}: {slope} is {off} off");
             }
         }
     }
 
     #[test]
-    fn motion_starts_at_rest_and_ends_periodic() {
-        let series = Fourier::table_3();
-        assert_eq!(series.at(0.0).velocity, [0.0; 4]);
-        let (one, next) = (series.at(5.0), series.at(5.0 + series.period()));
+    fn motion_starts_at_rest_repeats_itself_and_ends_at_rest_behind_whole_periods() {
+        let endless = Fourier::table_3();
+        assert_eq!(endless.seconds(), None);
+        assert_eq!(endless.at(0.0).velocity, [0.0; 4]);
+        let (one, next) = (endless.at(5.0), endless.at(5.0 + endless.period()));
         for i in 0..4 {
             assert!((one.position[i] - next.position[i]).abs() < 1e-12);
             assert!((one.velocity[i] - next.velocity[i]).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn motion_of_whole_periods_ends_at_rest() {
         let series = Fourier {
             periods: Some(3),
-            ..Fourier::table_3()
+            ..endless
         };
         let end = series.seconds().expect("it ends");
         assert!((end - 11.5).abs() < 1e-12);
         assert_eq!(series.at(end).velocity, [0.0; 4]);
         assert_eq!(series.at(end + 1.0), series.at(end));
-        assert_eq!(series.at(5.0), Fourier::table_3().at(5.0));
-        assert_eq!(Fourier::table_3().seconds(), None);
+        assert_eq!(series.at(5.0), one);
     }
 
     #[test]

@@ -346,15 +346,10 @@ mod tests {
         let ladder = plan().build(None).expect("feasible");
         for speed in plan().speeds {
             for sign in [1.0, -1.0] {
-                let longest = ladder
-                    .plateaus()
-                    .filter(|(v, _)| (v / (sign * speed) - 1.0).abs() < 1e-9)
-                    .map(|(_, seconds)| seconds)
-                    .fold(0.0, f64::max);
-                assert!(
-                    longest > 0.15,
-                    "{speed} m/s in direction {sign}: {longest} s"
-                );
+                let near = |v: f64| (v / (sign * speed) - 1.0).abs() < 1e-9;
+                let own = ladder.plateaus().filter(|(v, _)| near(*v));
+                let longest = own.fold(0.0, |longest, (_, seconds)| seconds.max(longest));
+                assert!(longest > 0.15, "{} m/s: {longest} s", sign * speed);
             }
         }
     }
@@ -365,7 +360,7 @@ mod tests {
         let h = 1e-5;
         for k in 1..19_999 {
             let t = 1e-3 * f64::from(k);
-            let ((x0, v0), (_, v), (x1, v1)) = (ladder.at(t - h), ladder.at(t), ladder.at(t + h));
+            let [(x0, v0), (_, v), (x1, v1)] = [t - h, t, t + h].map(|t| ladder.at(t));
             assert!(((x1 - x0) / (2.0 * h) - v).abs() < 1e-6, "at {t} s");
             assert!((v1 - v0).abs() / (2.0 * h) < 3.0 + 1e-6, "at {t} s");
         }
@@ -385,40 +380,28 @@ mod tests {
 
     #[test]
     fn short_ladders_have_fewer_speeds_and_still_both_ends_of_the_range_of_speeds() {
+        let usual = |seconds| LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, seconds, None);
         for seconds in [4.0, 6.0, 10.0, 15.0] {
-            let ladder =
-                LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, seconds, None).expect("fits");
-            assert!(
-                ladder.end <= seconds && ladder.end > 0.9 * seconds,
-                "{}",
-                ladder.end
-            );
+            let ladder = usual(seconds).expect("fits");
+            let end = ladder.end;
+            assert!(end <= seconds && end > 0.9 * seconds, "{end}");
             let speeds = ladder.plateaus().map(|(v, _)| v.abs());
             let (low, high) = speeds.fold((f64::MAX, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
-            assert!(
-                (low - 0.0015).abs() < 1e-12 && (high - 0.633).abs() < 0.03,
-                "{low} {high}"
-            );
+            assert!((low - 0.0015).abs() < 1e-12, "{low}");
+            assert!((high - 0.633).abs() < 0.03, "{high}");
         }
-        assert!(LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, 1.0, None).is_err());
+        assert!(usual(1.0).is_err());
     }
 
     #[test]
-    fn seeds_change_the_order_and_repeat_it() {
+    fn seeds_change_the_order_and_repeat_it_and_long_ladders_repeat_their_passes() {
         let build = |seed| plan().build_seeded(Some(seed)).expect("feasible");
         assert_eq!(build(3), build(3));
         assert_ne!(build(3), build(4));
-    }
-
-    #[test]
-    fn long_ladders_repeat_their_passes() {
-        let long = LadderPlan {
-            seconds: 100.0,
-            ..plan()
-        };
+        let mut long = plan();
+        long.seconds = 100.0;
         let ladder = long.build(None).expect("feasible");
-        assert_eq!(ladder.strokes.len(), 100);
-        assert!(ladder.end > 95.0);
+        assert!(ladder.strokes.len() == 100 && ladder.end > 95.0);
     }
 
     #[test]

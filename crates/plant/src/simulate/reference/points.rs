@@ -128,39 +128,26 @@ fn clamped_slopes<const J: usize>(
 mod tests {
     use super::*;
 
-    fn list() -> Points<2> {
-        Points::new(&[
-            (0.0, [0.0, 1.0]),
-            (1.0, [0.5, 1.2]),
-            (1.7, [0.1, 1.1]),
-            (2.5, [0.1, 1.1]),
-            (3.0, [0.3, 0.9]),
-            (4.0, [0.6, 0.7]),
-        ])
-        .expect("usable list")
-    }
+    const LIST: [(f64, [f64; 2]); 6] = [
+        (0.0, [0.0, 1.0]),
+        (1.0, [0.5, 1.2]),
+        (1.7, [0.1, 1.1]),
+        (2.5, [0.1, 1.1]),
+        (3.0, [0.3, 0.9]),
+        (4.0, [0.6, 0.7]),
+    ];
 
     #[test]
-    fn spline_passes_through_every_point() {
-        let points = list();
-        for (t, pose) in points.times.iter().zip(&points.positions) {
-            assert_eq!(points.at(*t).position, *pose);
+    fn a_spline_passes_smoothly_through_every_point_and_rests_where_it_dwells() {
+        let points = Points::new(&LIST).expect("usable list");
+        for (t, pose) in LIST {
+            assert_eq!(points.at(t).position, pose);
         }
-    }
-
-    #[test]
-    fn dwell_stays_at_rest() {
-        let points = list();
         for k in 0..=80 {
             let target = points.at(1.7 + 0.01 * f64::from(k));
             assert!((target.position[0] - 0.1).abs() < 1e-15);
             assert!(target.velocity[0].abs() < 1e-15);
         }
-    }
-
-    #[test]
-    fn velocity_and_acceleration_are_continuous_inside_a_stretch() {
-        let points = list();
         let h = 1e-6;
         for t in [1.0, 3.0] {
             let acceleration = |t: f64| {
@@ -173,10 +160,15 @@ mod tests {
     }
 
     #[test]
-    fn times_that_stand_still_are_refused() {
-        let outcome = Points::new(&[(0.0, [0.0]), (0.0, [1.0])]);
-        assert!(matches!(outcome, Err(SimulateError::Reference { .. })));
-        assert!(Points::new(&[(0.0, [0.0])]).is_err());
-        assert!(Points::new(&[(0.0, [0.0]), (1.0, [f64::NAN])]).is_err());
+    fn lists_that_are_no_motion_are_refused() {
+        let lists: [&[(f64, [f64; 1])]; 3] = [
+            &[(0.0, [0.0]), (0.0, [1.0])],
+            &[(0.0, [0.0])],
+            &[(0.0, [0.0]), (1.0, [f64::NAN])],
+        ];
+        for list in lists {
+            let outcome = Points::new(list);
+            assert!(matches!(outcome, Err(SimulateError::Reference { .. })));
+        }
     }
 }
