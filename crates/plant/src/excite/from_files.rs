@@ -102,13 +102,8 @@ fn channels(
     if let Some(practice) = &mechanism.practice {
         let (joint, least) = practice.clearance;
         let (name, open) = (&robot.joint_names()[joint], [least, f64::INFINITY]);
-        channels.push(BoundedQuantity::between(
-            Quantity::Clearance,
-            joint,
-            name,
-            "",
-            open,
-        ));
+        let of = Quantity::Clearance;
+        channels.push(BoundedQuantity::between(of, joint, name, "", open));
     }
     Ok(channels)
 }
@@ -214,17 +209,21 @@ pub fn series_of(machine: &ForeseenRobot, file: &FourierSection) -> Result<Serie
         *offset = position.map_or(0.0, BoundedQuantity::middle);
     }
     for given in &file.series {
-        let Some(i) = names.iter().position(|name| *name == given.name) else {
-            return Err(ExciteError::UnknownCoordinate {
-                name: given.name.clone(),
-                known: names.join(", "),
-            });
-        };
+        let i = place_of(&names, &given.name)?;
         series.offset[i] = given.offset;
         series.a[i][..given.a.len()].copy_from_slice(&given.a);
         series.b[i][..given.b.len()].copy_from_slice(&given.b);
     }
     Ok(series)
+}
+
+/// Where a name stands among the machine's.
+pub(super) fn place_of(names: &[String], name: &str) -> Result<usize, ExciteError> {
+    let unknown = || ExciteError::UnknownCoordinate {
+        name: name.to_owned(),
+        known: names.join(", "),
+    };
+    names.iter().position(|n| n == name).ok_or_else(unknown)
 }
 
 /// The trajectory file of a series in the machine's designed coordinates.

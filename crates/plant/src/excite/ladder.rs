@@ -19,6 +19,7 @@ use cft_ident_files::config::trajectory::SingleJointMove;
 
 use super::ExciteError;
 use super::foresee::{Expected, scaled_to_one};
+use super::from_files::place_of;
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::motion::differentiated;
@@ -196,16 +197,10 @@ struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     fn of(machine: &'a ForeseenRobot, task: &'a LadderTask) -> Result<Self, ExciteError> {
-        let names = machine.model.robot.joint_names();
-        let unknown = || ExciteError::UnknownCoordinate {
-            name: task.joint.clone(),
-            known: names.join(", "),
-        };
-        let joint = names.iter().position(|n| *n == task.joint);
         Ok(Self {
             machine,
             task,
-            joint: joint.ok_or_else(unknown)?,
+            joint: place_of(machine.model.robot.joint_names(), &task.joint)?,
         })
     }
 

@@ -13,7 +13,7 @@ use super::from_files::series_of;
 use super::limits::BoundedQuantity;
 use super::machine::ForeseenRobot;
 use super::series::{Kinematics, MAX_COORDINATES, Series};
-use super::usage::{Interval, Use, along, along_blend, along_period, joined};
+use super::usage::{Use, along, along_blend, along_period, joined};
 
 /// Step of the differences that give the acceleration of a reference \[s\].
 const STEP: f64 = 1e-4;
@@ -107,12 +107,8 @@ impl Motion {
                 joined(whole, along_blend(machine, channels, series, blend))
             }
             Self::Path { at, seconds } => {
-                let path = Interval {
-                    at,
-                    span: [0.0, *seconds],
-                    parts: (PARTS * seconds).ceil().max(64.0) as usize,
-                };
-                along(machine, channels, &path)
+                let parts = (PARTS * seconds).ceil().max(64.0) as usize;
+                along(machine, channels, at, [0.0, *seconds], parts)
             }
         }
     }

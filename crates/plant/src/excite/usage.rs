@@ -33,15 +33,6 @@ pub struct Use {
     pub t: f64,
 }
 
-/// All coordinates as a function of time, over an interval.
-pub(super) struct Interval<'a> {
-    pub at: &'a dyn Fn(f64) -> Kinematics,
-    /// From and to \[s\].
-    pub span: [f64; 2],
-    /// Equal parts to begin with.
-    pub parts: usize,
-}
-
 /// Channels along the whole period of a series: those that are trigonometric polynomials with a
 /// certain bound, the others with one from their measured curvature.
 pub fn along_period(
@@ -72,13 +63,10 @@ fn period(
     parts: usize,
     tolerance: f64,
 ) -> Vec<Use> {
-    let path = Interval {
-        at: &|t| series.at(t),
-        span: [0.0, series.period()],
-        parts,
-    };
+    let (at, span) = (|t| series.at(t), [0.0, series.period()]);
     let curved = channels.iter().filter(|c| !c.quantity.is_linear());
-    let mut curved = of_path(machine, &curved.collect::<Vec<_>>(), &path, tolerance).into_iter();
+    let curved: Vec<&BoundedQuantity> = curved.collect();
+    let mut curved = of_path(machine, &curved, &at, span, parts, tolerance).into_iter();
     let of = |c: &BoundedQuantity| match c.quantity.derivative() {
         Some(order) => Some(of_polynomial(c, order, series)),
         None => curved.next(),
@@ -86,14 +74,16 @@ fn period(
     channels.iter().filter_map(of).collect()
 }
 
-/// Channels along any path.
+/// Channels along any path from one time to another \[s\], in that many parts to begin with.
 pub(super) fn along(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
-    path: &Interval,
+    at: &dyn Fn(f64) -> Kinematics,
+    span: [f64; 2],
+    parts: usize,
 ) -> Vec<Use> {
     let channels: Vec<&BoundedQuantity> = channels.iter().collect();
-    of_path(machine, &channels, path, TOLERANCE)
+    of_path(machine, &channels, at, span, parts, TOLERANCE)
 }
 
 /// Channels along the motion from rest to rest, outside the whole periods.
@@ -105,14 +95,7 @@ pub fn along_blend(
 ) -> Vec<Use> {
     let at = |t| blend.at(series, t);
     let parts = (PARTS as f64 * (blend.seconds / series.period()).max(0.25)).ceil() as usize;
-    let over = |span| {
-        let path = Interval {
-            at: &at,
-            span,
-            parts,
-        };
-        along(machine, channels, &path)
-    };
+    let over = |span| along(machine, channels, &at, span, parts);
     let into = over([0.0, blend.seconds]);
     if blend.periods.is_none() {
         return into;
@@ -139,16 +122,7 @@ pub(super) fn along_way(
         }
         k
     };
-    let (span, parts) = ([0.0, 1.0], WAY_PARTS);
-    along(
-        machine,
-        channels,
-        &Interval {
-            at: &at,
-            span,
-            parts,
-        },
-    )
+    along(machine, channels, &at, [0.0, 1.0], WAY_PARTS)
 }
 
 /// Refuses a pose in the designed coordinates that breaks a limit itself: no way leads out of it.
@@ -243,12 +217,10 @@ impl Use {
     fn joined(self, other: Self) -> Self {
         let ([a, b], [low, high]) = (self.range, other.range);
         let range = [a.min(low), b.max(high)];
-        let nearest = if other.share > self.share {
-            other
-        } else {
-            self
-        };
-        Self { range, ..nearest }
+        match other.share > self.share {
+            true => Self { range, ..other },
+            false => Self { range, ..self },
+        }
     }
 }
 
@@ -301,14 +273,15 @@ fn of_polynomial(channel: &BoundedQuantity, order: usize, series: &Series) -> Us
 fn of_path(
     machine: &ForeseenRobot,
     channels: &[&BoundedQuantity],
-    path: &Interval,
+    at: &dyn Fn(f64) -> Kinematics,
+    [from, to]: [f64; 2],
+    parts: usize,
     tolerance: f64,
 ) -> Vec<Use> {
-    let [from, to] = path.span;
     let mut state = State::EMPTY;
-    let mut grid = vec![Vec::with_capacity(path.parts + 1); channels.len()];
-    for m in 0..=path.parts {
-        let k = (path.at)(from + (to - from) * m as f64 / path.parts as f64);
+    let mut grid = vec![Vec::with_capacity(parts + 1); channels.len()];
+    for m in 0..=parts {
+        let k = at(from + (to - from) * m as f64 / parts as f64);
         let reached = machine.fill(&k, &mut state).is_ok();
         let quantities = machine.quantities(&state);
         for (channel, values) in channels.iter().zip(&mut grid) {
@@ -316,7 +289,7 @@ fn of_path(
         }
     }
     let mut value = |channel: &BoundedQuantity, t: f64| {
-        let k = (path.at)(t);
+        let k = at(t);
         let reached = channel.quantity.is_linear() || machine.fill(&k, &mut state).is_ok();
         with_band(channel, &k, reached, &machine.quantities(&state))
     };
@@ -326,7 +299,7 @@ fn of_path(
             let samples: Vec<f64> = values.iter().copied().map(beyond).collect();
             let mut f = |t| beyond(value(channel, t));
             let tolerance = tolerance * channel.room();
-            highest(&mut f, path.span, &samples, None, tolerance)
+            highest(&mut f, [from, to], &samples, None, tolerance)
         };
         gathered(channel, peak(1.0), peak(-1.0))
     };

@@ -149,6 +149,20 @@ impl SimulateError {
         }
     }
 
+    /// Where a name stands among those of joints.
+    pub(super) fn place_of(known: &[String], name: &str) -> Result<usize, Self> {
+        let unknown = || Self::unknown_joint(name, known);
+        known.iter().position(|n| n == name).ok_or_else(unknown)
+    }
+
+    /// No joint of that name.
+    pub(super) fn unknown_joint(name: impl Into<String>, known: &[String]) -> Self {
+        Self::UnknownJoint {
+            name: name.into(),
+            known: known.join(", "),
+        }
+    }
+
     /// A reference that cannot be followed.
     pub(super) fn reference(what: impl Into<ErrorText>) -> Self {
         Self::Reference { what: what.into() }

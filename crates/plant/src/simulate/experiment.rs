@@ -105,12 +105,7 @@ fn fourier<const J: usize>(
         periods: file.periods,
     };
     for coordinate in &file.series {
-        let Some(i) = names.iter().position(|name| *name == coordinate.name) else {
-            return Err(SimulateError::UnknownJoint {
-                name: coordinate.name.clone(),
-                known: names.join(", "),
-            });
-        };
+        let i = SimulateError::place_of(&names, &coordinate.name)?;
         series.offset[i] = coordinate.offset;
         for (l, (a, b)) in coordinate.a.iter().zip(&coordinate.b).enumerate() {
             series.a[l][i] = *a;

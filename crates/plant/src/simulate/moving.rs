@@ -27,18 +27,6 @@ struct Balance<const J: usize> {
 }
 
 impl<const J: usize> Moving<'_, J> {
-    /// What effects see of a motion.
-    fn seen<'a>(&self, t: f64, [q, v]: [&'a [f64; J]; 2], z: &'a [f64]) -> PlantState<'a> {
-        let n = self.plant.joints();
-        PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
-            ..PlantState::default()
-        }
-    }
-
     /// Positions and speeds of the motors and their encoders: beyond the links by the deflections of elastic joints.
     pub(super) fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
         let (mut q, mut v) = (*q, *v);
@@ -65,10 +53,10 @@ impl<const J: usize> Moving<'_, J> {
     /// The balance with effects; where a joint is elastic the load tau_l is what the spring passes on.
     fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> Balance<J> {
         let (q, v) = self.motor_side(link, speed, z);
-        let friction = self.plant.friction(&v);
+        let (n, friction) = (self.plant.joints(), self.plant.friction(&v));
         let motion = PlantState {
-            friction: &friction[..self.plant.joints()],
-            ..self.seen(t, [&q, &v], z)
+            friction: &friction[..n],
+            ..seen(n, t, [&q, &v], z)
         };
         let (mut added, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
         self.effects.each(&motion, |effect, m| {
@@ -175,7 +163,7 @@ impl<const J: usize> Moving<'_, J> {
         let (mut mass, mut bias) = self.plant.rigid(q, v);
         gather(&mut mass, n);
         let flat = &mut mass.as_flattened_mut()[..n * n];
-        let motion = self.seen(t, [q, v], z);
+        let motion = seen(n, t, [q, v], z);
         let each = |effect: &dyn Effect, m: &PlantState| effect.inertia(m, flat, &mut bias[..n]);
         self.effects.each(&motion, each);
         spread(&mut mass, n);
@@ -189,7 +177,7 @@ impl<const J: usize> Moving<'_, J> {
         let friction = self.plant.friction(v);
         let motion = PlantState {
             friction: &friction[..n],
-            ..self.seen(t, [q, v], z)
+            ..seen(n, t, [q, v], z)
         };
         let (mut torque, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
         self.effects.each(&motion, |effect, m| {
@@ -229,7 +217,7 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
             friction: &balance.friction[..n],
             a: &balance.acceleration[..n],
             net: &balance.net[..n],
-            ..self.seen(t, [&balance.q, &balance.v], z)
+            ..seen(n, t, [&balance.q, &balance.v], z)
         };
         self.effects.rates(&motion, &mut dydt[2 * J..]);
     }
@@ -241,13 +229,23 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
         let z = &y[2 * J..];
         let (q, v) = self.motor_side(&part::<J, N>(y, 0), &part::<J, N>(y, J), z);
         let n = self.plant.joints();
-        self.effects.moved(&PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
-            ..PlantState::default()
-        })
+        self.effects.moved(&seen(n, t, [&q, &v], z))
+    }
+}
+
+/// What effects see of a motion of n joints.
+fn seen<'a, const J: usize>(
+    n: usize,
+    t: f64,
+    [q, v]: [&'a [f64; J]; 2],
+    z: &'a [f64],
+) -> PlantState<'a> {
+    PlantState {
+        t,
+        q: &q[..n],
+        v: &v[..n],
+        z,
+        ..PlantState::default()
     }
 }
 

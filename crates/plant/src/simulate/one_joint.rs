@@ -35,14 +35,11 @@ impl Mover {
         if let Some(motors) = robot.transmission().coordinates() {
             known.extend(motors.iter().map(|&motor| motor.to_owned()));
         }
-        match known.iter().position(|n| n == name) {
-            Some(place) if place < joints => Ok(Self::Joint(place)),
-            Some(place) => Ok(Self::Motor(place - joints)),
-            None => Err(SimulateError::UnknownJoint {
-                name: name.to_owned(),
-                known: known.join(", "),
-            }),
-        }
+        let place = SimulateError::place_of(&known, name)?;
+        Ok(match place.checked_sub(joints) {
+            None => Self::Joint(place),
+            Some(motor) => Self::Motor(motor),
+        })
     }
 
     fn index(self) -> usize {
@@ -121,10 +118,8 @@ impl OneJointMove {
     ) -> Result<Reference<J>, SimulateError> {
         let (m, place) = (mechanism, self.mover.index());
         if place >= m.joints() {
-            return Err(SimulateError::UnknownJoint {
-                name: format!("number {place}"),
-                known: m.robot.joint_names().join(", "),
-            });
+            let (name, known) = (format!("number {place}"), m.robot.joint_names());
+            return Err(SimulateError::unknown_joint(name, known));
         }
         let (frame, mut pose, room) = self.room(m)?;
         let range = self.within(&room);

@@ -3,7 +3,7 @@
 mod accuracy;
 mod data;
 mod load_and_memory;
-mod missing;
+pub mod missing;
 pub mod orders;
 mod serial;
 mod static_torques;

@@ -1,14 +1,16 @@
 //! Starts, limits, saturation, rest, open loop: the behaviour of the report's simulation block.
 
+use cft_ident_core::robot::RobotError;
 use cft_ident_core::robot::cft::{Setup, pantograph};
 use cft_ident_core::robot::friction::ViscousCoulomb;
-use cft_ident_core::robot::{JointKind, RobotError};
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::{
     CftTruth, Effects, MotorInput, MotorStatus, Path, Reference, ReferenceFrame, RunEnding,
     Sensors, Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
 };
 use cft_ident_plant::simulate::{OneJointMove, SingleJointTruth, SmoothFriction};
+
+use crate::simulate_effects::missing::axis;
 
 fn truth() -> CftTruth {
     CftTruth::synthetic(Setup::Tuedacs)
@@ -279,21 +281,14 @@ fn table_3_with_the_printed_offsets_is_refused_on_dspace() {
 #[test]
 fn single_joint_follows_its_equation_exactly() {
     // Viscous friction alone under a constant force: v = (f/b)(1 - exp(-b t/m)).
+    let law = ViscousCoulomb {
+        viscous: 200.0,
+        coulomb: 0.0,
+    };
     let joint = SingleJointTruth {
-        name: "q1".to_owned(),
-        kind: JointKind::Prismatic,
-        inertia: 95.0,
-        friction: SmoothFriction::viscous_coulomb(
-            ViscousCoulomb {
-                viscous: 200.0,
-                coulomb: 0.0,
-            },
-            95.0,
-        ),
-        offset: -3.0,
-        gain: 35.0,
-        resolution: 0.0,
+        friction: SmoothFriction::viscous_coulomb(law, 95.0),
         limits: (f64::NEG_INFINITY, f64::INFINITY),
+        ..axis()
     };
     let joint = joint.plant().expect("a joint");
     joint.check().expect("physical");
@@ -315,19 +310,12 @@ fn single_joint_follows_its_equation_exactly() {
 
 #[test]
 fn dry_friction_holds_a_single_joint_below_its_breakaway() {
-    let law = ViscousCoulomb {
-        viscous: 200.0,
-        coulomb: 20.0,
-    };
     let joint = SingleJointTruth {
-        name: "q1".to_owned(),
-        kind: JointKind::Prismatic,
-        inertia: 95.0,
-        friction: SmoothFriction::viscous_coulomb(law, 95.0),
         offset: 0.0,
         gain: 1.0,
         resolution: 1e-6,
         limits: (-1.0, 1.0),
+        ..axis()
     };
     let joint = joint.plant().expect("a joint");
     let travelled = |force: f64| {

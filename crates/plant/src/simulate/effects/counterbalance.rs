@@ -20,16 +20,10 @@ const NEAR_POINT_M: f64 = 0.1;
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| {
-        let mut defaults = vec![
-            0.4 * site.scale / (FAR_POINT_M * NEAR_POINT_M),
-            0.5 * FAR_POINT_M,
-            FAR_POINT_M,
-            NEAR_POINT_M,
-        ];
-        let (from, to) = site.travel;
-        defaults.extend([site.middle() - std::f64::consts::FRAC_PI_2, from, to]);
-        defaults.extend([0.0; COUNT]);
-        defaults
+        let stiffness = 0.4 * site.scale / (FAR_POINT_M * NEAR_POINT_M);
+        let spring = [stiffness, 0.5 * FAR_POINT_M, FAR_POINT_M, NEAR_POINT_M];
+        let (angle, (from, to)) = (site.middle() - std::f64::consts::FRAC_PI_2, site.travel);
+        [&spring[..], &[angle, from, to], &[0.0; COUNT]].concat()
     },
     build,
 };
@@ -45,11 +39,8 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
         ));
     }
     if !(a > 0.0 && b > 0.0) || a == b {
-        return Err(refuse(
-            "a - b",
-            a - b,
-            "a and b must be above 0 and differ, or the spring's length reaches 0",
-        ));
+        let rule = "a and b must be above 0 and differ, or the spring's length reaches 0";
+        return Err(refuse("a - b", a - b, rule));
     }
     let (from, to) = (values[5], values[6]);
     if to <= from {

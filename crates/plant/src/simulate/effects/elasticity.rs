@@ -21,9 +21,7 @@ pub static LAW: PlantLaw = PlantLaw {
         ]
     },
     build: |site, _, values| {
-        let &[stiffness, inertia, damping] = values else {
-            return Err(site.refuse(ENTRY.name, "it takes stiffness, inertia and damping"));
-        };
+        let (stiffness, inertia, damping) = (values[0], values[1], values[2]);
         let rotor = site.inertia - inertia;
         if rotor <= 0.0 || inertia <= 0.0 || rotor >= site.least_inertia {
             let rule = "must be below the joint's, and leave the motor less than the joint's least";

@@ -118,10 +118,9 @@ impl Effect for Curve {
             return false;
         }
         let (q, farthest) = (motion.q[self.joint], self.turning[1]);
-        let back = if self.forward {
-            farthest - q
-        } else {
-            q - farthest
+        let back = match self.forward {
+            true => farthest - q,
+            false => q - farthest,
         };
         let turned = back > TURN * (KNOTS - 1) as f64 * self.step;
         if turned {

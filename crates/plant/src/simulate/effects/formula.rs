@@ -51,7 +51,7 @@ pub(super) fn build(
     let keys = candidate.shapes.keys().chain(candidate.formulas.keys());
     spec.check_keys(keys.map(String::as_str).collect())?;
     let mut out = Vec::new();
-    for site in spec.sites(&spec.name, Places::Joints, sites)? {
+    for site in spec.sites(Places::Joints, sites)? {
         let may = |joints: &Vec<String>| joints.contains(&site.name);
         if !candidate.joints.as_ref().is_none_or(may) {
             match &spec.joint {
@@ -149,13 +149,10 @@ impl Own {
             Ok(Input::Signal(signal, of))
         };
         let term = |(key, text): (&String, &String)| {
-            let refused = |why| {
-                wrong(
-                    candidate,
-                    &format!("`{key}`: `{text}` is no formula: {why}"),
-                )
-            };
-            let formula = Formula::parse(text).map_err(refused)?;
+            let formula = Formula::parse(text).map_err(|why| {
+                let what = format!("`{key}`: `{text}` is no formula: {why}");
+                wrong(candidate, &what)
+            })?;
             let inputs = formula.names().iter().map(|name| input(key, name));
             Ok(Term {
                 coefficient: number(spec, key)?,
@@ -167,15 +164,13 @@ impl Own {
         let terms: Vec<Term> = terms.collect::<Result<_, SimulateError>>()?;
         use FormulaSignal::{Acceleration, Load};
         let implicit = |input: &Input| matches!(input, Input::Signal(Acceleration | Load, _));
-        let friction = sites.joints.iter();
+        let of = |site: &Site| [site.coulomb, site.viscous, site.slope()];
         Ok(Self {
             joint: site.joint(),
             implicit: terms.iter().any(|term| term.inputs.iter().any(implicit)),
             terms,
             temperatures: sites.temperatures.clone(),
-            friction: friction
-                .map(|s| [s.coulomb, s.viscous, s.slope()])
-                .collect(),
+            friction: sites.joints.iter().map(of).collect(),
         })
     }
 

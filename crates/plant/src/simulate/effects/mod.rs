@@ -197,7 +197,7 @@ impl Effects {
                 continue;
             }
             let law = spec.law()?;
-            for site in spec.sites(law.entry.name, law.entry.places, sites)? {
+            for site in spec.sites(law.entry.places, sites)? {
                 let numbers = spec.numbers(law, site)?;
                 match law.built(site, &sites.machine, &numbers)? {
                     Built::Plant(effect) => effects.push(effect),

@@ -10,12 +10,8 @@ use cft_ident_core::effect::presliding::ENTRY;
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| {
-        let sigma0 = site.coulomb / bend(site.turns);
-        vec![
-            sigma0,
-            0.002 * site.coulomb / bend(site.turns),
-            site.coulomb,
-        ]
+        let (level, bend) = (site.coulomb, bend(site.turns));
+        vec![level / bend, 0.002 * level / bend, level]
     },
     build: |site, _, values| {
         let level = values[2];

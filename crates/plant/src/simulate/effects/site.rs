@@ -6,9 +6,9 @@ use crate::simulate::plant::Plant;
 use crate::simulate::temperature::PlantTemperatures;
 use cft_ident_core::effect::Place;
 use cft_ident_core::explain::ErrorText;
+use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::cft::geometry::L4;
 use cft_ident_core::robot::cft::pantograph;
-use cft_ident_core::robot::{JointKind, Robot};
 
 /// Middling speeds of a joint that slides \[m/s\] and of one that turns \[rad/s\].
 const SLIDING_SPEED: f64 = 0.2;
@@ -95,11 +95,6 @@ impl PlantRobot<'_> {
     /// The joint of a number, counted from one, that is another than `joint`.
     pub(super) fn other_joint(&self, joint: usize, number: f64) -> Option<usize> {
         (0..self.joints()).find(|&other| other != joint && (other + 1) as f64 == number)
-    }
-
-    /// Whether the joint of that index turns.
-    pub fn turns(&self, joint: usize) -> bool {
-        self.robot.joint_kind(joint) == JointKind::Revolute
     }
 }
 

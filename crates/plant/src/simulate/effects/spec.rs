@@ -103,27 +103,21 @@ impl EffectSpec {
         let found = LAWS.iter().find(|law| law.entry.name == self.name);
         found.copied().ok_or_else(|| {
             let known: Vec<&str> = LAWS.iter().map(|law| law.entry.name).collect();
-            SimulateError::UnknownEffect {
-                name: self.name.clone(),
-                known: known.join(", "),
-            }
+            let (name, known) = (self.name.clone(), known.join(", "));
+            SimulateError::UnknownEffect { name, known }
         })
     }
 
     /// The sites that the effect acts on: the one that is named, or all that the effect may sit at.
     pub(super) fn sites<'a>(
         &self,
-        effect: &str,
         places: Places,
         sites: &'a Sites,
     ) -> Result<&'a [Site], SimulateError> {
         let whole = sites.whole.as_slice();
         let refuse = |why: ErrorText| match whole.first().or(sites.joints.first()) {
-            Some(site) => site.refuse(effect, why),
-            None => SimulateError::UnknownJoint {
-                name: String::new(),
-                known: String::new(),
-            },
+            Some(site) => site.refuse(&self.name, why),
+            None => SimulateError::unknown_joint("", &[]),
         };
         let (joints, screws): (&[Site], &[Site]) = match places {
             Places::Joints | Places::JointsOrAll | Places::Pairs => (&sites.joints, &[]),
@@ -147,11 +141,8 @@ impl EffectSpec {
             list.get(place..=place)
         };
         named(joints).or_else(|| named(screws)).ok_or_else(|| {
-            let known = joints.iter().chain(screws).map(|site| site.name.as_str());
-            SimulateError::UnknownJoint {
-                name: name.clone(),
-                known: known.collect::<Vec<_>>().join(", "),
-            }
+            let known = joints.iter().chain(screws).map(|site| site.name.clone());
+            SimulateError::unknown_joint(name, &known.collect::<Vec<_>>())
         })
     }
 
@@ -193,16 +184,14 @@ impl EffectSpec {
 impl EffectValue {
     pub(super) fn new(entry: &Entry, site: &Site, machine: &PlantRobot, numbers: &[f64]) -> Self {
         let pairs = || entry.keys.iter().zip(numbers);
-        let kind = |turns: bool| match turns {
+        let own = match site.turns {
             true => JointKind::Revolute,
             false => JointKind::Prismatic,
         };
-        let own = kind(site.turns);
         // Joints are counted from one; `from` is a joint where units follow it.
         let from = pairs().find(|(key, _)| entry.places == Places::Pairs && key.name == "from");
-        let from = from.map_or(own, |(_, number)| {
-            kind(machine.turns((*number - 1.0).max(0.0) as usize))
-        });
+        let joint = |(_, number): (_, &f64)| (*number - 1.0).max(0.0) as usize;
+        let from = from.map_or(own, |pair| machine.robot.joint_kind(joint(pair)));
         let torque = if site.turns { "Nm" } else { "N" };
         let parameter = |(key, &value): (&Key, &f64)| {
             let unit = key.unit.text(own, from, torque);
