@@ -22,6 +22,13 @@ pub enum Noise<const J: usize> {
 }
 
 impl<const J: usize> Noise<J> {
+    /// Standard deviation per channel for the rows that are to be logged.
+    pub fn deviation(&self, rows: &[[f64; J]]) -> [f64; J] {
+        let mut squares = MeanSquare::new();
+        squares.add(rows);
+        self.of_rms(squares.root())
+    }
+
     /// Standard deviation per channel for rows of that root mean square.
     pub(super) fn of_rms(&self, rms: [f64; J]) -> [f64; J] {
         match self {
@@ -196,7 +203,7 @@ mod tests {
             squares.add(rows);
             squares.root()
         };
-        let deviation = Noise::Relative(0.01).of_rms(rms(&clean));
+        let deviation = Noise::Relative(0.01).deviation(&clean);
         assert!((deviation[0] - 0.02).abs() < 1e-12);
         assert!((deviation[1] - 0.01 * 0.5f64.sqrt()).abs() < 1e-12);
         let mut noisy = clean.clone();
