@@ -7,12 +7,14 @@ use serde::Serialize;
 
 use super::ExciteError;
 use super::information::{Information, normalised};
+use super::judgement::GivenTogether;
 use super::machine::ForeseenRobot;
 use super::motion::Motion;
+use cft_ident_core::inertia::columns::Own;
 use cft_ident_core::math::rank;
 
 /// Samples of a period at which condition and determinant are taken.
-pub const SAMPLES: usize = 250;
+const SAMPLES: usize = 250;
 /// Samples per second of a motion that is no series.
 const RATE: f64 = 200.0;
 /// Share of the largest singular value (columns scaled) below which a direction is not excited.
@@ -71,23 +73,14 @@ pub struct Pair {
     pub correlation: f64,
 }
 
-/// What a motion says.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Foresight {
+/// What a motion says, however long its log.
+pub(super) struct Foresight {
     pub condition: Condition,
     pub rank: usize,
-    /// log det(F'F) of `samples` rows per joint, unweighted; null where the rank is short.
+    /// log det(F'F) of the information's rows, unweighted; none where the rank is short.
     pub log_det: Option<f64>,
-    /// Rows per joint in condition and determinant.
-    pub samples: u64,
-    pub parameters: Vec<Expected>,
     /// Largest parts first.
     pub weakest_direction: Vec<UnknownShare>,
-    pub confounded: Option<Pair>,
-    /// Rows per joint that the deviations stand for.
-    pub rows: f64,
-    /// Standard deviation of each joint's torque noise, sample by sample \[N or N m\].
-    pub noise: Vec<f64>,
 }
 
 /// Information of the motion: of one period of a series, else of the whole motion; and the number
@@ -102,80 +95,44 @@ pub fn information(
     rate_hz: f64,
     seconds: f64,
 ) -> Result<(Information, f64), ExciteError> {
-    Ok(match motion {
-        Motion::Periodic { series, blend } => (
-            Information::of_period(machine, series, SAMPLES)?,
-            rate_hz
-                * blend
-                    .periods
-                    .map_or(seconds, |whole| series.period() * f64::from(whole)),
-        ),
+    match motion {
+        Motion::Periodic { series, blend } => {
+            let whole = blend.periods.map(|n| series.period() * f64::from(n));
+            let information = Information::of_period(machine, series, SAMPLES)?;
+            Ok((information, rate_hz * whole.unwrap_or(seconds)))
+        }
         Motion::Path { at, seconds } => {
             let samples = (RATE * seconds).ceil().max(2.0) as usize;
             let step = seconds / samples as f64;
             let at = |m: usize| at(step * (m as f64 + 0.5));
-            (
-                Information::of_path(machine, samples, &at)?,
-                rate_hz * seconds,
-            )
+            let information = Information::of_path(machine, samples, &at)?;
+            Ok((information, rate_hz * seconds))
         }
-    })
+    }
 }
 
-/// Foresees what a least-squares fit to a log of `rows` rows per joint will give, with white noise
-/// of `machine.noise` on every row and the friction known; `given` is (R'R by noise) of logs that
-/// are fitted together with it.
-///
-/// # Errors
-/// [`ExciteError`] where a number is not finite.
-pub fn foresee(
+/// Foresees what the rows themselves distinguish.
+pub(super) fn foresee(
     machine: &ForeseenRobot,
     information: &Information,
-    rows: f64,
-    given: Option<&DMatrix<f64>>,
 ) -> Result<Foresight, ExciteError> {
-    let (n, p) = (machine.coordinates(), machine.unknowns());
-    let names = machine.unknown_names();
-    let plain = information.stacked(&vec![1.0; n]);
+    let plain = information.stacked(&vec![1.0; machine.coordinates()]);
     let scaled = normalised(&plain)?;
     let largest = scaled.s.iter().copied().next().unwrap_or(0.0);
     let rank = scaled.s.iter().filter(|s| **s > NOTHING * largest).count();
-    let full = rank == p && largest > 0.0;
+    let full = rank == machine.unknowns() && largest > 0.0;
     let singular = rank::svd(&plain)?.s;
-    let weakest = scaled.v.column(p - 1);
-    let mut weakest_direction: Vec<UnknownShare> = names
-        .iter()
-        .zip(weakest.iter())
-        .map(|(name, weight)| UnknownShare {
-            parameter: name.clone(),
-            weight: *weight,
-        })
+    let weakest = scaled.v.column(machine.unknowns() - 1);
+    let mut weakest: Vec<(String, f64)> = (machine.unknown_names().into_iter())
+        .zip(weakest.iter().copied())
         .collect();
-    weakest_direction.sort_by(|a, b| b.weight.abs().total_cmp(&a.weight.abs()));
+    weakest.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     // the same direction whatever the sign of the decomposition
-    if weakest_direction
-        .first()
-        .is_some_and(|part| part.weight < 0.0)
-    {
-        for part in &mut weakest_direction {
-            part.weight = -part.weight;
-        }
-    }
-
-    let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
-    let weighted = information.stacked(&weights);
-    let mut g = weighted.tr_mul(&weighted) * (rows / information.rows as f64);
-    if let Some(given) = given {
-        g += given;
-    }
-    let (covariance, determined) = inverse(&g)?;
-    let values = machine.unknown_values();
-    let parameters = (0..p).map(|i| {
-        let std = determined[i].then(|| covariance[(i, i)].sqrt());
-        let value = machine.source.known().then_some(values[i]);
-        Expected::new(&names[i], unit(machine, i), value, std)
-    });
-    let parameters = parameters.collect();
+    let turned = weakest.first().is_some_and(|part| part.1 < 0.0);
+    let part = |(parameter, weight): (String, f64)| UnknownShare {
+        parameter,
+        weight: if turned { -weight } else { weight },
+    };
     Ok(Foresight {
         condition: Condition {
             raw: full.then(|| rank::condition(&singular)),
@@ -183,27 +140,50 @@ pub fn foresee(
         },
         rank,
         log_det: full.then(|| 2.0 * singular.iter().map(|s| s.ln()).sum::<f64>()),
-        samples: information.rows,
-        parameters,
-        weakest_direction,
-        confounded: confounded(&covariance, &determined, &names),
-        rows,
-        noise: machine.noise.clone(),
+        weakest_direction: weakest.into_iter().map(part).collect(),
     })
+}
+
+/// Foresees a fit to `rows` rows per joint with their noise, friction known, and what is given besides by its noise.
+pub(super) fn expected(
+    machine: &ForeseenRobot,
+    information: &Information,
+    rows: f64,
+    given: Option<&DMatrix<f64>>,
+) -> Result<GivenTogether, ExciteError> {
+    let names = machine.unknown_names();
+    let weighted = information.stacked(&machine.weights());
+    let mut g = weighted.tr_mul(&weighted) * (rows / information.rows as f64);
+    if let Some(given) = given {
+        g += given;
+    }
+    let (covariance, determined) = inverse(&g)?;
+    let values = machine.unknown_values();
+    let parameters = names.iter().enumerate().map(|(i, name)| {
+        let std = determined[i].then(|| covariance[(i, i)].sqrt());
+        let value = machine.source.known().then_some(values[i]);
+        Expected::new(name, unit(machine, i), value, std)
+    });
+    Ok(GivenTogether {
+        parameters: parameters.collect(),
+        confounded: confounded(&covariance, &determined, &names),
+    })
+}
+
+/// A matrix of squares and products with a diagonal of ones, and the factors; 0 for what is not there.
+pub(super) fn scaled_to_one(g: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
+    let factor = |size: f64| if size > 0.0 { 1.0 / size } else { 0.0 };
+    let scale: Vec<f64> = g.diagonal().iter().map(|x| factor(x.sqrt())).collect();
+    let (n, m) = g.shape();
+    let scaled = DMatrix::from_fn(n, m, |i, j| g[(i, j)] * scale[i] * scale[j]);
+    (scaled, scale)
 }
 
 /// Inverse of G on the directions that are excited, and which unknowns have no part in the others.
 pub(super) fn inverse(g: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), ExciteError> {
     let p = g.nrows();
-    let scale: Vec<f64> = (0..p)
-        .map(|i| {
-            let size = g[(i, i)].sqrt();
-            if size > 0.0 { 1.0 / size } else { 0.0 }
-        })
-        .collect();
-    let svd = rank::svd(&DMatrix::from_fn(p, p, |i, j| {
-        g[(i, j)] * scale[i] * scale[j]
-    }))?;
+    let (scaled, scale) = scaled_to_one(g);
+    let svd = rank::svd(&scaled)?;
     let mut determined: Vec<bool> = scale.iter().map(|s| *s > 0.0).collect();
     let mut inverse = DMatrix::zeros(p, p);
     for k in 0..p {
@@ -220,14 +200,13 @@ pub(super) fn inverse(g: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), Exc
     Ok((covariance, determined))
 }
 
+/// The pair of unknowns whose errors are most correlated.
 fn confounded(covariance: &DMatrix<f64>, determined: &[bool], names: &[String]) -> Option<Pair> {
     let p = names.len();
     let mut most: Option<(f64, usize, usize)> = None;
+    let open = |i: usize| !determined[i];
     for j in 0..p {
-        for i in 0..j {
-            if !(determined[i] && determined[j]) {
-                continue;
-            }
+        for i in (0..j).filter(|i| !(open(*i) || open(j))) {
             let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
             let correlation = covariance[(i, j)] / scale;
             if correlation.is_finite() && most.is_none_or(|(c, ..)| correlation.abs() > c.abs()) {
@@ -252,8 +231,8 @@ fn unit(machine: &ForeseenRobot, i: usize) -> String {
         let first = machine.columns.first_own(j);
         if let Some(own) = i.checked_sub(first).and_then(|k| own.get(k)) {
             let kind = robot.joint_kind(j);
-            return match own.name() {
-                "viscous" => format!("{} s/{}", kind.torque_unit(), kind.position_unit()),
+            return match own {
+                Own::Viscous => format!("{} s/{}", kind.torque_unit(), kind.position_unit()),
                 _ => kind.torque_unit().to_owned(),
             };
         }

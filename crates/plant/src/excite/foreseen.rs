@@ -161,12 +161,7 @@ fn declared_friction(file: &RobotFile, robot: &Robot) -> Vec<JointFriction> {
 /// Inertial parameters by the mass properties of every moving link, or the links that have none.
 fn declared_inertia(file: &RobotFile, robot: &Robot) -> Result<Vec<f64>, Vec<String>> {
     let names = robot.tree().links().iter().map(|link| &link.name);
-    let given = |i: usize| {
-        file.robot
-            .link
-            .get(i)
-            .and_then(|link| link.inertial.as_ref())
-    };
+    let given = |i: usize| file.robot.link.get(i)?.inertial.as_ref();
     let bare = names.enumerate().filter(|(i, _)| given(*i).is_none());
     let bare: Vec<String> = bare.map(|(_, name)| name.clone()).collect();
     if !bare.is_empty() {

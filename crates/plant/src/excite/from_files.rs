@@ -35,20 +35,16 @@ pub fn machine(
     let robot = file.robot();
     let n = robot.joints();
     let (model, source) = TorqueSource::of(file, &robot, model)?;
-    let mut own = vec![Vec::new(); n];
-    if file.friction.fitted_with_inertias {
-        for own in &mut own {
-            own.extend([Own::Viscous, Own::Coulomb]);
-            if file.friction.offset {
-                own.push(Own::Offset);
-            }
-        }
-    }
+    let own = match (file.friction.fitted_with_inertias, file.friction.offset) {
+        (false, _) => Vec::new(),
+        (true, false) => vec![Own::Viscous, Own::Coulomb],
+        (true, true) => vec![Own::Viscous, Own::Coulomb, Own::Offset],
+    };
     let mut machine = ForeseenRobot {
         columns: RegressorColumns {
             joints: n,
             shared: robot.parameters().len(),
-            own,
+            own: vec![own; n],
             known: vec![None; n],
             rest_speed: Vec::new(),
         },
@@ -68,10 +64,7 @@ pub fn machine(
     machine.space = space;
     machine.channels.extend(of_places);
     for i in 0..n {
-        let of = |quantity| {
-            let mut all = machine.channels.iter();
-            all.find(|c| c.index == i && c.quantity == quantity)
-        };
+        let of = |quantity| BoundedQuantity::find(&machine.channels, quantity, i);
         let speed = of(Quantity::Speed).map(|c| c.upper);
         let travel = of(Quantity::Position).map(|c| c.upper - c.lower);
         machine.coulomb_speed[i] = SIGN * speed.or(travel).unwrap_or(1.0);
@@ -79,8 +72,7 @@ pub fn machine(
     Ok(machine)
 }
 
-/// What a motion must keep: limits of the motors' coordinates, of joints that are none of these, and where the
-/// motors could lose hold of a joint.
+/// Limits of the motors' coordinates, of joints that are none of these, and where motors could lose hold of a joint.
 fn channels(
     file: &RobotFile,
     mechanism: &Mechanism<MAX_COORDINATES>,
@@ -102,26 +94,16 @@ fn channels(
                 joint: name.clone(),
             });
         }
-        let transmission = robot.transmission();
-        let of_motors = (0..robot.joints()).filter_map(|i| transmission.joint_of(i));
-        let same = of_motors.into_iter().any(|(own, _)| own == joint);
-        of_joint(
-            given,
-            joint,
-            name,
-            robot.joint_kind(joint),
-            same,
-            &mut channels,
-        );
+        let mut of_motors = (0..robot.joints()).filter_map(|i| robot.transmission().joint_of(i));
+        let same = of_motors.any(|(own, _)| own == joint);
+        let kind = robot.joint_kind(joint);
+        of_joint(given, joint, name, kind, same, &mut channels);
     }
     if let Some(practice) = &mechanism.practice {
         let (joint, least) = practice.clearance;
-        let name = &robot.joint_names()[joint];
-        channels.push(BoundedQuantity {
-            lower: least,
-            upper: f64::INFINITY,
-            ..BoundedQuantity::symmetric(Quantity::Clearance, joint, name, "", 0.0)
-        });
+        let (name, open) = (&robot.joint_names()[joint], [least, f64::INFINITY]);
+        let of = Quantity::Clearance;
+        channels.push(BoundedQuantity::between(of, joint, name, "", open));
     }
     Ok(channels)
 }
@@ -151,22 +133,20 @@ fn of_coordinate(
         speed = speed.min(of_joint.speed.unwrap_or(f64::INFINITY));
         acceleration = acceleration.min(of_joint.acceleration.unwrap_or(f64::INFINITY));
     }
-    let symmetric =
-        |quantity, unit: &str, most: f64| BoundedQuantity::symmetric(quantity, i, name, unit, most);
-    if lower.is_finite() && upper.is_finite() {
-        channels.push(BoundedQuantity {
-            lower,
-            upper,
-            ..symmetric(Quantity::Position, unit, 0.0)
-        });
-    }
-    if speed.is_finite() {
-        channels.push(symmetric(Quantity::Speed, &format!("{unit}/s"), speed));
-    }
-    if acceleration.is_finite() {
-        let unit = format!("{unit}/s^2");
-        channels.push(symmetric(Quantity::Acceleration, &unit, acceleration));
-    }
+    let mut add = |quantity, unit: &str, [low, high]: [f64; 2]| {
+        if low.is_finite() && high.is_finite() {
+            let span = [low, high];
+            channels.push(BoundedQuantity::between(quantity, i, name, unit, span));
+        }
+    };
+    add(Quantity::Position, unit, [lower, upper]);
+    add(Quantity::Speed, &format!("{unit}/s"), [-speed, speed]);
+    let most = acceleration;
+    add(
+        Quantity::Acceleration,
+        &format!("{unit}/s^2"),
+        [-most, most],
+    );
     // a limit on a motor's force is one on its volts; one volt is one unit of torque where no gain is known
     let gain = robot.transmission().gains().map_or(1.0, |gains| gains[i]);
     let force = given.torque.map(|force| force / gain);
@@ -174,13 +154,11 @@ fn of_coordinate(
     let saturation = file.control.saturation_v.or(amplifier);
     let most = [given.volts, saturation, force].into_iter().flatten();
     let most = most.fold(f64::INFINITY, f64::min);
-    if most.is_finite() {
-        let unit = match mechanism.motors_at_joints() {
-            true => kind.torque_unit(),
-            false => "V",
-        };
-        channels.push(symmetric(Quantity::Drive, unit, most));
-    }
+    let unit = match mechanism.motors_at_joints() {
+        true => kind.torque_unit(),
+        false => "V",
+    };
+    add(Quantity::Drive, unit, [-most, most]);
 }
 
 /// Limits of a joint that is no designed coordinate (torque alone where it is one, `same`).
@@ -193,28 +171,21 @@ fn of_joint(
     channels: &mut Vec<BoundedQuantity>,
 ) {
     let unit = kind.position_unit();
-    let symmetric = |quantity, unit: &str, most: f64| {
-        BoundedQuantity::symmetric(quantity, joint, name, unit, most)
+    let both = |most: f64| [-most, most];
+    let mut add = |quantity, unit: &str, span: Option<[f64; 2]>| {
+        let of = |span| BoundedQuantity::between(quantity, joint, name, unit, span);
+        channels.extend(span.map(of));
     };
-    if let Some(torque) = given.torque {
-        channels.push(symmetric(Quantity::Torque, kind.torque_unit(), torque));
-    }
-    if same {
-        return;
-    }
-    if let Some([lower, upper]) = given.position {
-        channels.push(BoundedQuantity {
-            lower,
-            upper,
-            ..symmetric(Quantity::JointPosition, unit, 0.0)
-        });
-    }
-    if let Some(speed) = given.speed {
-        channels.push(symmetric(Quantity::JointSpeed, &format!("{unit}/s"), speed));
-    }
-    if let Some(most) = given.acceleration {
-        let unit = format!("{unit}/s^2");
-        channels.push(symmetric(Quantity::JointAcceleration, &unit, most));
+    add(Quantity::Torque, kind.torque_unit(), given.torque.map(both));
+    if !same {
+        let (speed, acceleration) = (given.speed.map(both), given.acceleration.map(both));
+        add(Quantity::JointPosition, unit, given.position);
+        add(Quantity::JointSpeed, &format!("{unit}/s"), speed);
+        add(
+            Quantity::JointAcceleration,
+            &format!("{unit}/s^2"),
+            acceleration,
+        );
     }
 }
 
@@ -234,17 +205,11 @@ pub fn series_of(machine: &ForeseenRobot, file: &FourierSection) -> Result<Serie
     let harmonics = file.series.iter().map(|c| c.a.len()).max().unwrap_or(0);
     let mut series = Series::still(TAU * file.fundamental_hz, names.len(), harmonics);
     for (i, offset) in series.offset.iter_mut().enumerate() {
-        let mut all = machine.channels.iter();
-        let position = all.find(|c| c.quantity == Quantity::Position && c.index == i);
-        *offset = position.map_or(0.0, |c| 0.5 * (c.lower + c.upper));
+        let position = BoundedQuantity::find(&machine.channels, Quantity::Position, i);
+        *offset = position.map_or(0.0, BoundedQuantity::middle);
     }
     for given in &file.series {
-        let Some(i) = names.iter().position(|name| *name == given.name) else {
-            return Err(ExciteError::UnknownCoordinate {
-                name: given.name.clone(),
-                known: names.join(", "),
-            });
-        };
+        let i = place_of(&names, &given.name)?;
         series.offset[i] = given.offset;
         series.a[i][..given.a.len()].copy_from_slice(&given.a);
         series.b[i][..given.b.len()].copy_from_slice(&given.b);
@@ -252,8 +217,18 @@ pub fn series_of(machine: &ForeseenRobot, file: &FourierSection) -> Result<Serie
     Ok(series)
 }
 
+/// Where a name stands among the machine's.
+pub(super) fn place_of(names: &[String], name: &str) -> Result<usize, ExciteError> {
+    let unknown = || ExciteError::UnknownCoordinate {
+        name: name.to_owned(),
+        known: names.join(", "),
+    };
+    names.iter().position(|n| n == name).ok_or_else(unknown)
+}
+
 /// The trajectory file of a series in the machine's designed coordinates.
 pub fn trajectory(machine: &ForeseenRobot, series: &Series) -> FourierSection {
+    let names = machine.coordinate_names();
     let of = |(i, name): (usize, String)| FourierCoordinate {
         name,
         offset: series.offset[i],
@@ -266,11 +241,6 @@ pub fn trajectory(machine: &ForeseenRobot, series: &Series) -> FourierSection {
         start_s: None,
         blend_s: None,
         periods: None,
-        series: machine
-            .coordinate_names()
-            .into_iter()
-            .enumerate()
-            .map(of)
-            .collect(),
+        series: names.into_iter().enumerate().map(of).collect(),
     }
 }

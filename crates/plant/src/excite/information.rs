@@ -36,7 +36,7 @@ impl Information {
     }
 
     /// Of any motion, given by its samples.
-    pub(crate) fn of_path(
+    pub(super) fn of_path(
         machine: &ForeseenRobot,
         samples: usize,
         at: &dyn Fn(usize) -> Kinematics,
@@ -84,18 +84,15 @@ impl Information {
         criterion: &Criterion,
         prior: Option<&PriorInformation>,
     ) -> Result<f64, NoValue> {
-        let weights: Vec<f64> = if criterion.weighted() {
-            machine.noise.iter().map(|s| 1.0 / s).collect()
-        } else {
-            vec![1.0; machine.coordinates()]
+        let weights = match criterion.weighted() {
+            true => machine.weights(),
+            false => vec![1.0; machine.coordinates()],
         };
         let r = self.stacked(&weights);
         if prior.is_none() {
             match criterion {
                 Criterion::Condition => return Ok(rank::condition(&rank::svd(&r)?.s)),
-                Criterion::ConditionNormalised => {
-                    return Ok(rank::condition(&normalised(&r)?.s));
-                }
+                Criterion::ConditionNormalised => return Ok(rank::condition(&normalised(&r)?.s)),
                 _ => {}
             }
         }
@@ -113,10 +110,7 @@ impl Information {
 }
 
 /// Singular values of the columns scaled to norm 1; columns of zeros stay.
-///
-/// # Errors
-/// [`NoValue::Math`] where an entry is not finite.
-pub fn normalised(r: &DMatrix<f64>) -> Result<Svd, NoValue> {
+pub(super) fn normalised(r: &DMatrix<f64>) -> Result<Svd, NoValue> {
     let mut scaled = r.clone();
     for mut column in scaled.column_iter_mut() {
         let norm = column.norm();

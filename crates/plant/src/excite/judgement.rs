@@ -4,10 +4,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::foresee::{Condition, Expected, Foresight, Pair, UnknownShare, foresee, information};
+use super::foresee::{Condition, Expected, Pair, UnknownShare, expected, foresee, information};
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::motion::{spectrum, torque_band};
+use super::series::Series;
 use super::usage::{Use, along_way};
 use super::{ExciteError, GivenInformation, Motion};
 use cft_ident_core::number;
@@ -164,15 +165,12 @@ pub struct Judgements {
 
 impl Judgements {
     /// None where there is none.
-    pub fn of(mut all: Vec<Judgement>) -> Option<Self> {
-        let last = all.last()?.clone();
-        if all.len() == 1 {
-            all.clear();
+    pub fn of(mut trajectories: Vec<Judgement>) -> Option<Self> {
+        let last = trajectories.last()?.clone();
+        if trajectories.len() == 1 {
+            trajectories.clear();
         }
-        Some(Judgements {
-            last,
-            trajectories: all,
-        })
+        Some(Judgements { last, trajectories })
     }
 }
 
@@ -209,57 +207,38 @@ pub fn judge(
     let first = motion.at(0.0);
     let way = (terms.from).map(|from| along_way(machine, terms.channels, from, &first));
     let (information, rows) = information(machine, motion, terms.rate_hz, terms.seconds)?;
-    let foresight = foresee(machine, &information, rows, None)?;
-    let together = match terms.given {
-        Some(given) => {
-            let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
-            let before = given.weighted(&weights);
-            let found = foresee(machine, &information, rows, Some(&before))?;
-            Some(GivenTogether {
-                parameters: found.parameters,
-                confounded: found.confounded,
-            })
-        }
-        None => None,
+    let foresight = foresee(machine, &information)?;
+    let GivenTogether {
+        parameters,
+        confounded,
+    } = expected(machine, &information, rows, None)?;
+    let with = |given: &GivenInformation| {
+        let before = given.weighted(&machine.weights());
+        expected(machine, &information, rows, Some(&before))
     };
-    let (names, joints) = (
-        machine.coordinate_names(),
-        machine.model.robot.joint_names(),
-    );
+    let names = machine.coordinate_names();
     let (spectrum, band, periods) = match motion {
         Motion::Periodic { series, blend } => {
-            let rows = names.iter().zip(spectrum(series)).enumerate();
-            let of =
-                |(i, (coordinate, speed_amplitudes)): (usize, (&String, Vec<f64>))| Amplitudes {
-                    coordinate: coordinate.clone(),
-                    unit: format!("{}/s", machine.coordinate_unit(i)),
-                    speed_amplitudes,
-                };
-            let spectrum = rows.map(of).collect();
-            let of = |(joint, torque_power_99_below_hz): (&String, f64)| PowerBand {
-                joint: joint.clone(),
-                torque_power_99_below_hz,
-            };
-            let band = match machine.source.known() {
-                true => Some(torque_band(machine, series, BAND_POWER_SHARE)?),
-                false => None,
-            };
-            let band = band.map(|band| joints.iter().zip(band).map(of).collect());
-            (Some(spectrum), band, blend.periods)
+            let spectrum = amplitudes(machine, &names, series);
+            (Some(spectrum), band(machine, series)?, blend.periods)
         }
         Motion::Path { .. } => (None, None, None),
     };
     // a one-joint move is not meant to separate the inertias
     let warnings = match terms.friction {
-        None => cautions(&foresight, machine.unknowns()),
+        None => cautions(confounded.as_ref(), foresight.rank, machine.unknowns()),
         Some(_) => Vec::new(),
     };
-    let noise = joints.iter().zip(&machine.noise);
+    let noise = machine.model.robot.joint_names().iter().zip(&machine.noise);
+    let noise = noise.map(|(joint, std)| TorqueNoise {
+        joint: joint.clone(),
+        torque_std: *std,
+    });
     Ok(Judgement {
         condition: foresight.condition,
         log_det: foresight.log_det,
         rank: foresight.rank,
-        samples_per_period: foresight.samples,
+        samples_per_period: information.rows,
         limits_used: limits_used(&names, &uses),
         limits: uses.iter().map(LimitUse::of).collect(),
         torques: machine.source.sentence(),
@@ -267,18 +246,13 @@ pub fn judge(
         torques_first: machine.source.caution().is_some(),
         not_checked: machine.space.not_checked(way.is_some()),
         way: way.map(|way| way.iter().map(LimitUse::of).collect()),
-        parameters: foresight.parameters,
+        parameters,
         weakest_direction: foresight.weakest_direction,
-        confounded: foresight.confounded,
-        together,
+        confounded,
+        together: terms.given.map(with).transpose()?,
         friction: terms.friction,
-        noise: noise
-            .map(|(joint, std)| TorqueNoise {
-                joint: joint.clone(),
-                torque_std: *std,
-            })
-            .collect(),
-        rows: foresight.rows,
+        noise: noise.collect(),
+        rows,
         rate_hz: terms.rate_hz,
         spectrum,
         band,
@@ -291,10 +265,35 @@ pub fn judge(
     })
 }
 
+/// Amplitudes of a series, coordinate after coordinate.
+fn amplitudes(machine: &ForeseenRobot, names: &[String], series: &Series) -> Vec<Amplitudes> {
+    let rows = names.iter().zip(spectrum(series)).enumerate();
+    rows.map(|(i, (coordinate, speed_amplitudes))| Amplitudes {
+        coordinate: coordinate.clone(),
+        unit: format!("{}/s", machine.coordinate_unit(i)),
+        speed_amplitudes,
+    })
+    .collect()
+}
+
+/// Where the power of the torques lies; none where they are not foreseen.
+fn band(machine: &ForeseenRobot, series: &Series) -> Result<Option<Vec<PowerBand>>, ExciteError> {
+    if !machine.source.known() {
+        return Ok(None);
+    }
+    let edges = torque_band(machine, series, BAND_POWER_SHARE)?;
+    let joints = machine.model.robot.joint_names().iter().zip(edges);
+    let of = |(joint, torque_power_99_below_hz): (&String, f64)| PowerBand {
+        joint: joint.clone(),
+        torque_power_99_below_hz,
+    };
+    Ok(Some(joints.map(of).collect()))
+}
+
 /// What the motion does not distinguish.
-fn cautions(foresight: &Foresight, unknowns: usize) -> Vec<String> {
+fn cautions(confounded: Option<&Pair>, rank: usize, unknowns: usize) -> Vec<String> {
     let mut warnings = Vec::new();
-    if let Some(pair) = &foresight.confounded
+    if let Some(pair) = confounded
         && pair.correlation.abs() > ALIKE
     {
         warnings.push(format!(
@@ -302,10 +301,9 @@ fn cautions(foresight: &Foresight, unknowns: usize) -> Vec<String> {
             pair.first, pair.second, pair.correlation
         ));
     }
-    if foresight.rank < unknowns {
+    if rank < unknowns {
         warnings.push(format!(
-            "this motion excites {} of {unknowns} directions of the parameters",
-            foresight.rank,
+            "this motion excites {rank} of {unknowns} directions of the parameters"
         ));
     }
     warnings
@@ -313,9 +311,8 @@ fn cautions(foresight: &Foresight, unknowns: usize) -> Vec<String> {
 
 fn limits_used(names: &[String], uses: &[Use]) -> Vec<LimitsUsed> {
     let share = |quantity: Quantity, i: usize| {
-        let mut all = uses.iter();
-        all.find(|u| u.channel.quantity == quantity && u.channel.index == i)
-            .map(|u| u.share)
+        let of = |u: &&Use| u.channel.quantity == quantity && u.channel.index == i;
+        uses.iter().find(of).map(|u| u.share)
     };
     let of = |(i, name): (usize, &String)| LimitsUsed {
         coordinate: name.clone(),
@@ -351,30 +348,26 @@ impl LimitUse {
             "" => String::new(),
             unit => format!(" {unit}"),
         };
+        let percent = number::significant(100.0 * self.t, 3);
         let (on, at) = match on_way {
-            true => {
-                let percent = number::significant(100.0 * self.t, 3);
-                (
-                    "on the way from the given pose ",
-                    format!("at {percent} % of it"),
-                )
-            }
+            true => (
+                "on the way from the given pose ",
+                format!("at {percent} % of it"),
+            ),
             false => ("", format!("at t = {:.4} s", self.t)),
         };
         if self.used.is_infinite() && !self.most.is_finite() {
             return format!("{on}the robot cannot follow {at}, where {what} would be needed");
         }
         let value = |v: f64| number::significant(v, 5);
-        let (allowed, nearest) = if self.upper.is_finite() {
-            let allowed = format!("[{}, {}]", value(self.lower), value(self.upper));
-            (allowed, "farthest")
-        } else {
-            (format!("at least {}", value(self.lower)), "nearest")
+        let [lower, upper, least, most] =
+            [self.lower, self.upper, self.least, self.most].map(value);
+        let (allowed, nearest) = match self.upper.is_finite() {
+            true => (format!("[{lower}, {upper}]"), "farthest"),
+            false => (format!("at least {lower}"), "nearest"),
         };
         format!(
-            "{on}{what} runs from {} to {}{unit}, allowed is {allowed}; {nearest} {at}",
-            value(self.least),
-            value(self.most),
+            "{on}{what} runs from {least} to {most}{unit}, allowed is {allowed}; {nearest} {at}"
         )
     }
 }
@@ -394,9 +387,8 @@ impl Judgement {
         let way = self.way.iter().flatten().map(|limit| (limit, true));
         let all = way.chain(self.limits.iter().map(|limit| (limit, false)));
         let broken = all.filter(|(limit, _)| limit.broken);
-        broken
-            .map(|(limit, on_way)| limit.sentence(on_way))
-            .collect()
+        let sentences = broken.map(|(limit, on_way)| limit.sentence(on_way));
+        sentences.collect()
     }
 
     /// The limit of a coordinate, where it has one.

@@ -53,8 +53,7 @@ impl InformationBefore {
         machine: &ForeseenRobot,
         (usual, rows): (&Information, f64),
     ) -> Result<Vec<f64>, ExciteError> {
-        let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
-        let r = usual.stacked(&weights);
+        let r = usual.stacked(&machine.weights());
         let g = r.tr_mul(&r) * (rows / usual.rows as f64) + &self.information;
         let (after, _) = inverse(&g)?;
         let mut factors = vec![0.0; self.variances.len()];

@@ -18,8 +18,9 @@ use cft_ident_files::config::identified::friction_unit;
 use cft_ident_files::config::trajectory::SingleJointMove;
 
 use super::ExciteError;
-use super::foresee::Expected;
-use super::limits::Quantity;
+use super::foresee::{Expected, scaled_to_one};
+use super::from_files::place_of;
+use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::motion::differentiated;
 use super::series::MAX_COORDINATES;
@@ -82,55 +83,44 @@ pub fn design_ladder(
     machine: &ForeseenRobot,
     task: &LadderTask,
 ) -> Result<DesignedLadder, ExciteError> {
-    let joint = joint_of(machine, &task.joint)?;
-    if machine.model.friction[joint].parameters() == 0 {
-        return Err(ExciteError::NoLaw {
-            joint: task.joint.clone(),
-        });
+    let bench = Bench::of(machine, task)?;
+    if bench.law().parameters() == 0 {
+        return Err(bench.no_law());
     }
-    let (usual, before) = widest(machine, task, joint)?;
+    let (usual, before) = bench.widest()?;
     let (slowest, fastest) = ends(&usual.speeds);
-    let value = |rungs: &Rungs| match expectation(machine, task, joint, rungs) {
-        Ok(expected) => score(&machine.model.friction[joint], &expected),
+    let value = |rungs: &Rungs| match bench.expectation(rungs) {
+        Ok(expected) => bench.score(&expected),
         Err(_) => f64::INFINITY,
     };
-    let found: Vec<(f64, Rungs, u64)> = COUNTS
-        .into_par_iter()
-        .map(|count| {
-            let ratio = |k: usize| k as f64 / (count - 1) as f64;
-            let mut start: Vec<f64> = (0..count)
-                .map(|k| (slowest.ln() + ratio(k) * (fastest / slowest).ln()).min(fastest.ln()))
-                .collect();
-            start.push(TURN.ln());
-            let rungs = |x: &[f64]| -> Rungs {
-                let within = |x: &f64| x.exp().clamp(0.2 * slowest, fastest);
-                let mut speeds: Vec<f64> = x[..count].iter().map(within).collect();
-                speeds.sort_by(f64::total_cmp);
-                let turn = x[count].exp().clamp(TURNS[0], TURNS[1]);
-                let range = usual.range;
-                Rungs {
-                    range,
-                    speeds,
-                    turn,
-                }
-            };
-            let mut f = |x: &[f64]| value(&rungs(x));
-            // outwards steps would leave the motors' range at the top
-            let steps: Vec<f64> = (0..count)
-                .map(|k| SPREAD * (1.0 - 2.0 * ratio(k)))
-                .collect();
-            let steps: Vec<f64> = steps
-                .iter()
-                .map(|s| if s.abs() < 0.1 { 0.1 } else { *s })
-                .chain([SLOWER])
-                .collect();
-            let best = nelder_mead(&mut f, &start, &steps, 1e-4, EVALUATIONS);
-            (best.value, rungs(&best.x), best.evaluations)
-        })
-        .collect();
+    let search = |count: usize| {
+        let ratio = |k: usize| k as f64 / (count - 1) as f64;
+        let spread = |k| (slowest.ln() + ratio(k) * (fastest / slowest).ln()).min(fastest.ln());
+        let start: Vec<f64> = (0..count).map(spread).chain([TURN.ln()]).collect();
+        let rungs = |x: &[f64]| -> Rungs {
+            let within = |x: &f64| x.exp().clamp(0.2 * slowest, fastest);
+            let mut speeds: Vec<f64> = x[..count].iter().map(within).collect();
+            speeds.sort_by(f64::total_cmp);
+            Rungs {
+                range: usual.range,
+                speeds,
+                turn: x[count].exp().clamp(TURNS[0], TURNS[1]),
+            }
+        };
+        let mut f = |x: &[f64]| value(&rungs(x));
+        // outwards steps would leave the motors' range at the top
+        let step = |k| match SPREAD * (1.0 - 2.0 * ratio(k)) {
+            step if step.abs() < 0.1 => 0.1,
+            step => step,
+        };
+        let steps: Vec<f64> = (0..count).map(step).chain([SLOWER]).collect();
+        let best = nelder_mead(&mut f, &start, &steps, 1e-4, EVALUATIONS);
+        (best.value, rungs(&best.x), best.evaluations)
+    };
+    let found: Vec<(f64, Rungs, u64)> = COUNTS.into_par_iter().map(search).collect();
     let evaluations = found.iter().map(|f| f.2).sum();
     let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    let at_start = score(&machine.model.friction[joint], &before);
+    let at_start = bench.score(&before);
     let mut rungs = match best {
         Some((value, rungs, _)) if value < at_start => rungs,
         _ => usual,
@@ -139,10 +129,9 @@ pub fn design_ladder(
     for number in rungs.speeds.iter_mut().chain([&mut rungs.turn]) {
         *number = three_digits(*number);
     }
-    let expected = expectation(machine, task, joint, &rungs)?;
     Ok(DesignedLadder {
-        file: move_of(machine, task, &rungs),
-        expected,
+        expected: bench.expectation(&rungs)?,
+        file: bench.move_of(&rungs),
         usual: before.iter().map(|e| e.relative_std).collect(),
         evaluations,
     })
@@ -154,46 +143,8 @@ pub fn foresee_ladder(
     task: &LadderTask,
     file: &SingleJointMove,
 ) -> Result<Vec<Expected>, ExciteError> {
-    let joint = joint_of(machine, &task.joint)?;
-    let reference = reference(machine, task, file)?;
-    expected(machine, task, joint, &reference).map(|(expected, _)| expected)
-}
-
-fn joint_of(machine: &ForeseenRobot, name: &str) -> Result<usize, ExciteError> {
-    let names = machine.model.robot.joint_names();
-    names
-        .iter()
-        .position(|n| n == name)
-        .ok_or_else(|| ExciteError::UnknownCoordinate {
-            name: name.to_owned(),
-            known: names.join(", "),
-        })
-}
-
-/// The usual ladder over the widest part of the travel at which the drives keep their limits, and what it says.
-fn widest(
-    machine: &ForeseenRobot,
-    task: &LadderTask,
-    joint: usize,
-) -> Result<(Rungs, Vec<Expected>), ExciteError> {
-    let mut refused = None;
-    for part in PARTS.map(|part| part * task.part) {
-        let mut usual = usual_ladder(machine, task, (joint, part))?;
-        keep_speed_limit(machine, task.reserve, joint, &mut usual.speeds);
-        let mut expected = expectation(machine, task, joint, &usual);
-        // strokes that leave the range with their turns
-        while matches!(expected, Err(ExciteError::Reference(_))) && usual.slow_down() {
-            expected = expectation(machine, task, joint, &usual);
-        }
-        match expected {
-            Ok(before) => return Ok((usual, before)),
-            Err(error @ ExciteError::BeyondDrive { .. }) => refused = Some(error),
-            Err(error) => return Err(error),
-        }
-    }
-    Err(refused.unwrap_or(ExciteError::NoLaw {
-        joint: task.joint.clone(),
-    }))
+    let bench = Bench::of(machine, task)?;
+    bench.expected(file).map(|(expected, _)| expected)
 }
 
 /// What a design turns.
@@ -219,32 +170,15 @@ impl Rungs {
     }
 }
 
-/// The acceleration that a ladder may take where the motors are the joints and something bounds it: less the reserve,
-/// as for every limit.
-fn acceleration(machine: &ForeseenRobot, task: &LadderTask) -> Option<f64> {
-    let mut names = machine.model.robot.joint_names().iter();
-    let joint = names.position(|name| *name == task.joint);
-    let mut limits = machine.channels.iter();
-    let limit = limits.find(|c| c.quantity == Quantity::Acceleration && Some(c.index) == joint);
-    let limit = limit.filter(|_| machine.mechanism.motors_at_joints())?;
-    Some(three_digits((1.0 - task.reserve) * limit.upper))
-}
-
-fn move_of(machine: &ForeseenRobot, task: &LadderTask, rungs: &Rungs) -> SingleJointMove {
-    SingleJointMove {
-        joint: task.joint.clone(),
-        speeds: rungs.speeds.clone(),
-        range: rungs.range,
-        acceleration: acceleration(machine, task),
-        turn_s: Some(rungs.turn),
-    }
-}
-
 /// Three significant digits, rounded down so that a top speed stays one.
 fn three_digits(v: f64) -> f64 {
     let scale = 10f64.powf(2.0 - v.log10().floor());
     // whole numbers over a power of ten print short
     (v * scale + 1e-9).floor() / scale
+}
+
+fn six_decimals(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
 }
 
 fn ends(speeds: &[f64]) -> (f64, f64) {
@@ -253,195 +187,215 @@ fn ends(speeds: &[f64]) -> (f64, f64) {
     (slowest, fastest)
 }
 
-/// The ladder that the simulator runs where no file says otherwise, over a part of the travel.
-fn usual_ladder(
-    machine: &ForeseenRobot,
-    task: &LadderTask,
-    (joint, part): (usize, f64),
-) -> Result<Rungs, ExciteError> {
-    let mut mover = OneJointMove::new(joint, task.seconds, Some(task.seed));
-    mover.acceleration = acceleration(machine, task);
-    mover.part = part;
-    if part < 1.0 {
-        let (low, high) = mover.travel(&machine.mechanism)?;
-        mover.range = Some((six_decimals(low), six_decimals(high)));
-    }
-    let mut speeds = Vec::new();
-    if let Path::Ladder { ladder, .. } = mover.reference(&machine.mechanism)?.path {
-        speeds.extend(ladder.plateaus().map(|(v, _)| v.abs()));
-    }
-    speeds.sort_by(f64::total_cmp);
-    speeds.dedup();
-    Ok(Rungs {
-        range: mover.range.map(|(low, high)| [low, high]),
-        speeds,
-        turn: TURN,
-    })
-}
-
-fn six_decimals(x: f64) -> f64 {
-    (x * 1e6).round() / 1e6
-}
-
-/// Brings speeds that would stand at the joint's limit, or beyond it, below it by the reserve.
-fn keep_speed_limit(machine: &ForeseenRobot, reserve: f64, joint: usize, speeds: &mut Vec<f64>) {
-    let quantity = match machine.mechanism.motors_at_joints() {
-        true => Quantity::Speed,
-        false => Quantity::JointSpeed,
-    };
-    let mut limits = machine.channels.iter();
-    let limit = limits.find(|c| c.quantity == quantity && c.index == joint);
-    let Some(limit) = limit.map(|c| c.upper) else {
-        return;
-    };
-    for speed in speeds.iter_mut().filter(|v| **v > limit * (1.0 - AT_LIMIT)) {
-        *speed = limit * (1.0 - reserve);
-    }
-    speeds.dedup();
-}
-
-/// The ladder of a file in joint coordinates.
-fn reference(
-    machine: &ForeseenRobot,
-    task: &LadderTask,
-    file: &SingleJointMove,
-) -> Result<Reference<MAX_COORDINATES>, ExciteError> {
-    let mechanism = &machine.mechanism;
-    let ladder = OneJointMove::of(file, &mechanism.robot, task.seconds, task.seed)?;
-    Ok(ladder.reference(mechanism)?)
-}
-
-/// Expected deviations of a ladder of these rungs, refused where the drive would be beyond its limit.
-fn expectation(
-    machine: &ForeseenRobot,
-    task: &LadderTask,
+/// A machine, what is asked of it and the joint that it is asked of.
+#[derive(Clone, Copy)]
+struct Bench<'a> {
+    machine: &'a ForeseenRobot,
+    task: &'a LadderTask,
     joint: usize,
-    rungs: &Rungs,
-) -> Result<Vec<Expected>, ExciteError> {
-    let along = reference(machine, task, &move_of(machine, task, rungs))?;
-    let (expected, (used, drive)) = expected(machine, task, joint, &along)?;
-    if used > 1.0 - task.reserve {
-        return Err(ExciteError::BeyondDrive {
-            joint: task.joint.clone(),
-            drive: machine.mechanism.robot.coordinate_names()[drive].clone(),
-            used,
-            free: task.reserve,
-        });
-    }
-    Ok(expected)
 }
 
-/// Sum of the logs of the slopes' relative variances, with a little of the others': the worst of
-/// them does not hide the rest.
-fn score(law: &JointFriction, expected: &[Expected]) -> f64 {
-    let slopes = matches!(law, JointFriction::DoubleTanh(_));
-    expected
-        .iter()
-        .map(|e| {
+impl<'a> Bench<'a> {
+    fn of(machine: &'a ForeseenRobot, task: &'a LadderTask) -> Result<Self, ExciteError> {
+        Ok(Self {
+            machine,
+            task,
+            joint: place_of(machine.model.robot.joint_names(), &task.joint)?,
+        })
+    }
+
+    fn law(&self) -> &'a JointFriction {
+        &self.machine.model.friction[self.joint]
+    }
+
+    fn no_law(&self) -> ExciteError {
+        ExciteError::NoLaw {
+            joint: self.task.joint.clone(),
+        }
+    }
+
+    /// The usual ladder over the widest part of the travel at which the drives keep their limits, and what it says.
+    fn widest(&self) -> Result<(Rungs, Vec<Expected>), ExciteError> {
+        let mut refused = None;
+        for part in PARTS.map(|part| part * self.task.part) {
+            let mut usual = self.usual(part)?;
+            self.keep_speed_limit(&mut usual.speeds);
+            let mut expected = self.expectation(&usual);
+            // strokes that leave the range with their turns
+            while matches!(expected, Err(ExciteError::Reference(_))) && usual.slow_down() {
+                expected = self.expectation(&usual);
+            }
+            match expected {
+                Ok(before) => return Ok((usual, before)),
+                Err(error @ ExciteError::BeyondDrive { .. }) => refused = Some(error),
+                Err(error) => return Err(error),
+            }
+        }
+        Err(refused.unwrap_or_else(|| self.no_law()))
+    }
+
+    /// The acceleration that a ladder may take where the motors are the joints and something bounds it.
+    fn acceleration(&self) -> Option<f64> {
+        let channels = &self.machine.channels;
+        let limit = BoundedQuantity::find(channels, Quantity::Acceleration, self.joint);
+        let limit = limit.filter(|_| self.machine.mechanism.motors_at_joints())?;
+        Some(three_digits((1.0 - self.task.reserve) * limit.upper))
+    }
+
+    fn move_of(&self, rungs: &Rungs) -> SingleJointMove {
+        SingleJointMove {
+            joint: self.task.joint.clone(),
+            speeds: rungs.speeds.clone(),
+            range: rungs.range,
+            acceleration: self.acceleration(),
+            turn_s: Some(rungs.turn),
+        }
+    }
+
+    /// The ladder that the simulator runs where no file says otherwise, over a part of the travel.
+    fn usual(&self, part: f64) -> Result<Rungs, ExciteError> {
+        let mechanism = &self.machine.mechanism;
+        let mut mover = OneJointMove::new(self.joint, self.task.seconds, Some(self.task.seed));
+        mover.acceleration = self.acceleration();
+        mover.part = part;
+        if part < 1.0 {
+            let (low, high) = mover.travel(mechanism)?;
+            mover.range = Some((six_decimals(low), six_decimals(high)));
+        }
+        let mut speeds = Vec::new();
+        if let Path::Ladder { ladder, .. } = mover.reference(mechanism)?.path {
+            speeds.extend(ladder.plateaus().map(|(v, _)| v.abs()));
+        }
+        speeds.sort_by(f64::total_cmp);
+        speeds.dedup();
+        Ok(Rungs {
+            range: mover.range.map(|(low, high)| [low, high]),
+            speeds,
+            turn: TURN,
+        })
+    }
+
+    /// Brings speeds that would stand at the joint's limit, or beyond it, below it by the reserve.
+    fn keep_speed_limit(&self, speeds: &mut Vec<f64>) {
+        let quantity = match self.machine.mechanism.motors_at_joints() {
+            true => Quantity::Speed,
+            false => Quantity::JointSpeed,
+        };
+        let limit = BoundedQuantity::find(&self.machine.channels, quantity, self.joint);
+        let Some(limit) = limit.map(|c| c.upper) else {
+            return;
+        };
+        for speed in speeds.iter_mut().filter(|v| **v > limit * (1.0 - AT_LIMIT)) {
+            *speed = limit * (1.0 - self.task.reserve);
+        }
+        speeds.dedup();
+    }
+
+    /// Expected deviations of a ladder of these rungs, refused where the drive would be beyond its limit.
+    fn expectation(&self, rungs: &Rungs) -> Result<Vec<Expected>, ExciteError> {
+        let (expected, (used, drive)) = self.expected(&self.move_of(rungs))?;
+        if used > 1.0 - self.task.reserve {
+            return Err(ExciteError::BeyondDrive {
+                joint: self.task.joint.clone(),
+                drive: self.machine.coordinate_names().swap_remove(drive),
+                used,
+                free: self.task.reserve,
+            });
+        }
+        Ok(expected)
+    }
+
+    /// Sum of the logs of the slopes' relative variances, with a little of the others': the worst does not hide the rest.
+    fn score(&self, expected: &[Expected]) -> f64 {
+        let slopes = matches!(self.law(), JointFriction::DoubleTanh(_));
+        let one = |e: &Expected| {
             let relative = e.relative_std.unwrap_or(f64::INFINITY);
             let weight = match slopes && !e.name.starts_with("slope") {
                 true => OTHERS,
                 false => 1.0,
             };
             weight * 2.0 * relative.ln()
-        })
-        .sum()
-}
+        };
+        expected.iter().map(one).sum()
+    }
 
-/// Expected deviations along a reference, the largest share of a drive's limit, and which drive it is.
-fn expected(
-    machine: &ForeseenRobot,
-    task: &LadderTask,
-    joint: usize,
-    along: &Reference<MAX_COORDINATES>,
-) -> Result<(Vec<Expected>, (f64, usize)), ExciteError> {
-    let model = &machine.model;
-    let law = &model.friction[joint];
-    let (mut g, used) = information(machine, task.seconds, joint, along)?;
-    g *= task.rate_hz / SAMPLES_PER_SECOND / (machine.noise[joint] * machine.noise[joint]);
-    let (names, values): (&[&str], Vec<f64>) = match law {
-        JointFriction::DoubleTanh(law) => (&DoubleTanh::NAMES, law.parameters().to_vec()),
-        JointFriction::ViscousCoulomb(law) => {
-            (&ViscousCoulomb::NAMES, vec![law.viscous, law.coulomb])
-        }
-        JointFriction::None => (&[], Vec::new()),
-    };
-    let variances = variances(&g, model.theta.len() + 1)?;
-    let torque = model.robot.joint_unit(joint);
-    let rows = names.iter().zip(values).zip(variances);
-    let expected = rows.map(|((name, value), variance)| {
-        let unit = friction_unit(&model.robot, joint, name, torque);
-        Expected::new(name, unit, Some(value), variance.map(f64::sqrt))
-    });
-    Ok((expected.collect(), used))
-}
+    /// Expected deviations along a move, the largest share of a drive's limit, and which drive it is.
+    fn expected(
+        &self,
+        file: &SingleJointMove,
+    ) -> Result<(Vec<Expected>, (f64, usize)), ExciteError> {
+        let (machine, task, joint) = (self.machine, self.task, self.joint);
+        let (model, mechanism) = (&machine.model, &machine.mechanism);
+        let ladder = OneJointMove::of(file, &mechanism.robot, task.seconds, task.seed)?;
+        let (mut g, used) = self.information(&ladder.reference(mechanism)?)?;
+        g *= task.rate_hz / SAMPLES_PER_SECOND / (machine.noise[joint] * machine.noise[joint]);
+        let (names, values): (&[&str], Vec<f64>) = match self.law() {
+            JointFriction::DoubleTanh(law) => (&DoubleTanh::NAMES, law.parameters().to_vec()),
+            JointFriction::ViscousCoulomb(law) => {
+                (&ViscousCoulomb::NAMES, vec![law.viscous, law.coulomb])
+            }
+            JointFriction::None => (&[], Vec::new()),
+        };
+        let variances = variances(&g, model.theta.len() + 1)?;
+        let torque = model.robot.joint_unit(joint);
+        let rows = names.iter().zip(values).zip(variances);
+        let expected = rows.map(|((name, value), variance)| {
+            let unit = friction_unit(&model.robot, joint, name, torque);
+            Expected::new(name, unit, Some(value), variance.map(f64::sqrt))
+        });
+        Ok((expected.collect(), used))
+    }
 
-/// Sums of squares and products of a joint's rows along a reference, for inertial parameters, a constant torque
-/// and the friction law; the largest share of a drive's limit, and which drive it is.
-fn information(
-    machine: &ForeseenRobot,
-    seconds: f64,
-    joint: usize,
-    along: &Reference<MAX_COORDINATES>,
-) -> Result<(DMatrix<f64>, (f64, usize)), ExciteError> {
-    let model = &machine.model;
-    let (n, p) = (machine.coordinates(), model.theta.len());
-    let law = &model.friction[joint];
-    let width = p + 1 + law.parameters();
-    let (mut y, mut tau, mut row) = (vec![0.0; n * p], vec![0.0; n], vec![0.0; width]);
-    let mut g = DMatrix::<f64>::zeros(width, width);
-    let mut used = (0.0_f64, 0);
-    let drives = machine.channels.iter();
-    let drives: Vec<_> = drives.filter(|c| c.quantity == Quantity::Drive).collect();
-    for m in 0..(seconds * SAMPLES_PER_SECOND).ceil() as usize {
-        let k = differentiated(along, (m as f64 + 0.5) / SAMPLES_PER_SECOND);
-        let (q, v, a) = (&k.x[..n], &k.xd[..n], &k.xdd[..n]);
-        model.robot.regressor(q, v, a, &mut y);
-        row[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);
-        row[p] = 1.0;
-        law.gradient(v[joint], &mut row[p + 1..]);
-        for j in 0..width {
-            for i in 0..=j {
-                g[(i, j)] += row[i] * row[j];
+    /// F'F of the joint's rows for inertia, a constant torque and friction; the largest share of a drive's limit, and whose.
+    fn information(
+        &self,
+        along: &Reference<MAX_COORDINATES>,
+    ) -> Result<(DMatrix<f64>, (f64, usize)), ExciteError> {
+        let (machine, joint, law) = (self.machine, self.joint, self.law());
+        let model = &machine.model;
+        let (n, p) = (machine.coordinates(), model.theta.len());
+        let width = p + 1 + law.parameters();
+        let (mut y, mut tau, mut row) = (vec![0.0; n * p], vec![0.0; n], vec![0.0; width]);
+        let mut g = DMatrix::<f64>::zeros(width, width);
+        let mut used = (0.0_f64, 0);
+        let drives = machine.channels.iter();
+        let drives: Vec<_> = drives.filter(|c| c.quantity == Quantity::Drive).collect();
+        for m in 0..(self.task.seconds * SAMPLES_PER_SECOND).ceil() as usize {
+            let k = differentiated(along, (m as f64 + 0.5) / SAMPLES_PER_SECOND);
+            let (q, v, a) = (&k.x[..n], &k.xd[..n], &k.xdd[..n]);
+            model.robot.regressor(q, v, a, &mut y);
+            row[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);
+            row[p] = 1.0;
+            law.gradient(v[joint], &mut row[p + 1..]);
+            for j in 0..width {
+                for i in 0..=j {
+                    g[(i, j)] += row[i] * row[j];
+                }
+            }
+            for (j, tau) in tau.iter_mut().enumerate() {
+                let inertial = machine.inertial(&y[j * p..(j + 1) * p]);
+                *tau = inertial + model.friction[j].torque(v[j]) + model.offset[j];
+            }
+            let drive = machine.drives(q, &tau)?;
+            for channel in &drives {
+                let share = channel.used(drive[channel.index]);
+                if share > used.0 {
+                    used = (share, channel.index);
+                }
             }
         }
-        for (j, tau) in tau.iter_mut().enumerate() {
-            let inertial = y[j * p..(j + 1) * p].iter().zip(&model.theta);
-            let inertial: f64 = inertial.map(|(y, t)| y * t).sum();
-            *tau = inertial + model.friction[j].torque(v[j]) + model.offset[j];
-        }
-        let drive = machine.drives(q, &tau)?;
-        for channel in &drives {
-            let share = channel.used(drive[channel.index]);
-            if share > used.0 {
-                used = (share, channel.index);
-            }
-        }
+        g.fill_lower_triangle_with_upper_triangle();
+        Ok((g, used))
     }
-    for j in 0..width {
-        for i in 0..j {
-            g[(j, i)] = g[(i, j)];
-        }
-    }
-    Ok((g, used))
 }
 
-/// Variances of the unknowns behind the first `nuisance`, whose values are unknown too; `None` where
-/// nothing distinguishes one from them.
+/// Variances of the unknowns behind the first `nuisance`; `None` where nothing distinguishes one from those.
 fn variances(g: &DMatrix<f64>, nuisance: usize) -> Result<Vec<Option<f64>>, ExciteError> {
-    let width = g.nrows();
-    let scale: Vec<f64> = (0..width)
-        .map(|i| {
-            let size = g[(i, i)].sqrt();
-            if size > 0.0 { 1.0 / size } else { 0.0 }
-        })
-        .collect();
-    let scaled = DMatrix::from_fn(width, width, |i, j| g[(i, j)] * scale[i] * scale[j]);
-    let f = width - nuisance;
-    let own = scaled.view((nuisance, nuisance), (f, f));
+    let (scaled, scale) = scaled_to_one(g);
+    let f = g.nrows() - nuisance;
     let mixed = scaled.view((0, nuisance), (nuisance, f));
     let taken = rank::svd(&scaled.view((0, 0), (nuisance, nuisance)).into_owned())?;
-    let mut left = own.into_owned();
+    let mut left = scaled.view((nuisance, nuisance), (f, f)).into_owned();
     for k in 0..nuisance {
         if taken.s[k] > NOTHING * taken.s[0] {
             let along = mixed.tr_mul(&taken.v.column(k));
@@ -449,19 +403,18 @@ fn variances(g: &DMatrix<f64>, nuisance: usize) -> Result<Vec<Option<f64>>, Exci
         }
     }
     let svd = rank::svd(&left)?;
-    Ok((0..f)
-        .map(|i| {
-            let mut variance = 0.0;
-            for k in 0..f {
-                let part = svd.v[(i, k)] * svd.v[(i, k)];
-                if svd.s[k] > NOTHING * svd.s[0] {
-                    variance += part / svd.s[k];
-                } else if part > NOTHING.sqrt() {
-                    return None;
-                }
+    let variance = |i: usize| {
+        let mut variance = 0.0;
+        for k in 0..f {
+            let part = svd.v[(i, k)] * svd.v[(i, k)];
+            if svd.s[k] > NOTHING * svd.s[0] {
+                variance += part / svd.s[k];
+            } else if part > NOTHING.sqrt() {
+                return None;
             }
-            let unscale = scale[nuisance + i];
-            (unscale > 0.0).then_some(variance * unscale * unscale)
-        })
-        .collect())
+        }
+        let unscale = scale[nuisance + i];
+        (unscale > 0.0).then_some(variance * unscale * unscale)
+    };
+    Ok((0..f).map(variance).collect())
 }

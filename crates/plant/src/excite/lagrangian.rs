@@ -9,11 +9,7 @@ use cft_ident_core::math::minimise::lbfgs;
 use super::objective::{Multipliers, Objective, Work};
 
 /// One round: sharpness of the criterion, evaluations it may take.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Round {
-    pub sharpness: f64,
-    pub evaluations: u64,
-}
+pub(super) type Round = (f64, u64);
 
 /// A search that can be continued.
 #[derive(Debug, Clone)]
@@ -39,8 +35,7 @@ impl Search {
         }
     }
 
-    /// Runs the rounds, up to `most` evaluations since the search began. `stop` is looked at before
-    /// each of them: when it is true the search ends where it is.
+    /// Runs the rounds, up to `most` evaluations since the search began; `stop` is looked at before each evaluation.
     pub fn run(
         &mut self,
         objective: &Objective,
@@ -49,7 +44,7 @@ impl Search {
         work: &mut Work,
         stop: &dyn Fn() -> bool,
     ) {
-        for round in rounds {
+        for (sharpness, evaluations) in rounds {
             let left = most.saturating_sub(self.evaluations);
             if stop() || left == 0 {
                 return;
@@ -59,19 +54,17 @@ impl Search {
                 if stop() {
                     return f64::INFINITY;
                 }
-                objective
-                    .evaluate(z, round.sharpness, multipliers, work, gradient)
-                    .unwrap_or(f64::INFINITY)
+                let value = objective.evaluate(z, *sharpness, multipliers, work, gradient);
+                value.unwrap_or(f64::INFINITY)
             };
-            let found = lbfgs(&mut f, &self.z, FLAT, round.evaluations.min(left));
+            let found = lbfgs(&mut f, &self.z, FLAT, left.min(*evaluations));
             self.evaluations += found.evaluations;
             if found.value.is_finite() {
                 self.z = found.x;
             }
-            let growth = if self.multipliers.weight < HEAVIEST {
-                GROWTH
-            } else {
-                1.0
+            let growth = match self.multipliers.weight < HEAVIEST {
+                true => GROWTH,
+                false => 1.0,
             };
             let updated = objective.update(&self.z, &mut self.multipliers, growth, work);
             if updated.is_err() {

@@ -34,9 +34,15 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Whether it is linear in the coefficients of the series.
+    /// Which derivative of a coordinate it is; of these all are linear in the coefficients of the series.
+    #[inline]
+    pub(super) fn derivative(self) -> Option<usize> {
+        let all = [Self::Position, Self::Speed, Self::Acceleration];
+        all.into_iter().position(|of| of == self)
+    }
+
     pub(super) fn is_linear(self) -> bool {
-        matches!(self, Self::Position | Self::Speed | Self::Acceleration)
+        self.derivative().is_some()
     }
 
     /// Whether it takes the masses of the links to foresee it.
@@ -93,13 +99,41 @@ pub struct BoundedQuantity {
 impl BoundedQuantity {
     /// A channel bounded to `-most..=most`.
     pub fn symmetric(quantity: Quantity, index: usize, name: &str, unit: &str, most: f64) -> Self {
+        Self::between(quantity, index, name, unit, [-most, most])
+    }
+
+    pub(super) fn between(
+        quantity: Quantity,
+        index: usize,
+        name: &str,
+        unit: &str,
+        [lower, upper]: [f64; 2],
+    ) -> Self {
         Self {
             quantity,
             index,
             name: name.to_owned(),
             unit: unit.to_owned(),
-            lower: -most,
-            upper: most,
+            lower,
+            upper,
+        }
+    }
+
+    /// The channel of a quantity of a coordinate or joint.
+    pub(super) fn find(all: &[Self], quantity: Quantity, index: usize) -> Option<&Self> {
+        all.iter()
+            .find(|c| c.quantity == quantity && c.index == index)
+    }
+
+    pub(super) fn middle(&self) -> f64 {
+        0.5 * (self.upper + self.lower)
+    }
+
+    /// What a share of 1 stands for.
+    pub(super) fn room(&self) -> f64 {
+        match self.upper.is_finite() {
+            true => 0.5 * (self.upper - self.lower),
+            false => self.lower,
         }
     }
 
@@ -108,9 +142,8 @@ impl BoundedQuantity {
     pub fn reserved(&self, share: f64) -> Self {
         let mut out = self.clone();
         if self.upper.is_finite() {
-            let half = 0.5 * (self.upper - self.lower);
-            out.lower += share * half;
-            out.upper -= share * half;
+            out.lower += share * self.room();
+            out.upper -= share * self.room();
         } else {
             out.lower *= 1.0 + share;
         }
@@ -121,8 +154,7 @@ impl BoundedQuantity {
     #[inline]
     pub fn used(&self, value: f64) -> f64 {
         if self.upper.is_finite() {
-            let half = 0.5 * (self.upper - self.lower);
-            (value - 0.5 * (self.upper + self.lower)).abs() / half
+            (value - self.middle()).abs() / self.room()
         } else if value > 0.0 {
             self.lower / value
         } else {
@@ -134,8 +166,8 @@ impl BoundedQuantity {
     #[inline]
     pub(super) fn constraints(&self, value: f64) -> [(f64, f64); 2] {
         if self.upper.is_finite() {
-            let half = 0.5 * (self.upper - self.lower);
-            let g = (value - 0.5 * (self.upper + self.lower)) / half;
+            let half = self.room();
+            let g = (value - self.middle()) / half;
             [(g - 1.0, 1.0 / half), (-g - 1.0, -1.0 / half)]
         } else {
             let slope = 1.0 / self.lower;
@@ -149,29 +181,21 @@ mod tests {
     use super::*;
 
     fn position() -> BoundedQuantity {
-        BoundedQuantity {
-            lower: -0.1,
-            upper: 0.5,
-            ..BoundedQuantity::symmetric(Quantity::Position, 0, "x_c4", "m", 1.0)
-        }
+        BoundedQuantity::between(Quantity::Position, 0, "x_c4", "m", [-0.1, 0.5])
     }
 
     #[test]
     fn use_of_a_limit_is_one_at_the_limit_on_either_side() {
         let channel = position();
-        assert!((channel.used(-0.1) - 1.0).abs() < 1e-12);
-        assert!((channel.used(0.5) - 1.0).abs() < 1e-12);
-        assert!(channel.used(0.2) < 1e-12);
+        for (value, used) in [(-0.1, 1.0), (0.5, 1.0), (0.2, 0.0)] {
+            assert!((channel.used(value) - used).abs() < 1e-12, "{value}");
+        }
         let reserved = channel.reserved(0.1);
         assert!((reserved.lower + 0.07).abs() < 1e-12 && (reserved.upper - 0.47).abs() < 1e-12);
-        let clearance = BoundedQuantity {
-            upper: f64::INFINITY,
-            lower: 0.2,
-            ..BoundedQuantity::symmetric(Quantity::Clearance, 0, "q5", "", 1.0)
-        };
-        assert_eq!(clearance.used(0.2), 1.0);
-        assert_eq!(clearance.used(0.4), 0.5);
-        assert_eq!(clearance.used(-0.1), f64::INFINITY);
+        let open = [0.2, f64::INFINITY];
+        let clearance = BoundedQuantity::between(Quantity::Clearance, 0, "q5", "", open);
+        let used = [0.2, 0.4, -0.1].map(|value| clearance.used(value));
+        assert_eq!(used, [1.0, 0.5, f64::INFINITY]);
         assert!(clearance.reserved(0.1).lower > 0.2);
     }
 

@@ -61,8 +61,7 @@ impl State {
     };
 }
 
-/// Friction and signs of one instant as straight lines in the velocities: what differences with
-/// steps wider than their bends may be taken of.
+/// Friction and signs of one instant as straight lines in the velocities, so that differences do not meet their bends.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Linearised {
     friction: [(f64, f64); MAX_COORDINATES],
@@ -110,11 +109,8 @@ impl ForeseenRobot {
     /// Names of the unknowns, in the order of the columns.
     pub fn unknown_names(&self) -> Vec<String> {
         let robot = &self.model.robot;
-        let mut names: Vec<String> = robot
-            .parameters()
-            .iter()
-            .map(|p| p.name.to_string())
-            .collect();
+        let inertial = robot.parameters().iter().map(|p| p.name.to_string());
+        let mut names: Vec<String> = inertial.collect();
         for (joint, own) in robot.joint_names().iter().zip(&self.columns.own) {
             names.extend(own.iter().map(|own| format!("{}:{joint}", own.name())));
         }
@@ -133,6 +129,11 @@ impl ForeseenRobot {
             }));
         }
         values
+    }
+
+    /// One over the noise of each joint: what its rows count by.
+    pub(super) fn weights(&self) -> Vec<f64> {
+        self.noise.iter().map(|s| 1.0 / s).collect()
     }
 
     /// Whether nothing but the position of coordinate i itself depends on it.
@@ -218,8 +219,7 @@ impl ForeseenRobot {
         out
     }
 
-    /// The rows of the fit, n x p row-major, with the sign in Coulomb columns as a steep tanh, and
-    /// (where `torques` is set) the torques and volts of the state, friction by its straight line.
+    /// [`Self::exact_rows`] with signs and friction by their straight lines, and torques and volts where they are asked for.
     pub(super) fn rows(
         &self,
         state: &mut State,
@@ -227,52 +227,54 @@ impl ForeseenRobot {
         torques: bool,
         y: &mut [f64],
     ) -> Result<(), RobotError> {
-        let (n, p, shared) = (self.coordinates(), self.unknowns(), self.columns.shared);
-        let (q, v, a) = (state.q, state.v, state.a);
-        self.model
-            .robot
-            .regressor(&q[..n], &v[..n], &a[..n], &mut y[..n * shared]);
+        let v = state.v;
+        let beyond = |j: usize, (at, slope): (f64, f64)| at + slope * (v[j] - line.v[j]);
+        self.inertial_rows(state, y);
         if torques {
-            for (j, row) in y[..n * shared].chunks_exact(shared).enumerate() {
-                let inertial: f64 = row
-                    .iter()
-                    .zip(&self.model.theta)
-                    .map(|(y, theta)| y * theta)
-                    .sum();
-                let (at, slope) = line.friction[j];
-                let friction = at + slope * (v[j] - line.v[j]);
+            let shared = self.columns.shared;
+            for j in 0..self.coordinates() {
+                let inertial = self.inertial(&y[j * shared..(j + 1) * shared]);
+                let friction = beyond(j, line.friction[j]);
                 state.tau[j] = inertial + friction + self.model.offset[j];
             }
             self.drive(state)?;
         }
-        if p > shared {
-            // spread the rows from the last to the first: they only move up
-            for j in (0..n).rev() {
-                y.copy_within(j * shared..(j + 1) * shared, j * p);
-                y[j * p + shared..(j + 1) * p].fill(0.0);
-                let first = self.columns.first_own(j);
-                for (c, own) in self.columns.own[j].iter().enumerate() {
-                    y[j * p + first + c] = match own {
-                        Own::Coulomb => line.sign[j].0 + line.sign[j].1 * (v[j] - line.v[j]),
-                        own => own.column(v[j]),
-                    };
-                }
-            }
-        }
+        self.own_columns(y, |j, own| match own {
+            Own::Coulomb => beyond(j, line.sign[j]),
+            own => own.column(v[j]),
+        });
         Ok(())
     }
 
     /// The rows of the fit as they are, n x p row-major.
-    pub(crate) fn exact_rows(&self, state: &State, y: &mut [f64]) {
-        let (n, p, shared) = (self.coordinates(), self.unknowns(), self.columns.shared);
-        let (q, v, a) = (&state.q[..n], &state.v[..n], &state.a[..n]);
+    pub(super) fn exact_rows(&self, state: &State, y: &mut [f64]) {
+        self.inertial_rows(state, y);
+        self.own_columns(y, |j, own| own.column(state.v[j]));
+    }
+
+    /// Rows of the inertial parameters alone, one joint right behind the other.
+    fn inertial_rows(&self, state: &State, y: &mut [f64]) {
+        let (n, shared) = (self.coordinates(), self.columns.shared);
+        let [q, v, a] = [&state.q, &state.v, &state.a].map(|x| &x[..n]);
         self.model.robot.regressor(q, v, a, &mut y[..n * shared]);
-        for j in (0..n).rev() {
+    }
+
+    /// The inertial part of a joint's torque by its row.
+    pub(super) fn inertial(&self, row: &[f64]) -> f64 {
+        let terms = row.iter().zip(&self.model.theta);
+        terms.map(|(y, theta)| y * theta).sum()
+    }
+
+    /// Spreads inertial rows to whole ones, with the joints' own columns.
+    fn own_columns(&self, y: &mut [f64], column: impl Fn(usize, &Own) -> f64) {
+        let (p, shared) = (self.unknowns(), self.columns.shared);
+        // from the last to the first: they only move up
+        for j in (0..self.coordinates()).rev() {
             y.copy_within(j * shared..(j + 1) * shared, j * p);
             y[j * p + shared..(j + 1) * p].fill(0.0);
             let first = self.columns.first_own(j);
             for (c, own) in self.columns.own[j].iter().enumerate() {
-                y[j * p + first + c] = own.column(v[j]);
+                y[j * p + first + c] = column(j, own);
             }
         }
     }
@@ -294,7 +296,6 @@ impl ForeseenRobot {
 pub struct Quantities<'a> {
     machine: &'a ForeseenRobot,
     state: &'a State,
-    /// Of the links, for the first channel that asks where they are and all after it.
     frames: OnceCell<Vec<Frame>>,
     /// How far the torques may be off, and the drives.
     half_widths: OnceCell<[[f64; MAX_COORDINATES]; 2]>,

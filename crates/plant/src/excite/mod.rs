@@ -9,7 +9,7 @@
 //! | [`criterion`], [`information`] | J_k, J_d, traces, and their slopes |
 //! | [`known`] | what a model knows already, and what is weak in it |
 //! | [`search`] | many starts, an augmented Lagrangian around L-BFGS, repair |
-//! | [`usage`], [`peak`] | how near each limit a motion comes, between samples too |
+//! | [`usage`], `peak` | how near each limit a motion comes, between samples too |
 //! | [`space`] | points above a floor and in a box, links apart |
 //! | [`judgement`] | the result: what a log of the motion will tell, and the limits along it |
 
@@ -28,7 +28,7 @@ pub mod limits;
 pub mod machine;
 pub mod motion;
 mod objective;
-pub mod peak;
+mod peak;
 mod repair;
 pub mod search;
 pub mod series;

@@ -13,7 +13,7 @@ use super::from_files::series_of;
 use super::limits::BoundedQuantity;
 use super::machine::ForeseenRobot;
 use super::series::{Kinematics, MAX_COORDINATES, Series};
-use super::usage::{Interval, Use, along, along_blend, along_period};
+use super::usage::{Use, along, along_blend, along_period, joined};
 
 /// Step of the differences that give the acceleration of a reference \[s\].
 const STEP: f64 = 1e-4;
@@ -104,28 +104,20 @@ impl Motion {
         match self {
             Self::Periodic { series, blend } => {
                 let whole = along_period(machine, channels, series);
-                let ends = along_blend(machine, channels, series, blend);
-                let pairs = whole.into_iter().zip(ends);
-                pairs.map(|(whole, ends)| whole.joined(ends)).collect()
+                joined(whole, along_blend(machine, channels, series, blend))
             }
             Self::Path { at, seconds } => {
-                let path = Interval {
-                    at,
-                    span: [0.0, *seconds],
-                    parts: (PARTS * seconds).ceil().max(64.0) as usize,
-                };
-                along(machine, channels, &path)
+                let parts = (PARTS * seconds).ceil().max(64.0) as usize;
+                along(machine, channels, at, [0.0, *seconds], parts)
             }
         }
     }
 }
 
 fn short_enough(seconds: f64) -> Result<(), ExciteError> {
-    match seconds > MAX_DURATION_S {
-        true => Err(ExciteError::LongMotion {
-            seconds,
-            most: MAX_DURATION_S,
-        }),
+    let most = MAX_DURATION_S;
+    match seconds > most {
+        true => Err(ExciteError::LongMotion { seconds, most }),
         false => Ok(()),
     }
 }
@@ -141,11 +133,8 @@ fn blend_of(file: &FourierSection) -> Blend {
 
 /// Positions, velocities and accelerations of a reference in its own coordinates.
 pub(super) fn differentiated(reference: &Reference<MAX_COORDINATES>, t: f64) -> Kinematics {
-    let here = reference.path.at(t);
-    let (before, after) = (
-        reference.path.at(t - STEP).velocity,
-        reference.path.at(t + STEP).velocity,
-    );
+    let [before, here, after] = [t - STEP, t, t + STEP].map(|t| reference.path.at(t));
+    let (before, after) = (before.velocity, after.velocity);
     Kinematics {
         x: here.position,
         xd: here.velocity,
@@ -169,16 +158,13 @@ fn kinematics(reference: &Reference<MAX_COORDINATES>, robot: &Robot, t: f64) -> 
 }
 
 /// Amplitudes of the speed per harmonic of a series, coordinate after coordinate \[m/s or rad/s\].
-pub fn spectrum(series: &Series) -> Vec<Vec<f64>> {
-    let pairs = series.a.iter().zip(&series.b);
-    pairs
-        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.hypot(*b)).collect())
-        .collect()
+pub(super) fn spectrum(series: &Series) -> Vec<Vec<f64>> {
+    let of = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a.hypot(*b)).collect();
+    series.a.iter().zip(&series.b).map(of).collect()
 }
 
-/// Frequency \[Hz\] below which a share of the torque's power along the period lies, per joint; the
-/// constant part is left out. What lies above a log's filter is lost to the fit.
-pub(crate) fn torque_band(
+/// Frequency \[Hz\] below which a share of the torque's power lies, per joint, its constant part left out.
+pub(super) fn torque_band(
     machine: &ForeseenRobot,
     series: &Series,
     share: f64,
@@ -201,16 +187,15 @@ pub(crate) fn torque_band(
         }
         c * c + s * s
     };
-    Ok((0..n)
-        .map(|j| {
-            let lines: Vec<f64> = (1..=LINES).map(|l| power(j, l)).collect();
-            let whole: f64 = lines.iter().sum();
-            let mut below = 0.0;
-            let first = lines.iter().position(|line| {
-                below += line;
-                below >= share * whole
-            });
-            (first.unwrap_or(LINES) + 1) as f64 / series.period()
-        })
-        .collect())
+    let band = |j| {
+        let lines: Vec<f64> = (1..=LINES).map(|l| power(j, l)).collect();
+        let whole: f64 = lines.iter().sum();
+        let mut below = 0.0;
+        let first = lines.iter().position(|line| {
+            below += line;
+            below >= share * whole
+        });
+        (first.unwrap_or(LINES) + 1) as f64 / series.period()
+    };
+    Ok((0..n).map(band).collect())
 }

@@ -97,14 +97,11 @@ impl<'a> Objective<'a> {
         prior: Option<&'a PriorInformation>,
         samples: usize,
     ) -> Self {
-        let (linear, curved) = channels
-            .iter()
-            .cloned()
-            .partition(|c: &BoundedQuantity| c.quantity.is_linear());
-        let weights = if criterion.weighted() {
-            machine.noise.iter().map(|s| 1.0 / (s * s)).collect()
-        } else {
-            vec![1.0; machine.coordinates()]
+        let (linear, curved) =
+            (channels.iter().cloned()).partition(|c: &BoundedQuantity| c.quantity.is_linear());
+        let weights = match criterion.weighted() {
+            true => machine.noise.iter().map(|s| 1.0 / (s * s)).collect(),
+            false => vec![1.0; machine.coordinates()],
         };
         Self {
             machine,
@@ -119,9 +116,8 @@ impl<'a> Objective<'a> {
         }
     }
 
-    /// The same with those of the curved limits tightened that the motion at z exceeds between the
-    /// samples, by what it does; `None` where none is exceeded by more than the share given.
-    pub(crate) fn tightened(&self, z: &[f64], most: f64) -> Option<Self> {
+    /// The same with the curved limits tightened that the motion at z exceeds by more than a share; `None` without any.
+    pub(super) fn tightened(&self, z: &[f64], most: f64) -> Option<Self> {
         let mut series = self.work().series;
         self.variables.series(z, &mut series);
         let uses = along_period(self.machine, &self.curved, &series);
@@ -155,7 +151,7 @@ impl<'a> Objective<'a> {
     }
 
     /// Number of constraints: two sides of every channel at every sample.
-    pub(crate) fn constraints(&self) -> usize {
+    pub(super) fn constraints(&self) -> usize {
         2 * (self.linear.len() + self.curved.len()) * self.fine.samples
     }
 
@@ -180,11 +176,7 @@ impl<'a> Objective<'a> {
             }
             work.lines[m] = line;
         }
-        for j in 0..p {
-            for i in 0..j {
-                g[(j, i)] = g[(i, j)];
-            }
-        }
+        g.fill_lower_triangle_with_upper_triangle();
         if let Some(prior) = self.prior {
             g *= prior.rows / self.basis.samples as f64;
             g += &prior.information;
@@ -220,10 +212,9 @@ impl<'a> Objective<'a> {
     /// Penalty of the linear channels, with its derivative.
     fn linear_penalty(&self, multipliers: &Multipliers, work: &mut Work) -> f64 {
         let width = 1 + 2 * self.variables.harmonics;
-        let mut total = 0.0;
-        let mut at = 0;
+        let (mut total, mut at) = (0.0, 0);
         for channel in &self.linear {
-            let (i, d) = (channel.index, order(channel));
+            let (i, d) = (channel.index, channel.quantity.derivative().unwrap_or(0));
             for m in 0..self.fine.samples {
                 let value = self.fine.at(&work.series, i, m)[d];
                 let mut by_value = 0.0;
@@ -252,15 +243,12 @@ impl<'a> Objective<'a> {
             .map_or(1.0, |prior| prior.rows / self.basis.samples as f64);
         for m in 0..self.basis.samples {
             let y = &work.rows[m * n * p..(m + 1) * n * p];
-            for (j, (row, out)) in y
-                .chunks_exact(p)
-                .zip(work.weights.chunks_exact_mut(p))
-                .enumerate()
-            {
+            let pairs = y.chunks_exact(p).zip(work.weights.chunks_exact_mut(p));
+            for ((row, out), weight) in pairs.zip(&self.weights) {
                 for (k, out) in out.iter_mut().enumerate() {
                     let column = slope.column(k);
                     let sum: f64 = row.iter().zip(column.iter()).map(|(y, s)| y * s).sum();
-                    *out = 2.0 * rows * self.weights[j] * sum;
+                    *out = 2.0 * rows * weight * sum;
                 }
             }
             let state = work.states[m];
@@ -349,7 +337,8 @@ impl<'a> Objective<'a> {
         };
         for channel in &self.linear {
             for m in 0..self.fine.samples {
-                let value = self.fine.at(&work.series, channel.index, m)[order(channel)];
+                let order = channel.quantity.derivative().unwrap_or(0);
+                let value = self.fine.at(&work.series, channel.index, m)[order];
                 renew(&mut at, channel, value);
             }
         }
@@ -368,22 +357,11 @@ impl<'a> Objective<'a> {
     }
 }
 
-/// Which of position, speed and acceleration a linear channel bounds.
-fn order(channel: &BoundedQuantity) -> usize {
-    match channel.quantity {
-        super::limits::Quantity::Position => 0,
-        super::limits::Quantity::Speed => 1,
-        _ => 2,
-    }
-}
-
 impl Multipliers {
     /// All zero, with a first weight.
     pub fn new(constraints: usize, weight: f64) -> Self {
-        Self {
-            lambda: vec![0.0; constraints],
-            weight,
-        }
+        let lambda = vec![0.0; constraints];
+        Self { lambda, weight }
     }
 
     /// Penalty of constraint `at` with the value g <= 0 where it holds, and its derivative by g.
@@ -391,10 +369,8 @@ impl Multipliers {
     fn penalty(&self, at: usize, g: f64) -> (f64, f64) {
         let lambda = self.lambda[at];
         let pressed = (lambda + self.weight * g).max(0.0);
-        (
-            (pressed * pressed - lambda * lambda) / (2.0 * self.weight),
-            pressed,
-        )
+        let penalty = (pressed * pressed - lambda * lambda) / (2.0 * self.weight);
+        (penalty, pressed)
     }
 }
 
@@ -417,12 +393,8 @@ impl Local<'_> {
         machine.rows(state, self.line, !self.kappas.is_empty(), self.rows)?;
         let mut sum = 0.0;
         if let Some(weights) = self.weights {
-            sum += self
-                .rows
-                .iter()
-                .zip(weights)
-                .map(|(y, w)| y * w)
-                .sum::<f64>();
+            let terms = self.rows.iter().zip(weights);
+            sum += terms.map(|(y, w)| y * w).sum::<f64>();
         }
         let quantities = machine.quantities(state);
         for (channel, kappa) in self.objective.curved.iter().zip(self.kappas) {

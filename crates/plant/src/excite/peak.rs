@@ -14,27 +14,14 @@ pub struct Peak {
 /// Narrowest part that is still halved, as a share of the whole interval.
 const MIN_WIDTH_SHARE: f64 = 1e-9;
 
-/// Highest value of `f` on `[from, to]`, by halving those of `pieces` equal parts that could hold a
-/// higher one, until they could exceed it by `tolerance` at most.
+/// Highest value of `f` on `[from, to]` from its values at the ends of equal parts, by halving those parts that could
+/// hold a higher one, until they could exceed it by `tolerance` at most.
 ///
 /// Between two samples h apart a function exceeds the larger by h^2/8 times the most of its second
 /// derivative. With that number given (`curvature`) the bound is certain; without, the second
 /// difference at the part's middle estimates it, 16 times as large as a parabola would need,
 /// and the first parts must be fine enough to meet every bend.
-pub fn highest(
-    f: &mut dyn FnMut(f64) -> f64,
-    [from, to]: [f64; 2],
-    pieces: usize,
-    curvature: Option<f64>,
-    tolerance: f64,
-) -> Peak {
-    let at = |k: usize| from + (to - from) * k as f64 / pieces as f64;
-    let samples: Vec<f64> = (0..=pieces).map(|k| f(at(k))).collect();
-    highest_from(f, [from, to], &samples, curvature, tolerance)
-}
-
-/// [`highest`] of a function whose values at the ends of equal parts are there already.
-pub(crate) fn highest_from(
+pub(super) fn highest(
     f: &mut dyn FnMut(f64) -> f64,
     [from, to]: [f64; 2],
     samples: &[f64],
@@ -63,11 +50,9 @@ pub(crate) fn highest_from(
         peak.bound = f64::INFINITY;
         return peak;
     }
-    let mut open: Vec<(f64, f64, f64, f64)> = samples
-        .windows(2)
-        .enumerate()
-        .map(|(k, pair)| (at(k), at(k + 1), pair[0], pair[1]))
-        .collect();
+    let parts = samples.windows(2).enumerate();
+    let parts = parts.map(|(k, pair)| (at(k), at(k + 1), pair[0], pair[1]));
+    let mut open: Vec<(f64, f64, f64, f64)> = parts.collect();
     while let Some((a, b, left, right)) = open.pop() {
         let top = left.max(right);
         if let Some(most) = curvature {
@@ -110,6 +95,18 @@ mod tests {
         (3.0 * t).sin() + 0.4 * (7.0 * t + 0.3).cos() - 0.2 * (11.0 * t).sin()
     }
 
+    /// From samples at the ends of equal parts.
+    fn highest(
+        f: &mut dyn FnMut(f64) -> f64,
+        span: [f64; 2],
+        parts: u32,
+        curvature: Option<f64>,
+    ) -> Peak {
+        let at = |k: u32| span[0] + (span[1] - span[0]) * f64::from(k) / f64::from(parts);
+        let samples: Vec<f64> = (0..=parts).map(|k| f(at(k))).collect();
+        super::highest(f, span, &samples, curvature, 1e-9)
+    }
+
     #[test]
     fn peaks_between_samples_are_found_and_bounded() {
         let most = 9.0 + 0.4 * 49.0 + 0.2 * 121.0;
@@ -121,7 +118,7 @@ mod tests {
                 count += 1;
                 bent(t)
             };
-            let peak = highest(&mut counted, [0.0, 6.0], 64, curvature, 1e-9);
+            let peak = highest(&mut counted, [0.0, 6.0], 64, curvature);
             assert!((peak.value - exact).abs() < 1e-9, "{peak:?} {exact}");
             assert!(peak.bound >= exact && peak.bound < exact + 2e-9);
             assert_eq!(bent(peak.t), peak.value);
@@ -132,10 +129,10 @@ mod tests {
     #[test]
     fn a_step_ends_and_a_value_that_is_not_a_number_is_beyond_every_limit() {
         let mut step = |t: f64| if t < 0.3333 { 0.0 } else { 1.0 };
-        let peak = highest(&mut step, [0.0, 1.0], 10, None, 1e-9);
+        let peak = highest(&mut step, [0.0, 1.0], 10, None);
         assert_eq!((peak.value, peak.bound), (1.0, 1.0));
         let mut fall = |t: f64| if t < 0.3333 { t } else { -1.0 };
-        let peak = highest(&mut fall, [0.0, 1.0], 10, None, 1e-9);
+        let peak = highest(&mut fall, [0.0, 1.0], 10, None);
         assert!((peak.value - 0.3333).abs() < 1e-9 && (peak.bound - 0.3333).abs() < 1e-8);
         let mut gap = |t: f64| {
             if (0.7..0.8).contains(&t) {
@@ -144,7 +141,7 @@ mod tests {
                 0.0
             }
         };
-        let peak = highest(&mut gap, [0.0, 1.0], 40, None, 1e-9);
+        let peak = highest(&mut gap, [0.0, 1.0], 40, None);
         assert_eq!((peak.value, peak.bound), (f64::INFINITY, f64::INFINITY));
     }
 }

@@ -3,7 +3,7 @@
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::series::Series;
-use super::usage::{along_period, closely_along_period, roughly_along_period, worst};
+use super::usage::{Care, about_period, along_period, worst};
 
 /// Steps towards the common factor, and how near to it they end.
 const MAX_STEPS: usize = 40;
@@ -13,21 +13,7 @@ const ROUGH_TOLERANCE: f64 = 2e-3;
 /// What is left to rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// How exactly torques and volts are looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Care {
-    /// To a thousandth, for a start of a search.
-    Rough,
-    /// As what is written must keep them.
-    Thorough,
-}
-
-/// The series brought inside the channels: each coordinate is scaled about its offset as far as
-/// its own limits ask for, its offset is moved where it may be (`fixed` is none) and that saves
-/// amplitude, and at last all coordinates together are scaled until torques and volts fit. Where
-/// they do not fit even at rest, the offsets are moved to the middle of their limits first.
-///
-/// `None` where standing still breaks a limit there too.
+/// The series brought inside the channels, by way of the middle of the limits where it cannot even rest at its offsets.
 pub(super) fn repaired(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
@@ -39,7 +25,7 @@ pub(super) fn repaired(
         let mut centred = series.clone();
         for channel in channels.iter().filter(|c| c.quantity == Quantity::Position) {
             if fixed[channel.index].is_none() {
-                centred.offset[channel.index] = 0.5 * (channel.lower + channel.upper);
+                centred.offset[channel.index] = channel.middle();
             }
         }
         let fixed: Vec<Option<f64>> = centred.offset.iter().copied().map(Some).collect();
@@ -47,6 +33,7 @@ pub(super) fn repaired(
     })
 }
 
+/// Each coordinate scaled and moved to its own limits, then all to torques and volts; `None` where rest breaks a limit.
 fn fitted(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
@@ -55,14 +42,14 @@ fn fitted(
     care: Care,
 ) -> Option<Series> {
     let mut series = series.clone();
-    let (linear, curved): (Vec<BoundedQuantity>, Vec<BoundedQuantity>) = channels
-        .iter()
-        .cloned()
-        .partition(|c| c.quantity.is_linear());
-    for channel in linear.iter().filter(|c| c.quantity == Quantity::Position) {
+    let (linear, curved): (Vec<_>, Vec<_>) =
+        (channels.iter().cloned()).partition(|c| c.quantity.is_linear());
+    let (positions, others): (Vec<_>, Vec<_>) =
+        (linear.iter()).partition(|c| c.quantity == Quantity::Position);
+    for channel in positions {
         into_span(machine, channel, &mut series, fixed)?;
     }
-    for channel in linear.iter().filter(|c| c.quantity != Quantity::Position) {
+    for channel in others {
         let share = along_period(machine, std::slice::from_ref(channel), &series)[0].share;
         if share > 1.0 {
             series.scale(channel.index, (1.0 - ROUNDING) / share);
@@ -70,10 +57,7 @@ fn fitted(
     }
     let share = |care: Care, factor: f64| {
         let scaled = series.scaled(factor);
-        worst(&match care {
-            Care::Thorough => closely_along_period(machine, &curved, &scaled),
-            Care::Rough => roughly_along_period(machine, &curved, &scaled),
-        })
+        worst(&about_period(machine, &curved, &scaled, care))
     };
     let mut broken = (1.0, share(care, 1.0));
     if broken.1 <= 1.0 {
@@ -86,27 +70,20 @@ fn fitted(
     if care == Care::Thorough {
         let roughly = |factor| share(Care::Rough, factor);
         let about = narrowed(&roughly, kept, broken, ROUGH_TOLERANCE).0;
-        for tried in [
-            about * (1.0 - ROUGH_TOLERANCE),
-            about * (1.0 + ROUGH_TOLERANCE),
-        ] {
+        for tried in [1.0 - ROUGH_TOLERANCE, 1.0 + ROUGH_TOLERANCE].map(|x| about * x) {
             if kept.0 < tried && tried < broken.0 {
                 let at = (tried, share(care, tried));
-                *(if at.1 <= 1.0 { &mut kept } else { &mut broken }) = at;
+                let end = if at.1 <= 1.0 { &mut kept } else { &mut broken };
+                *end = at;
             }
         }
     }
-    let kept = narrowed(
-        &|factor| share(care, factor),
-        kept,
-        broken,
-        FACTOR_TOLERANCE,
-    );
+    let closely = |factor| share(care, factor);
+    let kept = narrowed(&closely, kept, broken, FACTOR_TOLERANCE);
     Some(series.scaled(kept.0))
 }
 
-/// The largest factor whose share is 1 at most, but for `near`, between two of which the first keeps
-/// that and the second does not; each with its share.
+/// The largest factor whose share is 1 at most, but for `near`, between one that keeps that and one that does not.
 fn narrowed(
     share: &dyn Fn(f64) -> f64,
     mut kept: (f64, f64),
@@ -125,15 +102,17 @@ fn narrowed(
         };
         let tried = tried.clamp(kept.0 + 0.1 * near, broken.0 - 0.1 * near);
         let found = (tried, share(tried));
-        *(if found.1 <= 1.0 {
+        let end = if found.1 <= 1.0 {
             &mut kept
         } else {
             &mut broken
-        }) = found;
+        };
+        *end = found;
     }
     kept
 }
 
+/// One coordinate scaled and moved into its positions.
 fn into_span(
     machine: &ForeseenRobot,
     channel: &BoundedQuantity,
@@ -143,10 +122,10 @@ fn into_span(
     let i = channel.index;
     let range = |series: &Series| {
         let found = along_period(machine, std::slice::from_ref(channel), series);
-        let half = 0.5 * (channel.upper - channel.lower);
         let [low, high] = found[0].range;
         // the search stops within a tolerance of the true extremes
-        [low - 2e-7 * half, high + 2e-7 * half]
+        let beyond = 2e-7 * channel.room();
+        [low - beyond, high + beyond]
     };
     let offset = series.offset[i];
     let [low, high] = range(series);
@@ -171,10 +150,9 @@ fn into_span(
     }
     let least = channel.lower - reach[0];
     let most = channel.upper - reach[1];
-    series.offset[i] = if least <= most {
-        offset.clamp(least, most)
-    } else {
-        0.5 * (least + most)
+    series.offset[i] = match least <= most {
+        true => offset.clamp(least, most),
+        false => 0.5 * (least + most),
     };
     Some(())
 }

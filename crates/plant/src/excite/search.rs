@@ -12,10 +12,10 @@ use super::lagrangian::{Round, Search};
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::objective::{Objective, PriorInformation};
-use super::repair::{Care, repaired};
+use super::repair::repaired;
 use super::series::Series;
 use super::start::random_motion;
-use super::usage::{along_period, worst};
+use super::usage::{Care, Use, along_period, most_broken, worst};
 use super::variables::Variables;
 
 /// What is to be designed, and how hard to look.
@@ -45,10 +45,6 @@ pub struct FoundMotion {
     pub series: Series,
     /// Evaluations of the criterion with its derivative, over all starts.
     pub evaluations: u64,
-    /// Start that it came from, counted from 0.
-    pub start: usize,
-    /// Starts that gave a motion within the limits.
-    pub usable: usize,
     /// Whether it was stopped before its end.
     pub stopped: bool,
 }
@@ -56,28 +52,21 @@ pub struct FoundMotion {
 /// What a start has given: the criterion and the motion within the limits.
 type Best = Option<(f64, Series)>;
 
-const fn round(sharpness: f64, evaluations: u64) -> Round {
-    Round {
-        sharpness,
-        evaluations,
-    }
-}
-
 /// Rounds that every start gets.
-const FIRST: [Round; 3] = [round(6.0, 60), round(8.0, 40), round(12.0, 40)];
+const FIRST: [Round; 3] = [(6.0, 60), (8.0, 40), (12.0, 40)];
 /// Rounds that the best of them get on top.
 const SECOND: [Round; 8] = [
-    round(16.0, 100),
-    round(24.0, 100),
-    round(32.0, 100),
-    round(48.0, 100),
-    round(64.0, 100),
-    round(96.0, 100),
-    round(128.0, 100),
-    round(192.0, 100),
+    (16.0, 100),
+    (24.0, 100),
+    (32.0, 100),
+    (48.0, 100),
+    (64.0, 100),
+    (96.0, 100),
+    (128.0, 100),
+    (192.0, 100),
 ];
 /// Rounds after torques and volts have been looked at between the samples.
-const LAST: [Round; 3] = [round(128.0, 80), round(192.0, 80), round(256.0, 80)];
+const LAST: [Round; 3] = [(128.0, 80), (192.0, 80), (256.0, 80)];
 /// Excess between samples, as a share of the limit, that is left to the repair.
 const MAX_EXCESS_SHARE: f64 = 2e-3;
 /// One start in so many gets the second part.
@@ -88,7 +77,7 @@ const SAMPLES_PER_HARMONIC: usize = 12;
 impl Task {
     /// Evaluations that the search will take at most.
     pub fn most_evaluations(&self) -> u64 {
-        let sum = |rounds: &[Round]| rounds.iter().map(|r| r.evaluations).sum::<u64>();
+        let sum = |rounds: &[Round]| rounds.iter().map(|round| round.1).sum::<u64>();
         let most = self.evaluations.unwrap_or(u64::MAX);
         let first = sum(&FIRST).min(most);
         let last = (sum(&SECOND) + sum(&LAST)).min(most - first);
@@ -117,22 +106,12 @@ pub fn design(
     let reserved = machine.channels.iter().map(|c| c.reserved(task.reserve));
     let channels: Vec<BoundedQuantity> = reserved.collect();
     check(machine, task, &channels)?;
-    let variables = Variables::new(
-        &channels,
-        machine.coordinates(),
-        TAU * task.fundamental_hz,
-        task.harmonics,
-        task.offsets.clone(),
-    );
+    let (w, offsets) = (TAU * task.fundamental_hz, task.offsets.clone());
+    let variables = Variables::new(&channels, w, task.harmonics, offsets);
     let samples = (SAMPLES_PER_HARMONIC * task.harmonics).max(25);
-    let objective = Objective::new(
-        machine,
-        &task.criterion,
-        &channels,
-        variables,
-        task.prior.as_ref(),
-        samples,
-    );
+    let prior = task.prior.as_ref();
+    let criterion = &task.criterion;
+    let objective = Objective::new(machine, criterion, &channels, variables, prior, samples);
     let effort = Effort {
         most: task.evaluations.unwrap_or(u64::MAX),
         spent: AtomicU64::new(0),
@@ -163,7 +142,6 @@ pub fn design(
         })
         .collect();
     searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
-    let usable = searches.iter().filter(|s| s.2.is_some()).count();
     let last = task.finalists().min(searches.len());
     searches[..last]
         .par_iter_mut()
@@ -183,10 +161,8 @@ pub fn design(
         });
     searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
     match searches.into_iter().next() {
-        Some((start, _, Some((_, series)))) => Ok(FoundMotion {
+        Some((_, _, Some((_, series)))) => Ok(FoundMotion {
             series,
-            start,
-            usable,
             stopped: effort.stopped(),
             evaluations: effort.spent.into_inner(),
         }),
@@ -243,10 +219,9 @@ fn rounded(machine: &ForeseenRobot, channels: &[BoundedQuantity], series: Series
         // adding 0 takes the sign of a zero away
         *x = (*x * DECIMALS).round() / DECIMALS + 0.0;
     }
-    if worst(&along_period(machine, channels, &out)) <= 1.0 {
-        out
-    } else {
-        series
+    match worst(&along_period(machine, channels, &out)) <= 1.0 {
+        true => out,
+        false => series,
     }
 }
 
@@ -258,12 +233,7 @@ fn check(
 ) -> Result<(), ExciteError> {
     let names = machine.coordinate_names();
     for (i, name) in names.iter().enumerate() {
-        let of = |quantity| {
-            channels
-                .iter()
-                .find(|c| c.quantity == quantity && c.index == i)
-        };
-        let Some(position) = of(Quantity::Position) else {
+        let Some(position) = BoundedQuantity::find(channels, Quantity::Position, i) else {
             return Err(ExciteError::NoTravel {
                 coordinate: name.clone(),
             });
@@ -299,26 +269,22 @@ fn nothing_fits(
 ) -> ExciteError {
     let rest = random_motion(machine, channels, variables, task.seed, 0).scaled(0.0);
     let uses = along_period(machine, channels, &rest);
-    match uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share)) {
-        Some(u) if u.share > 1.0 => ExciteError::CannotRest {
-            channel: u.channel.name.clone(),
-            quantity: u.channel.quantity.called(&u.channel.unit),
-            value: if u.range[1].abs() > u.range[0].abs() {
-                u.range[1]
-            } else {
-                u.range[0]
-            },
-            lower: u.channel.lower,
-            upper: u.channel.upper,
-        },
-        _ => ExciteError::NothingExcited {
+    let Some(Use { channel, range, .. }) = most_broken(uses) else {
+        return ExciteError::NothingExcited {
             unknowns: machine.unknowns(),
             starts: task.starts,
+        };
+    };
+    let [least, most] = range;
+    ExciteError::CannotRest {
+        quantity: channel.quantity.called(&channel.unit),
+        value: if most.abs() > least.abs() {
+            most
+        } else {
+            least
         },
+        lower: channel.lower,
+        upper: channel.upper,
+        channel: channel.name,
     }
-}
-
-/// Whether a series keeps every limit of the machine along its period.
-pub fn keeps_limits(machine: &ForeseenRobot, series: &Series) -> bool {
-    worst(&along_period(machine, &machine.channels, series)) <= 1.0
 }

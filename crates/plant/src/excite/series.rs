@@ -75,10 +75,16 @@ impl Series {
 
     /// Position, velocity and acceleration of coordinate i at t.
     pub fn one(&self, i: usize, t: f64) -> [f64; 3] {
+        self.sum(i, |_, lw| (lw * t).sin_cos())
+    }
+
+    /// [`Self::one`] with the sine and cosine of harmonic l, of the frequency lw.
+    #[inline]
+    fn sum(&self, i: usize, sin_cos: impl Fn(usize, f64) -> (f64, f64)) -> [f64; 3] {
         let mut out = [self.offset[i], 0.0, 0.0];
         for (l, (a, b)) in self.a[i].iter().zip(&self.b[i]).enumerate() {
             let lw = (l + 1) as f64 * self.fundamental;
-            let (s, c) = (lw * t).sin_cos();
+            let (s, c) = sin_cos(l, lw);
             out[0] += (a * s - b * c) / lw;
             out[1] += a * c + b * s;
             out[2] += (b * c - a * s) * lw;
@@ -86,13 +92,12 @@ impl Series {
         out
     }
 
-    /// Bound of the k-th time derivative's modulus of coordinate i, without the offset: the sum of
-    /// its terms' amplitudes.
-    pub(crate) fn derivative_bound(&self, i: usize, k: i32) -> f64 {
+    /// Bound of the k-th time derivative of coordinate i without its offset: the sum of its terms' amplitudes.
+    pub(super) fn derivative_bound(&self, i: usize, k: i32) -> f64 {
         let terms = self.a[i].iter().zip(&self.b[i]).enumerate();
-        terms
-            .map(|(l, (a, b))| ((l + 1) as f64 * self.fundamental).powi(k - 1) * a.hypot(*b))
-            .sum()
+        let amplitude =
+            |l: usize, a: f64, b: f64| ((l + 1) as f64 * self.fundamental).powi(k - 1) * a.hypot(b);
+        terms.map(|(l, (a, b))| amplitude(l, *a, *b)).sum()
     }
 
     /// The same motion with the amplitudes of coordinate i times `factor`, about its offset.
@@ -123,40 +128,26 @@ pub(super) struct Basis {
 
 impl Basis {
     pub fn new(samples: usize, harmonics: usize) -> Self {
-        let table = (0..samples)
-            .flat_map(|m| {
-                (1..=harmonics).map(move |l| {
-                    // whole turns taken off, so that large angles lose nothing
-                    let turns = (m * l % samples) as f64 / samples as f64;
-                    (TAU * turns).sin_cos()
-                })
-            })
-            .collect();
+        // whole turns taken off, so that large angles lose nothing
+        let turns = |m: usize, l: usize| (m * l % samples) as f64 / samples as f64;
+        let row = |m| (1..=harmonics).map(move |l| (TAU * turns(m, l)).sin_cos());
         Self {
             samples,
             harmonics,
-            table,
+            table: (0..samples).flat_map(row).collect(),
         }
     }
 
     /// Coordinate i of the series at sample m.
     #[inline]
     pub fn at(&self, series: &Series, i: usize, m: usize) -> [f64; 3] {
-        let (a, b) = (&series.a[i], &series.b[i]);
-        let mut out = [series.offset[i], 0.0, 0.0];
         let row = &self.table[m * self.harmonics..(m + 1) * self.harmonics];
-        for (l, (s, c)) in row.iter().enumerate() {
-            let lw = (l + 1) as f64 * series.fundamental;
-            out[0] += (a[l] * s - b[l] * c) / lw;
-            out[1] += a[l] * c + b[l] * s;
-            out[2] += (b[l] * c - a[l] * s) * lw;
-        }
-        out
+        series.sum(i, |l, _| row[l])
     }
 
     /// [`Self::pull_back`] for every coordinate, whose derivatives stand one after the other in `out`.
     #[inline]
-    pub(crate) fn pull_back_all(
+    pub(super) fn pull_back_all(
         &self,
         fundamental: f64,
         m: usize,
@@ -169,10 +160,9 @@ impl Basis {
         }
     }
 
-    /// Adds to the derivatives by (offset, a, b) of coordinate i what the derivatives `g` by
-    /// (x, xd, xdd) at sample m stand for.
+    /// Adds derivatives `g` by (x, xd, xdd) of a coordinate at sample m to those by its (offset, a, b).
     #[inline]
-    pub(crate) fn pull_back(&self, fundamental: f64, m: usize, g: [f64; 3], out: &mut [f64]) {
+    pub(super) fn pull_back(&self, fundamental: f64, m: usize, g: [f64; 3], out: &mut [f64]) {
         let n = self.harmonics;
         let row = &self.table[m * n..(m + 1) * n];
         let (offset, rest) = out.split_at_mut(1);
@@ -206,8 +196,7 @@ mod tests {
         for k in 0..50 {
             let t = 0.05 * f64::from(k);
             for i in 0..2 {
-                let (before, here, after) =
-                    (series.one(i, t - h), series.one(i, t), series.one(i, t + h));
+                let [before, here, after] = [t - h, t, t + h].map(|t| series.one(i, t));
                 for d in 0..2 {
                     let slope = (after[d] - before[d]) / (2.0 * h);
                     assert!((slope - here[d + 1]).abs() < 1e-8 * (1.0 + slope.abs()));
@@ -231,10 +220,7 @@ mod tests {
                 let g = [0.7, -0.4, 0.2];
                 let mut out = [0.0; 7];
                 basis.pull_back(series.fundamental, m, g, &mut out);
-                let c: Vec<f64> = std::iter::once(series.offset[i])
-                    .chain(series.a[i].iter().copied())
-                    .chain(series.b[i].iter().copied())
-                    .collect();
+                let c = [&[series.offset[i]], &series.a[i][..], &series.b[i]].concat();
                 let back: f64 = out.iter().zip(&c).map(|(g, c)| g * c).sum();
                 let direct: f64 = (0..3).map(|d| g[d] * here[d]).sum();
                 assert!((back - direct).abs() < 1e-12);

@@ -91,13 +91,12 @@ impl DesignSpace {
             link: link(&point.link),
             xyz: point.xyz,
         });
-        let capsules: Vec<Capsule> = (limits.capsule.iter())
-            .map(|given| Capsule {
-                link: link(&given.link),
-                ends: [given.from, given.to],
-                radius: given.radius,
-            })
-            .collect();
+        let capsules = limits.capsule.iter().map(|given| Capsule {
+            link: link(&given.link),
+            ends: [given.from, given.to],
+            radius: given.radius,
+        });
+        let capsules: Vec<Capsule> = capsules.collect();
         let of = |link| -> Vec<Capsule> {
             let own = capsules.iter().filter(|c| c.link == link);
             own.copied().collect()
@@ -121,27 +120,16 @@ impl DesignSpace {
             bare: bare.collect(),
         };
         let distance = limits.distance.unwrap_or(DISTANCE);
-        let apart = |quantity, index, name: &str| BoundedQuantity {
-            lower: distance,
-            upper: f64::INFINITY,
-            ..BoundedQuantity::symmetric(quantity, index, name, "m", 0.0)
+        let apart = |quantity, index, name: &str| {
+            BoundedQuantity::between(quantity, index, name, "m", [distance, f64::INFINITY])
         };
         let mut channels = Vec::new();
         for (i, point) in space.points.iter().enumerate() {
             if let Some([low, high]) = limits.bounds {
                 for (k, axis) in ["x", "y", "z"].iter().enumerate() {
-                    let name = format!("{} along {axis}", point.name);
-                    channels.push(BoundedQuantity {
-                        lower: low[k],
-                        upper: high[k],
-                        ..BoundedQuantity::symmetric(
-                            Quantity::PointPosition,
-                            3 * i + k,
-                            &name,
-                            "m",
-                            0.0,
-                        )
-                    });
+                    let (name, span) = (format!("{} along {axis}", point.name), [low[k], high[k]]);
+                    let of = Quantity::PointPosition;
+                    channels.push(BoundedQuantity::between(of, 3 * i + k, &name, "m", span));
                 }
             }
             if limits.floor.is_some() {
@@ -190,8 +178,7 @@ impl DesignSpace {
         }
     }
 
-    /// What nobody looked at, in one sentence: collisions of links without capsules, what stands around the
-    /// robot, and the way to the first point where no pose is given from which it leads.
+    /// What nobody looked at, in one sentence; whether it looked along the way to the first point.
     pub(super) fn not_checked(&self, way: bool) -> String {
         let mut parts = Vec::new();
         match &self.bare[..] {
@@ -204,11 +191,7 @@ impl DesignSpace {
                 bare.join(", ")
             )),
         }
-        let names: Vec<&str> = self
-            .points
-            .iter()
-            .map(|point| point.name.as_str())
-            .collect();
+        let names: Vec<&str> = self.points.iter().map(|point| &*point.name).collect();
         let walls = match (self.floor.is_some(), self.boxed) {
             (true, true) => "floor and box",
             (true, false) => "floor",

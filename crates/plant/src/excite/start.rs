@@ -6,8 +6,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::limits::BoundedQuantity;
 use super::machine::ForeseenRobot;
-use super::repair::{Care, repaired};
+use super::repair::repaired;
 use super::series::Series;
+use super::usage::Care;
 use super::variables::Variables;
 
 /// Standard deviation of the offsets about the middle, in half spans.
@@ -19,8 +20,7 @@ const USUAL: usize = 16;
 const USUAL_SEED: u64 = 0;
 const SAMPLES: usize = 64;
 
-/// Random motion number `number` of a seed, within the channels; one that stands still at its
-/// offsets where none could be made to fit.
+/// Random motion number `number` of a seed, within the channels; at rest at its offsets where it could not be fitted.
 pub(super) fn random_motion(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
@@ -49,22 +49,25 @@ pub(super) fn random_motion(
 
 /// A random motion that fills the limits: what stands for a usual one.
 pub fn usual_motion(machine: &ForeseenRobot, fundamental: f64, harmonics: usize) -> Series {
-    let n = machine.coordinates();
-    let channels = &machine.channels;
-    let variables = Variables::new(channels, n, fundamental, harmonics, vec![None; n]);
-    random_motion(machine, channels, &variables, USUAL_SEED, 0)
+    usual(machine, fundamental, harmonics)(0)
+}
+
+/// Usual motions by their number.
+fn usual(
+    machine: &ForeseenRobot,
+    fundamental: f64,
+    harmonics: usize,
+) -> impl Fn(usize) -> Series + '_ {
+    let (channels, free) = (&machine.channels, vec![None; machine.coordinates()]);
+    let variables = Variables::new(channels, fundamental, harmonics, free);
+    move |number| random_motion(machine, channels, &variables, USUAL_SEED, number)
 }
 
 /// Root mean square of every joint's torque over random motions that fill the limits \[N or N m\]:
 /// what a share of the torque refers to before there is a motion.
 pub fn usual_torque(machine: &ForeseenRobot, fundamental: f64, harmonics: usize) -> Vec<f64> {
-    let n = machine.coordinates();
-    let free = vec![None; n];
-    let channels = &machine.channels;
-    let variables = Variables::new(channels, n, fundamental, harmonics, free);
-    let (mut squares, mut count) = (vec![0.0; n], 0usize);
-    for number in 0..USUAL {
-        let series = random_motion(machine, channels, &variables, USUAL_SEED, number);
+    let (mut squares, mut count) = (vec![0.0; machine.coordinates()], 0usize);
+    for series in (0..USUAL).map(usual(machine, fundamental, harmonics)) {
         for m in 0..SAMPLES {
             let t = series.period() * m as f64 / SAMPLES as f64;
             if let Ok(state) = machine.state(&series.at(t)) {

@@ -1,23 +1,25 @@
 //! How near a motion comes to each limit, between samples too.
 
-use std::f64::consts::TAU;
-
 use super::ExciteError;
 use super::blend::Blend;
-use super::limits::{BoundedQuantity, Quantity};
-use super::machine::{ForeseenRobot, State};
-use super::peak::{Peak, highest, highest_from};
+use super::limits::BoundedQuantity;
+use super::machine::{ForeseenRobot, Quantities, State};
+use super::peak::{Peak, highest};
 use super::series::{Kinematics, Series};
 
-/// How far a highest share may be off the one found.
-const TOLERANCE: f64 = 1e-7;
 /// First parts of a period for what is not a trigonometric polynomial: friction turns round within milliseconds.
 const PARTS: usize = 1024;
-/// The same where a motion is only prepared.
-const ROUGH_PARTS: usize = 96;
-/// The same as [`TOLERANCE`] in a search.
-const SEARCH_TOLERANCE: f64 = 1e-5;
-const ROUGH: f64 = 1e-3;
+/// How far a highest share may be off the one found.
+const TOLERANCE: f64 = 1e-7;
+
+/// How exactly a period is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Care {
+    /// To a thousandth, for a start of a search.
+    Rough,
+    /// As what is written must keep its limits.
+    Thorough,
+}
 
 /// A channel along a motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,15 +33,6 @@ pub struct Use {
     pub t: f64,
 }
 
-/// All coordinates as a function of time, over an interval.
-pub struct Interval<'a> {
-    pub at: &'a (dyn Fn(f64) -> Kinematics + Sync),
-    /// From and to \[s\].
-    pub span: [f64; 2],
-    /// Equal parts to begin with.
-    pub parts: usize,
-}
-
 /// Channels along the whole period of a series: those that are trigonometric polynomials with a
 /// certain bound, the others with one from their measured curvature.
 pub fn along_period(
@@ -51,21 +44,16 @@ pub fn along_period(
 }
 
 /// [`along_period`] with bounds that lie a little higher, for searches.
-pub(super) fn closely_along_period(
+pub(super) fn about_period(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
     series: &Series,
+    care: Care,
 ) -> Vec<Use> {
-    period(machine, channels, series, PARTS, SEARCH_TOLERANCE)
-}
-
-/// [`along_period`], to a thousandth.
-pub(super) fn roughly_along_period(
-    machine: &ForeseenRobot,
-    channels: &[BoundedQuantity],
-    series: &Series,
-) -> Vec<Use> {
-    period(machine, channels, series, ROUGH_PARTS, ROUGH)
+    match care {
+        Care::Thorough => period(machine, channels, series, PARTS, 1e-5),
+        Care::Rough => period(machine, channels, series, 96, 1e-3),
+    }
 }
 
 fn period(
@@ -75,28 +63,27 @@ fn period(
     parts: usize,
     tolerance: f64,
 ) -> Vec<Use> {
-    let path = Interval {
-        at: &|t| series.at(t),
-        span: [0.0, series.period()],
-        parts,
+    let (at, span) = (|t| series.at(t), [0.0, series.period()]);
+    let curved = channels.iter().filter(|c| !c.quantity.is_linear());
+    let curved: Vec<&BoundedQuantity> = curved.collect();
+    let mut curved = of_path(machine, &curved, &at, span, parts, tolerance).into_iter();
+    let of = |c: &BoundedQuantity| match c.quantity.derivative() {
+        Some(order) => Some(of_polynomial(c, order, series)),
+        None => curved.next(),
     };
-    let (linear, curved): (Vec<&BoundedQuantity>, Vec<&BoundedQuantity>) =
-        channels.iter().partition(|c| c.quantity.is_linear());
-    let mut curved = of_path(machine, &curved, &path, tolerance).into_iter();
-    let mut linear = linear.into_iter().map(|c| of_polynomial(c, series));
-    channels
-        .iter()
-        .filter_map(|c| match c.quantity.is_linear() {
-            true => linear.next(),
-            false => curved.next(),
-        })
-        .collect()
+    channels.iter().filter_map(of).collect()
 }
 
-/// Channels along any path.
-pub fn along(machine: &ForeseenRobot, channels: &[BoundedQuantity], path: &Interval) -> Vec<Use> {
+/// Channels along any path from one time to another \[s\], in that many parts to begin with.
+pub(super) fn along(
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
+    at: &dyn Fn(f64) -> Kinematics,
+    span: [f64; 2],
+    parts: usize,
+) -> Vec<Use> {
     let channels: Vec<&BoundedQuantity> = channels.iter().collect();
-    of_path(machine, &channels, path, TOLERANCE)
+    of_path(machine, &channels, at, span, parts, TOLERANCE)
 }
 
 /// Channels along the motion from rest to rest, outside the whole periods.
@@ -108,32 +95,21 @@ pub fn along_blend(
 ) -> Vec<Use> {
     let at = |t| blend.at(series, t);
     let parts = (PARTS as f64 * (blend.seconds / series.period()).max(0.25)).ceil() as usize;
-    let over = |interval| {
-        let path = Interval {
-            at: &at,
-            span: interval,
-            parts,
-        };
-        along(machine, channels, &path)
-    };
+    let over = |span| along(machine, channels, &at, span, parts);
     let into = over([0.0, blend.seconds]);
     if blend.periods.is_none() {
         return into;
     }
     let end = blend.duration(series.period());
     let out = over([end - blend.seconds, end]);
-    into.into_iter()
-        .zip(out)
-        .map(|(a, b)| a.joined(b))
-        .collect()
+    joined(into, out)
 }
 
 /// Parts of a straight way to begin with.
 const WAY_PARTS: usize = 512;
 
-/// Channels along the straight way between two poses in the designed coordinates, slowly: on the clock that is 0
-/// at the first and 1 at the other.
-pub fn along_way(
+/// Channels along the straight way between two poses, slowly, on the clock that is 0 at the first and 1 at the other.
+pub(super) fn along_way(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
     from: &[f64],
@@ -146,12 +122,7 @@ pub fn along_way(
         }
         k
     };
-    let path = Interval {
-        at: &at,
-        span: [0.0, 1.0],
-        parts: WAY_PARTS,
-    };
-    along(machine, channels, &path)
+    along(machine, channels, &at, [0.0, 1.0], WAY_PARTS)
 }
 
 /// Refuses a pose in the designed coordinates that breaks a limit itself: no way leads out of it.
@@ -172,7 +143,7 @@ pub fn check_pose(machine: &ForeseenRobot, from: &[f64]) -> Result<(), ExciteErr
 }
 
 /// The limit that is broken most; none where all hold.
-fn most_broken(uses: Vec<Use>) -> Option<Use> {
+pub(super) fn most_broken(uses: Vec<Use>) -> Option<Use> {
     let worst = uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share));
     worst.filter(|found| found.share > 1.0)
 }
@@ -243,18 +214,20 @@ impl Use {
     }
 
     /// The same channel along two motions.
-    pub fn joined(self, other: Self) -> Self {
-        let range = [
-            self.range[0].min(other.range[0]),
-            self.range[1].max(other.range[1]),
-        ];
-        let nearest = if other.share > self.share {
-            other
-        } else {
-            self
-        };
-        Self { range, ..nearest }
+    fn joined(self, other: Self) -> Self {
+        let ([a, b], [low, high]) = (self.range, other.range);
+        let range = [a.min(low), b.max(high)];
+        match other.share > self.share {
+            true => Self { range, ..other },
+            false => Self { range, ..self },
+        }
     }
+}
+
+/// The same channels along two motions.
+pub(super) fn joined(one: Vec<Use>, other: Vec<Use>) -> Vec<Use> {
+    let pairs = one.into_iter().zip(other);
+    pairs.map(|(a, b)| a.joined(b)).collect()
 }
 
 /// The largest share of several channels, 0 where there are none.
@@ -266,16 +239,11 @@ fn gathered(channel: &BoundedQuantity, most: Peak, least: Peak) -> Use {
     // least is the peak of the negative
     let upper = channel.used(most.bound);
     let lower = channel.used(-least.bound);
-    let one_sided = channel.upper.is_infinite();
-    let broken = most.value == f64::INFINITY || least.value == f64::INFINITY;
-    let (share, t) = if broken {
-        let t = if most.value == f64::INFINITY {
-            most.t
-        } else {
-            least.t
-        };
-        (f64::INFINITY, t)
-    } else if upper > lower && !one_sided {
+    let (share, t) = if most.value == f64::INFINITY {
+        (f64::INFINITY, most.t)
+    } else if least.value == f64::INFINITY {
+        (f64::INFINITY, least.t)
+    } else if upper > lower && channel.upper.is_finite() {
         (upper, most.t)
     } else {
         (lower, least.t)
@@ -288,34 +256,16 @@ fn gathered(channel: &BoundedQuantity, most: Peak, least: Peak) -> Use {
     }
 }
 
-/// Size of a channel's room: what a share of 1 stands for.
-fn room(channel: &BoundedQuantity) -> f64 {
-    if channel.upper.is_finite() {
-        0.5 * (channel.upper - channel.lower)
-    } else {
-        channel.lower
-    }
-}
-
-fn of_polynomial(channel: &BoundedQuantity, series: &Series) -> Use {
+fn of_polynomial(channel: &BoundedQuantity, order: usize, series: &Series) -> Use {
     let i = channel.index;
-    let order = match channel.quantity {
-        Quantity::Position => 0,
-        Quantity::Speed => 1,
-        _ => 2,
-    };
-    let curvature = series.derivative_bound(i, order + 2);
-    let interval = [0.0, TAU / series.fundamental];
-    let parts = 8 * series.harmonics().max(1);
+    let curvature = Some(series.derivative_bound(i, order as i32 + 2));
+    let (period, parts) = (series.period(), 8 * series.harmonics().max(1));
+    let tolerance = TOLERANCE * channel.room();
     let peak = |sign: f64| {
-        let mut f = |t| sign * series.one(i, t)[order as usize];
-        highest(
-            &mut f,
-            interval,
-            parts,
-            Some(curvature),
-            TOLERANCE * room(channel),
-        )
+        let mut f = |t| sign * series.one(i, t)[order];
+        let at = |k: usize| period * k as f64 / parts as f64;
+        let samples: Vec<f64> = (0..=parts).map(|k| f(at(k))).collect();
+        highest(&mut f, [0.0, period], &samples, curvature, tolerance)
     };
     gathered(channel, peak(1.0), peak(-1.0))
 }
@@ -323,57 +273,49 @@ fn of_polynomial(channel: &BoundedQuantity, series: &Series) -> Use {
 fn of_path(
     machine: &ForeseenRobot,
     channels: &[&BoundedQuantity],
-    path: &Interval,
+    at: &dyn Fn(f64) -> Kinematics,
+    [from, to]: [f64; 2],
+    parts: usize,
     tolerance: f64,
 ) -> Vec<Use> {
-    let [from, to] = path.span;
     let mut state = State::EMPTY;
-    let mut grid = vec![Vec::with_capacity(path.parts + 1); channels.len()];
-    for m in 0..=path.parts {
-        let k = (path.at)(from + (to - from) * m as f64 / path.parts as f64);
+    let mut grid = vec![Vec::with_capacity(parts + 1); channels.len()];
+    for m in 0..=parts {
+        let k = at(from + (to - from) * m as f64 / parts as f64);
         let reached = machine.fill(&k, &mut state).is_ok();
         let quantities = machine.quantities(&state);
         for (channel, values) in channels.iter().zip(&mut grid) {
-            values.push(match (channel.quantity.is_linear(), reached) {
-                (true, _) => (of_kinematics(channel, &k), 0.0),
-                (false, true) => (quantities.of(channel), quantities.half_width(channel)),
-                (false, false) => (f64::NAN, 0.0),
-            });
+            values.push(with_band(channel, &k, reached, &quantities));
         }
     }
     let mut value = |channel: &BoundedQuantity, t: f64| {
-        let k = (path.at)(t);
-        if channel.quantity.is_linear() {
-            return (of_kinematics(channel, &k), 0.0);
-        }
-        if machine.fill(&k, &mut state).is_err() {
-            return (f64::NAN, 0.0);
-        }
-        let quantities = machine.quantities(&state);
-        (quantities.of(channel), quantities.half_width(channel))
+        let k = at(t);
+        let reached = channel.quantity.is_linear() || machine.fill(&k, &mut state).is_ok();
+        with_band(channel, &k, reached, &machine.quantities(&state))
     };
-    channels
-        .iter()
-        .zip(grid)
-        .map(|(channel, values)| {
-            let mut peak = |sign: f64| {
-                let beyond = |(value, half): (f64, f64)| sign * value + half;
-                let samples: Vec<f64> = values.iter().copied().map(beyond).collect();
-                let mut f = |t| beyond(value(channel, t));
-                let tolerance = tolerance * room(channel);
-                highest_from(&mut f, path.span, &samples, None, tolerance)
-            };
-            gathered(channel, peak(1.0), peak(-1.0))
-        })
-        .collect()
+    let of = |(channel, values): (&&BoundedQuantity, Vec<(f64, f64)>)| {
+        let mut peak = |sign: f64| {
+            let beyond = |(value, half): (f64, f64)| sign * value + half;
+            let samples: Vec<f64> = values.iter().copied().map(beyond).collect();
+            let mut f = |t| beyond(value(channel, t));
+            let tolerance = tolerance * channel.room();
+            highest(&mut f, [from, to], &samples, None, tolerance)
+        };
+        gathered(channel, peak(1.0), peak(-1.0))
+    };
+    channels.iter().zip(grid).map(of).collect()
 }
 
-/// Position, speed or acceleration that a linear channel bounds.
-fn of_kinematics(channel: &BoundedQuantity, k: &Kinematics) -> f64 {
-    let i = channel.index;
-    match channel.quantity {
-        Quantity::Position => k.x[i],
-        Quantity::Speed => k.xd[i],
-        _ => k.xdd[i],
+/// A channel's value and how far it may be off; not a number where the machine cannot follow.
+fn with_band(
+    channel: &BoundedQuantity,
+    k: &Kinematics,
+    reached: bool,
+    quantities: &Quantities,
+) -> (f64, f64) {
+    match channel.quantity.derivative() {
+        Some(order) => ([k.x, k.xd, k.xdd][order][channel.index], 0.0),
+        None if reached => (quantities.of(channel), quantities.half_width(channel)),
+        None => (f64::NAN, 0.0),
     }
 }

@@ -3,14 +3,10 @@
 use super::limits::{BoundedQuantity, Quantity};
 use super::series::Series;
 
-/// Length of one unit of a search variable, in half spans and speed limits: the first step of a search
-/// is one unit long at most.
+/// Length of one unit of a search variable, in half spans and speed limits: the first step is one unit at most.
 const UNIT_OF_SPAN: f64 = 0.05;
 
-/// A map from search variables to the coefficients of a series.
-///
-/// Per coordinate: the offset in half spans about the middle (left out where it is given), then the
-/// a and the b in speed limits. Scaled so, a step of 1 is a fair one in each of them.
+/// A map from search variables to a series: per coordinate a free offset in half spans, then a and b in speed limits.
 #[derive(Debug, Clone)]
 pub(super) struct Variables {
     pub fundamental: f64,
@@ -24,33 +20,21 @@ pub(super) struct Variables {
 }
 
 impl Variables {
-    /// Scales from the limits of `n` coordinates; positions must be bounded. Where nothing bounds
-    /// the speed, that which crosses the span within a period of the highest harmonic stands in.
+    /// Scales from limits; without one of speed, that which crosses the span within a period of the highest harmonic.
     pub fn new(
         channels: &[BoundedQuantity],
-        n: usize,
         fundamental: f64,
         harmonics: usize,
         fixed: Vec<Option<f64>>,
     ) -> Self {
-        let of = |quantity: Quantity, i: usize| {
-            channels
-                .iter()
-                .find(|c| c.quantity == quantity && c.index == i)
+        let of = |quantity, i| BoundedQuantity::find(channels, quantity, i);
+        let span = |i| of(Quantity::Position, i).map_or((0.0, 1.0), |c| (c.middle(), c.room()));
+        let span: Vec<(f64, f64)> = (0..fixed.len()).map(span).collect();
+        let speed = |(i, span): (usize, &(f64, f64))| {
+            let natural = fundamental * harmonics as f64 * span.1;
+            of(Quantity::Speed, i).map_or(natural, |c| c.upper.min(natural))
         };
-        let span: Vec<(f64, f64)> = (0..n)
-            .map(|i| {
-                of(Quantity::Position, i).map_or((0.0, 1.0), |c| {
-                    (0.5 * (c.lower + c.upper), 0.5 * (c.upper - c.lower))
-                })
-            })
-            .collect();
-        let speed = (0..n)
-            .map(|i| {
-                let natural = fundamental * harmonics as f64 * span[i].1;
-                of(Quantity::Speed, i).map_or(natural, |c| c.upper.min(natural))
-            })
-            .collect();
+        let speed = span.iter().enumerate().map(speed).collect();
         Self {
             fundamental,
             harmonics,
@@ -78,11 +62,8 @@ impl Variables {
         for i in 0..self.coordinates() {
             let (middle, half) = self.span[i];
             out.offset[i] = self.fixed[i].unwrap_or_else(|| middle + UNIT_OF_SPAN * half * next());
-            for a in &mut out.a[i] {
-                *a = UNIT_OF_SPAN * self.speed[i] * next();
-            }
-            for b in &mut out.b[i] {
-                *b = UNIT_OF_SPAN * self.speed[i] * next();
+            for x in out.a[i].iter_mut().chain(&mut out.b[i]) {
+                *x = UNIT_OF_SPAN * self.speed[i] * next();
             }
         }
     }
@@ -102,7 +83,7 @@ impl Variables {
     }
 
     /// Derivatives by z from those by (offset, a, b), coordinate after coordinate.
-    pub(crate) fn pull_back(&self, by_coefficients: &[f64], out: &mut [f64]) {
+    pub fn pull_back(&self, by_coefficients: &[f64], out: &mut [f64]) {
         let mut at = 0;
         let rows = by_coefficients.chunks_exact(1 + 2 * self.harmonics);
         for (i, row) in rows.enumerate() {

@@ -21,8 +21,7 @@ use cft_ident_core::robot::friction::DoubleTanh;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CftTruth {
     pub setup: Setup,
-    /// theta_1..theta_12, then the ten base parameters that the printed structure lacks (zero where
-    /// the robot is as the report models it), in the order of `robot::cft::EXTENDED`.
+    /// theta_1..theta_12, then the ten base parameters that the printed structure lacks, as `robot::cft::EXTENDED`.
     pub theta: [f64; 22],
     /// Friction of q1, q2, q4, q5 (theta_13..theta_32).
     pub friction: [DoubleTanh; 4],
@@ -50,22 +49,16 @@ impl CftTruth {
     /// [`SimulateError::NotPositiveDefinite`] when no draw of a thousand is.
     pub fn varied(&self, spread: f64, seed: u64) -> Result<Self, SimulateError> {
         let mut chance = stream(seed, Purpose::Plant);
-        let mut outcome = Ok(*self);
-        for _ in 0..DRAWS {
+        let mut draw = || {
             let mut near = |x: f64| x * (1.0 + spread * chance.random_range(-1.0..=1.0));
             let mut drawn = *self;
-            for value in &mut drawn.theta {
-                *value = near(*value);
-            }
+            drawn.theta = drawn.theta.map(&mut near);
             for law in &mut drawn.friction {
                 *law = DoubleTanh::from_parameters(law.parameters().map(&mut near));
             }
-            outcome = drawn.check().map(|()| drawn);
-            if outcome.is_ok() {
-                break;
-            }
-        }
-        outcome
+            drawn.check().map(|()| drawn)
+        };
+        (1..DRAWS).fold(draw(), |found, _| found.or_else(|_| draw()))
     }
 
     pub fn check(&self) -> Result<(), SimulateError> {
@@ -96,9 +89,6 @@ impl CftTruth {
 }
 
 /// The CFT robot on a set-up, with the limits of Table 5.
-///
-/// # Errors
-/// None: it has four joints.
 pub fn mechanism(setup: Setup) -> Result<Mechanism<4>, SimulateError> {
     Mechanism::new(Robot::cft(setup, Structure::Printed12))
 }
@@ -114,10 +104,8 @@ pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
 }
 
 fn excitation_of(series: Fourier<4>) -> Reference<4> {
-    Reference {
-        frame: ReferenceFrame::Motors,
-        path: Path::Fourier(series),
-    }
+    let (frame, path) = (ReferenceFrame::Motors, Path::Fourier(series));
+    Reference { frame, path }
 }
 
 /// The effects on a CFT robot.
@@ -138,27 +126,9 @@ pub fn follow(
     let plant = truth.plant()?;
     plant.check()?;
     let (effects, _) = Effects::build(specs, &Sites::of(&plant)?)?;
-    let drive = MotorInput::Follow {
-        reference,
-        control: plant.control(),
-    };
+    let control = plant.control();
+    let drive = MotorInput::Follow { reference, control };
     run(&plant, effects, &Start::Settled, &drive, settings)
-}
-
-/// Largest distance between the wanted and the actual motor coordinates, and its root mean square.
-pub fn tracking_error(plant: &Plant<4>, recording: &SimulatedRun<4>) -> ([f64; 4], [f64; 4]) {
-    let mut worst = [0.0; 4];
-    let mut squares = [0.0; 4];
-    for (q, target) in recording.actual.q.iter().zip(&recording.actual.target) {
-        let x = plant.mechanism.coordinates(q);
-        for i in 0..4 {
-            let error = (x[i] - target[i]).abs();
-            worst[i] = f64::max(worst[i], error);
-            squares[i] += error * error;
-        }
-    }
-    let rows = recording.rows().max(1) as f64;
-    (worst, squares.map(|s| (s / rows).sqrt()))
 }
 
 #[cfg(test)]
@@ -173,12 +143,8 @@ mod tests {
             for seed in 0..20 {
                 let varied = nominal.varied(0.15, seed).expect("a draw is physical");
                 assert_eq!(varied, nominal.varied(0.15, seed).expect("repeats"));
-                let pairs = nominal.theta.iter().zip(&varied.theta);
-                let laws = nominal
-                    .friction_theta()
-                    .into_iter()
-                    .zip(varied.friction_theta());
-                for (a, b) in pairs.map(|(a, b)| (*a, *b)).chain(laws) {
+                let all = |truth: &CftTruth| [&truth.theta[..], &truth.friction_theta()].concat();
+                for (a, b) in all(&nominal).iter().zip(all(&varied)) {
                     assert!((b - a).abs() <= 0.15 * a.abs() + 1e-15);
                 }
             }
@@ -189,8 +155,9 @@ mod tests {
     fn impossible_inertia_is_refused_with_the_pose() {
         let mut truth = CftTruth::synthetic(Setup::Tuedacs);
         truth.theta[11] = -5.0;
+        let refused = truth.check();
         assert!(matches!(
-            truth.check(),
+            refused,
             Err(SimulateError::NotPositiveDefinite { .. })
         ));
         truth.theta[11] = f64::NAN;
@@ -198,15 +165,10 @@ mod tests {
     }
 
     #[test]
-    fn friction_parameters_come_back_in_the_order_of_the_report() {
+    fn cft_parameters_carry_the_numbers_of_the_report() {
         let truth = CftTruth::synthetic(Setup::Tuedacs);
         assert_eq!(truth.friction_theta(), practice::FRICTION);
         assert_eq!(truth.printed(), practice::INERTIA);
-    }
-
-    #[test]
-    fn cft_parameters_carry_the_numbers_of_the_report() {
-        let truth = CftTruth::synthetic(Setup::Tuedacs);
         let parameters = truth.plant().expect("a pose").parameters();
         assert_eq!(parameters.len(), 32);
         let mut numbers: Vec<u32> = parameters.iter().filter_map(|p| p.theta).collect();
@@ -215,12 +177,8 @@ mod tests {
         let friction = truth.friction_theta();
         for p in &parameters {
             let number = p.theta.expect("every parameter has a number") as usize;
-            let value = if number <= 12 {
-                truth.theta[number - 1]
-            } else {
-                friction[number - 13]
-            };
-            assert_eq!(p.value, value, "theta_{number}");
+            let all = [&truth.printed()[..], &friction].concat();
+            assert_eq!(p.value, all[number - 1], "theta_{number}");
         }
         let mut full = truth;
         full.theta[17] = 0.1;

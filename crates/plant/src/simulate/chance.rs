@@ -36,8 +36,8 @@ pub fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
 }
 
 /// Generator of the given purpose for one of several things, such as joints.
-pub(crate) fn stream_of(seed: u64, purpose: Purpose, number: usize) -> ChaCha8Rng {
-    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+pub(super) fn stream_of(seed: u64, purpose: Purpose, number: usize) -> ChaCha8Rng {
+    let mut generator = stream(seed, purpose);
     generator.set_stream(purpose as u64 + STREAMS_PER_PURPOSE * (number as u64 + 1));
     generator
 }

@@ -6,6 +6,7 @@
 //! the next sample (zero-order hold).
 
 use super::SimulateError;
+use super::reference::Target;
 
 /// Gains and limits of the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,78 +23,44 @@ impl<const J: usize> ControllerSettings<J> {
     /// # Errors
     /// [`SimulateError::Parameter`] when a gain is negative or not finite, or all of kp are zero.
     pub fn check(&self) -> Result<(), SimulateError> {
-        let usable = |x: f64| x >= 0.0 && x.is_finite();
-        for &gain in &self.proportional {
-            if !(usable(gain) && gain > 0.0) {
-                return Err(SimulateError::Parameter {
-                    name: "proportional gain kp",
-                    value: gain,
-                    rule: "must be above 0",
-                });
-            }
+        let above = |x: f64| x > 0.0 && x.is_finite();
+        for gain in self.proportional {
+            SimulateError::require(above(gain), "proportional gain kp", gain, "must be above 0")?;
         }
-        for &gain in &self.derivative {
-            if !usable(gain) {
-                return Err(SimulateError::Parameter {
-                    name: "derivative gain kd",
-                    value: gain,
-                    rule: "must be 0 or more",
-                });
-            }
+        for gain in self.derivative {
+            let good = gain == 0.0 || above(gain);
+            SimulateError::require(good, "derivative gain kd", gain, "must be 0 or more")?;
         }
-        if !(usable(self.filter_hz) && self.filter_hz > 0.0) {
-            return Err(SimulateError::Parameter {
-                name: "corner frequency of the derivative",
-                value: self.filter_hz,
-                rule: "must be above 0 Hz",
-            });
-        }
-        Ok(())
+        let (name, corner) = ("corner frequency of the derivative", self.filter_hz);
+        SimulateError::require(above(corner), name, corner, "must be above 0 Hz")
     }
 }
 
-/// The controller with its memory.
-#[derive(Debug, Clone)]
-pub struct Controller<const J: usize> {
-    control: ControllerSettings<J>,
-    last: Option<(f64, [f64; J])>,
-    speed: [f64; J],
-}
+/// The last sample of the controller, and the filtered speeds; none before the first.
+pub(super) type Memory<const J: usize> = Option<(f64, [f64; J], [f64; J])>;
 
-impl<const J: usize> Controller<J> {
-    /// Controller before its first sample.
-    pub fn new(control: ControllerSettings<J>) -> Self {
-        Self {
-            control,
-            last: None,
-            speed: [0.0; J],
-        }
-    }
-
-    /// Volts, not yet limited, at time t for the measured coordinates x and the wanted position and
-    /// velocity.
-    pub fn volts(
-        &mut self,
+impl<const J: usize> ControllerSettings<J> {
+    /// Volts, not yet limited, at time t for the measured coordinates x and what is wanted.
+    pub(super) fn volts(
+        &self,
+        memory: &mut Memory<J>,
         t: f64,
         x: &[f64; J],
-        position: &[f64; J],
-        velocity: &[f64; J],
+        target: &Target<J>,
     ) -> [f64; J] {
-        match self.last {
-            // Nothing to difference yet: the robot is taken to move as wanted.
-            None => self.speed = *velocity,
-            Some((before, last)) => {
-                let step = t - before;
-                let share = -(-std::f64::consts::TAU * self.control.filter_hz * step).exp_m1();
-                for i in 0..J {
-                    self.speed[i] += share * ((x[i] - last[i]) / step - self.speed[i]);
-                }
-            }
+        let (position, velocity) = (&target.position, &target.velocity);
+        // Nothing to difference at first: the robot is taken to move as wanted.
+        let mut speed = *velocity;
+        if let Some((before, last, known)) = *memory {
+            let step = t - before;
+            let share = -(-std::f64::consts::TAU * self.filter_hz * step).exp_m1();
+            speed =
+                std::array::from_fn(|i| known[i] + share * ((x[i] - last[i]) / step - known[i]));
         }
-        self.last = Some((t, *x));
+        *memory = Some((t, *x, speed));
         std::array::from_fn(|i| {
-            self.control.proportional[i] * (position[i] - x[i])
-                + self.control.derivative[i] * (velocity[i] - self.speed[i])
+            self.proportional[i] * (position[i] - x[i])
+                + self.derivative[i] * (velocity[i] - speed[i])
         })
     }
 }
@@ -108,21 +75,24 @@ mod tests {
         filter_hz: 100.0,
     };
 
+    fn target(position: [f64; 2], velocity: [f64; 2]) -> Target<2> {
+        Target { position, velocity }
+    }
+
     #[test]
     fn proportional_part_is_gain_times_error() {
-        let mut controller = Controller::new(CONTROL);
-        let u = controller.volts(0.0, &[0.1, 0.2], &[0.13, 0.2], &[0.0, 0.0]);
+        let wanted = target([0.13, 0.2], [0.0; 2]);
+        let u = CONTROL.volts(&mut None, 0.0, &[0.1, 0.2], &wanted);
         assert!((u[0] - 3.0).abs() < 1e-12 && u[1] == 0.0);
     }
 
     #[test]
     fn derivative_part_settles_on_gain_times_speed_error() {
-        let mut controller = Controller::new(CONTROL);
-        let mut u = [0.0; 2];
+        let (mut memory, mut u) = (None, [0.0; 2]);
         for k in 0..200 {
             let t = 1e-3 * f64::from(k);
             let x = [0.3 * t, 0.0];
-            u = controller.volts(t, &x, &x, &[0.5, 0.0]);
+            u = CONTROL.volts(&mut memory, t, &x, &target(x, [0.5, 0.0]));
         }
         assert!((u[0] - 2.0 * (0.5 - 0.3)).abs() < 1e-9, "{}", u[0]);
     }

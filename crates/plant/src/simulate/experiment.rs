@@ -13,8 +13,7 @@ use cft_ident_files::config::trajectory::{self, Coordinates, Trajectory};
 /// Duration of a motion that sets none \[s\].
 pub const SECONDS: f64 = 20.0;
 
-/// Fundamental of the usual motion of several joints \[Hz\], its harmonics, and the share of a joint's half
-/// travel that their amplitudes sum to.
+/// The usual motion of several joints: fundamental \[Hz\], harmonics, share of a half travel that amplitudes sum to.
 const FUNDAMENTAL_HZ: f64 = 0.1;
 const HARMONICS: usize = 4;
 const SHARE: f64 = 0.8;
@@ -48,16 +47,12 @@ impl<'a> Experiment<'a> {
         seconds: Option<f64>,
         seed: u64,
     ) -> Result<Option<Reference<J>>, SimulateError> {
-        let ladder = OneJointMove::new(0, seconds.unwrap_or(SECONDS), Some(seed));
+        let mut ladder = OneJointMove::new(0, seconds.unwrap_or(SECONDS), Some(seed));
         Ok(match *self {
             Self::Usual => Some(usual(mechanism, &ladder)?),
             Self::OneJoint { joint, part } => {
-                let mover = Mover::named(&mechanism.robot, joint)?;
-                let ladder = OneJointMove {
-                    mover,
-                    part,
-                    ..ladder
-                };
+                ladder.mover = Mover::named(&mechanism.robot, joint)?;
+                ladder.part = part;
                 Some(ladder.reference(mechanism)?)
             }
             Self::Trajectory(file) => Some(of_file(mechanism, file, seconds, seed)?),
@@ -66,12 +61,8 @@ impl<'a> Experiment<'a> {
     }
 }
 
-/// Reference of a trajectory file. Coordinates that a Fourier file leaves out stay in the middle of their
-/// travels.
-///
-/// # Errors
-/// [`SimulateError`] where the trajectory names what the robot does not have, or does not fit.
-pub fn of_file<const J: usize>(
+/// Reference of a trajectory file; what a Fourier file leaves out stays in the middle of its travel.
+pub(crate) fn of_file<const J: usize>(
     mechanism: &Mechanism<J>,
     file: &Trajectory,
     seconds: Option<f64>,
@@ -97,12 +88,10 @@ fn fourier<const J: usize>(
     frame: ReferenceFrame,
 ) -> Result<Reference<J>, SimulateError> {
     let middle = mechanism.middle();
+    let robot = &mechanism.robot;
     let (names, rest) = match frame {
-        ReferenceFrame::Motors => (mechanism.robot.coordinate_names(), middle),
-        ReferenceFrame::Joints => (
-            mechanism.robot.joint_names().to_vec(),
-            mechanism.pose(&middle)?,
-        ),
+        ReferenceFrame::Motors => (robot.coordinate_names(), middle),
+        ReferenceFrame::Joints => (robot.joint_names().to_vec(), mechanism.pose(&middle)?),
     };
     let terms = file.series.iter().map(|series| series.a.len());
     let terms = terms.max().unwrap_or(0);
@@ -116,22 +105,15 @@ fn fourier<const J: usize>(
         periods: file.periods,
     };
     for coordinate in &file.series {
-        let Some(i) = names.iter().position(|name| *name == coordinate.name) else {
-            return Err(SimulateError::UnknownJoint {
-                name: coordinate.name.clone(),
-                known: names.join(", "),
-            });
-        };
+        let i = SimulateError::place_of(&names, &coordinate.name)?;
         series.offset[i] = coordinate.offset;
         for (l, (a, b)) in coordinate.a.iter().zip(&coordinate.b).enumerate() {
             series.a[l][i] = *a;
             series.b[l][i] = *b;
         }
     }
-    Ok(Reference {
-        frame,
-        path: Path::Fourier(series),
-    })
+    let path = Path::Fourier(series);
+    Ok(Reference { frame, path })
 }
 
 fn points<const J: usize>(
@@ -141,24 +123,16 @@ fn points<const J: usize>(
 ) -> Result<Reference<J>, SimulateError> {
     let mut list = Vec::with_capacity(file.points.len());
     let first = file.points.first().map_or(0.0, |point| point.t);
-    for (k, point) in file.points.iter().enumerate() {
+    for (k, point) in (1..).zip(&file.points) {
         let Some(pose) = mechanism.widened(&point.position, 0.0) else {
-            return Err(SimulateError::Reference {
-                what: format!(
-                    "point {} has {} coordinates and the robot has {}",
-                    k + 1,
-                    point.position.len(),
-                    mechanism.joints()
-                )
-                .into(),
-            });
+            let (given, n) = (point.position.len(), mechanism.joints());
+            let what = format!("point {k} has {given} coordinates and the robot has {n}");
+            return Err(SimulateError::reference(what));
         };
         list.push((point.t - first, pose));
     }
-    Ok(Reference {
-        frame,
-        path: Path::Points(Points::new(&list)?),
-    })
+    let path = Path::Points(Points::new(&list)?);
+    Ok(Reference { frame, path })
 }
 
 /// What the robot does where nothing is asked for.
@@ -166,20 +140,17 @@ fn usual<const J: usize>(
     mechanism: &Mechanism<J>,
     ladder: &OneJointMove,
 ) -> Result<Reference<J>, SimulateError> {
-    if let Some(practice) = &mechanism.practice {
-        return Ok(Reference {
-            frame: ReferenceFrame::Motors,
-            path: Path::Fourier(Fourier::of(&practice.excitation)),
-        });
-    }
-    match mechanism.joints() {
-        1 => ladder.reference(mechanism),
-        _ => Ok(all_joints(mechanism)),
-    }
+    let (frame, series) = match &mechanism.practice {
+        Some(practice) => (ReferenceFrame::Motors, Fourier::of(&practice.excitation)),
+        None if mechanism.joints() == 1 => return ladder.reference(mechanism),
+        None => (ReferenceFrame::Joints, all_joints(mechanism)),
+    };
+    let path = Path::Fourier(series);
+    Ok(Reference { frame, path })
 }
 
 /// All joints over most of their travel, each with phases of its own.
-fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
+fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Fourier<J> {
     let (mut a, mut b) = (vec![[0.0; J]; HARMONICS], vec![[0.0; J]; HARMONICS]);
     let sum: f64 = (1..=HARMONICS).map(|k| 1.0 / k as f64).sum();
     for k in 0..HARMONICS {
@@ -191,22 +162,18 @@ fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
             b[k][j] = amplitude * phase.sin();
         }
     }
-    Reference {
-        frame: ReferenceFrame::Joints,
-        path: Path::Fourier(Fourier {
-            offset: mechanism.middle(),
-            a,
-            b,
-            fundamental: TAU * FUNDAMENTAL_HZ,
-            start: 0.0,
-            blend: Fourier::<J>::BLEND,
-            periods: None,
-        }),
+    Fourier {
+        offset: mechanism.middle(),
+        a,
+        b,
+        fundamental: TAU * FUNDAMENTAL_HZ,
+        start: 0.0,
+        blend: Fourier::<J>::BLEND,
+        periods: None,
     }
 }
 
-/// Own frequency \[rad/s\], damping, and corner frequency \[Hz\] of each joint under the usual gains: of one
-/// joint alone, and of several that push each other.
+/// Own frequency \[rad/s\], damping and corner frequency \[Hz\] under the usual gains, of one joint alone and of several.
 const USUAL_GAINS_ALONE: [f64; 3] = [45.0, 0.6, 50.0];
 const SEVERAL: [f64; 3] = [30.0, 0.8, 100.0];
 /// Corner frequency \[Hz\] with gains that are known.
@@ -230,12 +197,9 @@ impl<const J: usize> Plant<J> {
             _ => SEVERAL,
         };
         let stiffness = |j: usize| self.inertia[j] * frequency * frequency / m.gain[j];
-        let mut proportional = [1.0; J];
-        for (j, gain) in proportional.iter_mut().enumerate().take(m.joints()) {
-            *gain = stiffness(j);
-        }
+        let n = m.joints();
         ControllerSettings {
-            proportional,
+            proportional: std::array::from_fn(|j| if j < n { stiffness(j) } else { 1.0 }),
             derivative: m.filled(|j| 2.0 * damping / frequency * stiffness(j)),
             filter_hz,
         }

@@ -5,83 +5,88 @@ use super::temperature::PlantTemperatures;
 use cft_ident_files::config::robot_file::RobotFile;
 use cft_ident_logs::log::{Channel, DeclaredChannels, Layout};
 
-/// Names, signs, scales and offsets with which the robot file reads logs: joint channels where it reads those,
-/// and for the CFT robot the raw channels and status behind them.
-pub(super) struct LogLayout {
-    layout: Layout,
+/// A number of each row.
+type Column<const J: usize> = Box<dyn Fn(&SimulatedRun<J>, usize) -> f64>;
+
+/// How the robot file reads logs: joint channels where it reads those, the raw channels and status behind them.
+pub(super) struct LogLayout<const J: usize> {
     pub header: Vec<String>,
-    /// Joints that have a temperature.
-    warm: Vec<usize>,
-    temperatures: PlantTemperatures,
+    columns: Vec<Column<J>>,
 }
 
-impl LogLayout {
-    pub fn of<const J: usize>(
-        robot: &RobotFile,
-        run: &SimulatedRun<J>,
-        temperatures: PlantTemperatures,
-    ) -> Self {
+impl<const J: usize> LogLayout<J> {
+    pub fn of(robot: &RobotFile, run: &SimulatedRun<J>, temperatures: PlantTemperatures) -> Self {
         let layout = robot.layout();
-        let mut header = vec![layout.time.column.clone()];
+        let mut all = Self {
+            header: Vec::new(),
+            columns: Vec::new(),
+        };
+        all.channel(&layout.time, |run, k| run.t[k]);
         let (joint, actuator) = parts(&layout);
-        for part in [joint, actuator].into_iter().flatten() {
-            let channels = part.positions.iter().chain(&part.torques);
-            header.extend(channels.map(|c| c.column.clone()));
+        if let Some(part) = joint {
+            all.channels(&part.positions, |run| &run.q);
+            all.channels(&part.torques, |run| &run.torque);
         }
-        let speeds = joint.into_iter().flat_map(speeds);
-        header.extend(speeds.map(|(_, c)| c.column.clone()));
+        if let Some(part) = actuator {
+            all.channels(&part.positions, |run| &run.x);
+            all.channels(&part.torques, |run| &run.volts);
+        }
+        // velocities that the robot file names, which a log must have then: as drives estimate them, without noise
+        let speeds = joint
+            .into_iter()
+            .flat_map(|part| part.velocities.iter().enumerate());
+        for (j, channel) in speeds.filter(|(_, channel)| channel.key.is_some()) {
+            all.channel(channel, move |run, k| run.actual.v[k][j]);
+        }
         if actuator.is_some() {
-            let motors = 1..=run.coordinates.len();
-            header.extend(motors.map(|i| format!("status_{i}")));
+            for i in 0..run.coordinates.len() {
+                let code =
+                    move |run: &SimulatedRun<J>, k: usize| f64::from(run.status[k][i].code());
+                all.column(format!("status_{}", i + 1), code);
+            }
         }
-        let warm = |j: &usize| temperatures.at(*j, 0.0).is_some();
-        let warm: Vec<usize> = (0..run.joints.len()).filter(warm).collect();
-        header.extend(warm.iter().map(|j| {
-            let joint = &run.joints[*j];
-            let named = robot.log.joint.get(joint);
-            let named = named.and_then(|of| of.temperature.as_ref());
-            named.map_or(format!("temperature_{joint}"), |name| name.0.clone())
-        }));
-        Self {
-            layout,
-            header,
-            warm,
-            temperatures,
+        for (j, joint) in run.joints.iter().enumerate() {
+            let temperatures = temperatures.clone();
+            if temperatures.at(j, 0.0).is_some() {
+                let named = robot.log.joint.get(joint);
+                let named = named.and_then(|of| of.temperature.as_ref());
+                let name = named.map_or(format!("temperature_{joint}"), |name| name.0.clone());
+                all.column(name, move |run, k| {
+                    temperatures.at(j, run.t[k]).unwrap_or(f64::NAN)
+                });
+            }
+        }
+        all
+    }
+
+    fn column(&mut self, name: String, of: impl Fn(&SimulatedRun<J>, usize) -> f64 + 'static) {
+        self.header.push(name);
+        self.columns.push(Box::new(of));
+    }
+
+    /// What a channel shows of an SI value.
+    fn channel(
+        &mut self,
+        channel: &Channel,
+        of: impl Fn(&SimulatedRun<J>, usize) -> f64 + 'static,
+    ) {
+        let (offset, factor) = (channel.offset, channel.factor);
+        let shown = move |run: &SimulatedRun<J>, k: usize| (of(run, k) - offset) / factor;
+        self.column(channel.column.clone(), shown);
+    }
+
+    /// Channels of the joints or motors in their order.
+    fn channels(&mut self, channels: &[Channel], of: fn(&SimulatedRun<J>) -> &Vec<[f64; J]>) {
+        for (j, channel) in channels.iter().enumerate() {
+            self.channel(channel, move |run, k| of(run)[k][j]);
         }
     }
 
     /// The rows as the log shows them, one after the other.
-    pub fn values<const J: usize>(&self, run: &SimulatedRun<J>) -> Vec<f64> {
-        let (joint, actuator) = parts(&self.layout);
-        let mut values = Vec::with_capacity(self.header.len() * run.rows());
-        for k in 0..run.rows() {
-            values.push(logged(&self.layout.time, run.t[k]));
-            if let Some(part) = joint {
-                extend(&mut values, &part.positions, &run.q[k]);
-                extend(&mut values, &part.torques, &run.torque[k]);
-            }
-            if let Some(part) = actuator {
-                extend(&mut values, &part.positions, &run.x[k]);
-                extend(&mut values, &part.torques, &run.volts[k]);
-            }
-            for (j, channel) in joint.into_iter().flat_map(speeds) {
-                values.push(logged(channel, run.actual.v[k][j]));
-            }
-            if actuator.is_some() {
-                let status = run.status[k].iter().take(run.coordinates.len());
-                values.extend(status.map(|s| f64::from(s.code())));
-            }
-            let warm = self.warm.iter();
-            values.extend(warm.filter_map(|j| self.temperatures.at(*j, run.t[k])));
-        }
-        values
+    pub fn values(&self, run: &SimulatedRun<J>) -> Vec<f64> {
+        let row = |k| self.columns.iter().map(move |of| of(run, k));
+        (0..run.rows()).flat_map(row).collect()
     }
-}
-
-/// Velocities that the robot file names, which a log must have then: as drives estimate them, without noise.
-fn speeds(part: &Layout) -> impl Iterator<Item = (usize, &Channel)> {
-    let all = part.velocities.iter().enumerate();
-    all.filter(|(_, channel)| channel.key.is_some())
 }
 
 /// The parts of a layout that read joint channels, and motor channels.
@@ -95,18 +100,4 @@ fn parts(layout: &Layout) -> (Option<&Layout>, Option<&Layout>) {
         }
         DeclaredChannels::Actuator => (None, Some(layout)),
     }
-}
-
-fn extend(values: &mut Vec<f64>, channels: &[Channel], numbers: &[f64]) {
-    values.extend(
-        channels
-            .iter()
-            .zip(numbers)
-            .map(|(channel, x)| logged(channel, *x)),
-    );
-}
-
-/// The number that the channel shows for an SI value.
-fn logged(channel: &Channel, value: f64) -> f64 {
-    (value - channel.offset) / channel.factor
 }

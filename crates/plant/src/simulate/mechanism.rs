@@ -90,6 +90,16 @@ impl<const J: usize> Mechanism<J> {
         self.robot.transmission().coordinates().is_none()
     }
 
+    /// Refusal of a start whose coordinate i is outside its limits.
+    pub(super) fn beyond_at_start(&self, i: usize, value: f64) -> SimulateError {
+        SimulateError::LimitAtStart {
+            coordinate: self.robot.coordinate_names().swap_remove(i),
+            value,
+            lower: self.lower[i],
+            upper: self.upper[i],
+        }
+    }
+
     /// Limits of a motor's coordinate, or a metre and a radian about zero.
     pub fn travel(&self, i: usize) -> (f64, f64) {
         let (low, high) = (self.lower[i], self.upper[i]);
@@ -149,7 +159,7 @@ impl<const J: usize> Mechanism<J> {
     }
 
     /// Joint speeds at the pose q of the motors' speeds.
-    pub(crate) fn joint_speeds(
+    pub(super) fn joint_speeds(
         &self,
         q: &[f64; J],
         xd: &[f64; J],

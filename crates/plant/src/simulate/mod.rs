@@ -60,7 +60,7 @@ pub use plant::Plant;
 pub use reference::{Path, Reference, ReferenceFrame};
 pub use run::{MotorInput, Start, run};
 pub use sensors::{Noise, Sensors};
-pub use settings::{OnLimit, Settings};
+pub use settings::Settings;
 pub use simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 pub use single_joint::SingleJointTruth;
 pub use temperature::PlantTemperatures;

@@ -2,7 +2,7 @@
 //!
 //! Its state is (q, v, z): z are the states of the effects.
 
-use super::effects::{Effects, PlantState};
+use super::effects::{Effect, Effects, PlantState};
 use super::integrate::System;
 use super::plant::{Plant, gather, spread};
 
@@ -27,9 +27,8 @@ struct Balance<const J: usize> {
 }
 
 impl<const J: usize> Moving<'_, J> {
-    /// Positions and speeds where the motors and their encoders sit: those of the links, and beyond them
-    /// the deflections of elastic joints.
-    pub(crate) fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
+    /// Positions and speeds of the motors and their encoders: beyond the links by the deflections of elastic joints.
+    pub(super) fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
         let (mut q, mut v) = (*q, *v);
         for twist in self.effects.twists(z) {
             q[twist.joint] += twist.deflection;
@@ -51,26 +50,20 @@ impl<const J: usize> Moving<'_, J> {
         self.balance(t, &q, &v, &y[2 * J..]).acceleration
     }
 
-    /// The balance with effects: what the motors give, friction and added torques take; what is left is the
-    /// load tau_l with what depends on it, and where a joint is elastic the load is what the spring passes on.
+    /// The balance with effects; where a joint is elastic the load tau_l is what the spring passes on.
     fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> Balance<J> {
         let (q, v) = self.motor_side(link, speed, z);
-        let friction = self.plant.friction(&v);
-        let n = self.plant.joints();
+        let (n, friction) = (self.plant.joints(), self.plant.friction(&v));
         let motion = PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
             friction: &friction[..n],
-            ..PlantState::default()
+            ..seen(n, t, [&q, &v], z)
         };
-        let mut acting = [1.0; J];
-        self.effects.drive(&mut acting);
-        let mut added = self.plant.offset;
-        self.effects.torque(&motion, &mut added);
-        let mut share = [[0.0; 2]; J];
-        self.effects.load(&motion, &mut share);
+        let (mut added, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
+        self.effects.each(&motion, |effect, m| {
+            effect.drive(&mut acting);
+            effect.torque(m, &mut added);
+            effect.load(m, &mut share);
+        });
         let torque = self.plant.mechanism.torque(&q, &self.volts);
         let (mass, bias) = self.body(t, link, speed, z);
         let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
@@ -79,25 +72,16 @@ impl<const J: usize> Moving<'_, J> {
             let mut net: [f64; J] =
                 std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i] - taken[i]);
             // tau_l (1 + share) = net is linear on each side of zero.
-            let mut load: [f64; J] = std::array::from_fn(|i| {
-                let [positive, negative] = share[i];
-                net[i] / (1.0 + if net[i] > 0.0 { positive } else { negative })
-            });
+            let mut load: [f64; J] =
+                std::array::from_fn(|i| net[i] / (1.0 + side(share[i], net[i])));
             for twist in self.effects.twists(z) {
-                let [positive, negative] = share[twist.joint];
                 load[twist.joint] = twist.torque;
-                net[twist.joint] -= twist.torque
-                    * if twist.torque > 0.0 {
-                        positive
-                    } else {
-                        negative
-                    };
+                net[twist.joint] -= twist.torque * side(share[twist.joint], twist.torque);
             }
             let driven: [f64; J] = std::array::from_fn(|i| load[i] - bias[i]);
-            let solved = if symmetric {
-                self.plant.solve(&mass, &driven)
-            } else {
-                eliminate(mass, driven)
+            let solved = match symmetric {
+                true => self.plant.solve(&mass, &driven),
+                false => eliminate(mass, driven),
             };
             (net, load, solved.unwrap_or([f64::NAN; J]))
         };
@@ -112,8 +96,7 @@ impl<const J: usize> Moving<'_, J> {
         }
     }
 
-    /// The torque that effects take by the accelerations and loads that are left when they have taken it: Newton's
-    /// method, by differences, on their joints; NaN where it finds none.
+    /// The torque that effects take by the accelerations and loads it leaves, by Newton's method; NaN where it finds none.
     fn implicit(
         &self,
         respond: &impl Fn(&[f64; J]) -> ([f64; J], [f64; J], [f64; J]),
@@ -128,7 +111,7 @@ impl<const J: usize> Moving<'_, J> {
             return taken;
         }
         let n = self.plant.joints();
-        let left = |taken: &[f64; J]| {
+        let left = |taken: &[f64; J]| -> ([f64; J], [f64; J]) {
             let (net, load, a) = respond(taken);
             let motion = PlantState {
                 a: &a[..n],
@@ -136,9 +119,9 @@ impl<const J: usize> Moving<'_, J> {
                 ..*motion
             };
             let mut wanted = [0.0; J];
-            self.effects.implicit(&motion, &mut wanted);
-            let left: [f64; J] = std::array::from_fn(|i| wanted[i] - taken[i]);
-            (left, net)
+            let each = |effect: &dyn Effect, m: &PlantState| effect.implicit(m, &mut wanted);
+            self.effects.each(&motion, each);
+            (std::array::from_fn(|i| wanted[i] - taken[i]), net)
         };
         for _ in 0..MOST_STEPS {
             let (rest, net) = left(&taken);
@@ -178,16 +161,11 @@ impl<const J: usize> Moving<'_, J> {
     fn body(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([[f64; J]; J], [f64; J]) {
         let n = self.plant.joints();
         let (mut mass, mut bias) = self.plant.rigid(q, v);
-        let motion = PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
-            ..PlantState::default()
-        };
         gather(&mut mass, n);
         let flat = &mut mass.as_flattened_mut()[..n * n];
-        self.effects.inertia(&motion, flat, &mut bias[..n]);
+        let motion = seen(n, t, [q, v], z);
+        let each = |effect: &dyn Effect, m: &PlantState| effect.inertia(m, flat, &mut bias[..n]);
+        self.effects.each(&motion, each);
         spread(&mut mass, n);
         (mass, bias)
     }
@@ -198,29 +176,25 @@ impl<const J: usize> Moving<'_, J> {
         let n = self.plant.joints();
         let friction = self.plant.friction(v);
         let motion = PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
             friction: &friction[..n],
-            ..PlantState::default()
+            ..seen(n, t, [q, v], z)
         };
-        let mut torque = self.plant.offset;
-        self.effects.torque(&motion, &mut torque);
+        let (mut torque, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
+        self.effects.each(&motion, |effect, m| {
+            effect.drive(&mut acting);
+            effect.torque(m, &mut torque);
+            effect.load(m, &mut share);
+        });
         let still = [0.0; J];
         let at_rest = PlantState {
             a: &still[..n],
             load: &load[..n],
             ..motion
         };
-        self.effects.implicit(&at_rest, &mut torque);
-        let mut share = [[0.0; 2]; J];
-        self.effects.load(&motion, &mut share);
-        let mut acting = [1.0; J];
-        self.effects.drive(&mut acting);
+        let each = |effect: &dyn Effect, m: &PlantState| effect.implicit(m, &mut torque);
+        self.effects.each(&at_rest, each);
         std::array::from_fn(|i| {
-            let [positive, negative] = share[i];
-            let beside = load[i] * if load[i] > 0.0 { positive } else { negative };
+            let beside = load[i] * side(share[i], load[i]);
             (load[i] + beside + friction[i] + torque[i]) / acting[i]
         })
     }
@@ -240,14 +214,10 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
         dydt[2 * J..].fill(0.0);
         let n = self.plant.joints();
         let motion = PlantState {
-            t,
-            q: &balance.q[..n],
-            v: &balance.v[..n],
-            z,
             friction: &balance.friction[..n],
             a: &balance.acceleration[..n],
             net: &balance.net[..n],
-            ..PlantState::default()
+            ..seen(n, t, [&balance.q, &balance.v], z)
         };
         self.effects.rates(&motion, &mut dydt[2 * J..]);
     }
@@ -257,16 +227,31 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
             return false;
         }
         let z = &y[2 * J..];
-        let n = self.plant.joints();
         let (q, v) = self.motor_side(&part::<J, N>(y, 0), &part::<J, N>(y, J), z);
-        self.effects.moved(&PlantState {
-            t,
-            q: &q[..n],
-            v: &v[..n],
-            z,
-            ..PlantState::default()
-        })
+        let n = self.plant.joints();
+        self.effects.moved(&seen(n, t, [&q, &v], z))
     }
+}
+
+/// What effects see of a motion of n joints.
+fn seen<'a, const J: usize>(
+    n: usize,
+    t: f64,
+    [q, v]: [&'a [f64; J]; 2],
+    z: &'a [f64],
+) -> PlantState<'a> {
+    PlantState {
+        t,
+        q: &q[..n],
+        v: &v[..n],
+        z,
+        ..PlantState::default()
+    }
+}
+
+/// The share of a load on its side of zero.
+fn side([positive, negative]: [f64; 2], load: f64) -> f64 {
+    if load > 0.0 { positive } else { negative }
 }
 
 /// x with M x = b for any invertible M, by elimination with row exchange; `None` where M is not invertible.

@@ -3,7 +3,7 @@
 use super::SimulateError;
 use super::mechanism::Mechanism;
 use super::reference::{
-    LadderPlan, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
+    LadderPlan, LadderReference, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
 };
 use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::Robot;
@@ -35,14 +35,11 @@ impl Mover {
         if let Some(motors) = robot.transmission().coordinates() {
             known.extend(motors.iter().map(|&motor| motor.to_owned()));
         }
-        match known.iter().position(|n| n == name) {
-            Some(place) if place < joints => Ok(Self::Joint(place)),
-            Some(place) => Ok(Self::Motor(place - joints)),
-            None => Err(SimulateError::UnknownJoint {
-                name: name.to_owned(),
-                known: known.join(", "),
-            }),
-        }
+        let place = SimulateError::place_of(&known, name)?;
+        Ok(match place.checked_sub(joints) {
+            None => Self::Joint(place),
+            Some(motor) => Self::Motor(motor),
+        })
     }
 
     fn index(self) -> usize {
@@ -63,8 +60,7 @@ impl Mover {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OneJointMove {
     pub mover: Mover,
-    /// Range of the mover, m or rad; what the limits leave in the middle of the others, with a margin, where
-    /// absent.
+    /// Range of the mover, m or rad; what the limits leave with a margin, the others in their middle, where absent.
     pub range: Option<(f64, f64)>,
     /// Middle part of the range that the limits leave; all of it, 1, unless asked for.
     pub part: f64,
@@ -122,45 +118,32 @@ impl OneJointMove {
     ) -> Result<Reference<J>, SimulateError> {
         let (m, place) = (mechanism, self.mover.index());
         if place >= m.joints() {
-            return Err(SimulateError::UnknownJoint {
-                name: format!("number {place}"),
-                known: m.robot.joint_names().join(", "),
-            });
+            let (name, known) = (format!("number {place}"), m.robot.joint_names());
+            return Err(SimulateError::unknown_joint(name, known));
         }
         let (frame, mut pose, room) = self.room(m)?;
         let range = self.within(&room);
-        let low = room.range.0 - 1e-9;
         // what stands at the joint itself is looked at while it runs
-        if !m.motors_at_joints() && (range.0 < low || range.1 > room.range.1 + 1e-9) {
-            return Err(SimulateError::Reference {
-                what: format!(
-                    "{} cannot move over [{}, {}]: at this pose the limits leave [{:.4}, {:.4}]",
-                    self.mover.name(&m.robot),
-                    range.0,
-                    range.1,
-                    room.range.0,
-                    room.range.1
-                )
-                .into(),
-            });
+        let beyond = range.0 < room.range.0 - 1e-9 || range.1 > room.range.1 + 1e-9;
+        if beyond && !m.motors_at_joints() {
+            let (name, (from, to)) = (self.mover.name(&m.robot), room.range);
+            return Err(SimulateError::reference(format!(
+                "{name} cannot move over [{}, {}]: at this pose the limits leave [{from:.4}, {to:.4}]",
+                range.0, range.1
+            )));
         }
         let ladder = self.ladder(m, range, &room)?;
         pose[place] = ladder.at(0.0).0;
-        Ok(Reference {
-            frame,
-            path: Path::Ladder {
-                moving: place,
-                pose,
-                ladder,
-            },
-        })
+        let path = Path::Ladder {
+            moving: place,
+            pose,
+            ladder,
+        };
+        Ok(Reference { frame, path })
     }
 
     /// The range that the mover runs over.
-    ///
-    /// # Errors
-    /// [`SimulateError`] where its travel is not known.
-    pub fn travel<const J: usize>(
+    pub(crate) fn travel<const J: usize>(
         &self,
         mechanism: &Mechanism<J>,
     ) -> Result<(f64, f64), SimulateError> {
@@ -194,11 +177,10 @@ impl OneJointMove {
         let known = self.range.unwrap_or(room.range);
         if !(known.0.is_finite() && known.1.is_finite()) {
             let name = self.mover.name(&m.robot);
-            return Err(SimulateError::Reference {
-                what: ErrorText::new(format!("the travel of {name} is not known")).remedy(format!(
-                    "write `[limits.{name}] position = [low, high]` into the robot file"
-                )),
-            });
+            let remedy =
+                format!("write `[limits.{name}] position = [low, high]` into the robot file");
+            let what = ErrorText::new(format!("the travel of {name} is not known"));
+            return Err(SimulateError::reference(what.remedy(remedy)));
         }
         let frame = match self.mover {
             Mover::Joint(_) => ReferenceFrame::Joints,
@@ -212,7 +194,7 @@ impl OneJointMove {
         m: &Mechanism<J>,
         range: (f64, f64),
         room: &Travel,
-    ) -> Result<super::reference::LadderReference, SimulateError> {
+    ) -> Result<LadderReference, SimulateError> {
         let place = self.mover.index();
         let given = m.given.get(&self.mover.name(&m.robot));
         let of_practice = m.practice.as_ref().map(|practice| match self.mover {
@@ -220,8 +202,7 @@ impl OneJointMove {
             Mover::Motor(_) => practice.coordinate_ladders[place],
         });
         let whole = self.range.unwrap_or(room.range);
-        let acceleration = of_practice
-            .map(|[_, acceleration]| acceleration)
+        let acceleration = (of_practice.map(|[_, acceleration]| acceleration))
             .or_else(|| given?.acceleration)
             .unwrap_or(STROKES * (whole.1 - whole.0));
         // strokes last as long as those of the whole range, so that the controller follows them as well

@@ -12,7 +12,6 @@ use super::plant::Plant;
 use super::recorder::{Recorder, Waiting};
 use super::reference::Path;
 use super::run::{MotorInput, Start, run_in_blocks};
-use super::settings::Settings;
 use super::settings_file;
 use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 use super::temperature::PlantTemperatures;
@@ -121,25 +120,19 @@ pub fn simulate_from(
     order: &Order,
     initial: Option<&InitialConditions>,
 ) -> Result<SimulatedLog, SimulateError> {
-    #[derive(Default)]
-    struct InMemory {
-        header: Vec<String>,
-        values: Vec<f64>,
-    }
+    struct InMemory(Vec<String>, Vec<f64>);
     impl Rows for InMemory {
         fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()> {
-            if self.header.is_empty() {
-                self.header = header.to_vec();
-            }
-            self.values.extend_from_slice(values);
+            self.0 = header.to_vec();
+            self.1.extend_from_slice(values);
             ControlFlow::Continue(())
         }
     }
-    let mut rows = InMemory::default();
+    let mut rows = InMemory(Vec::new(), Vec::new());
     let simulated = run_any(order, initial, &mut rows, true)?;
     Ok(SimulatedLog {
-        header: rows.header,
-        values: rows.values,
+        header: rows.0,
+        values: rows.1,
         truth: simulated.truth,
         limits: simulated.limits,
         ending: simulated.ending,
@@ -194,16 +187,12 @@ fn run_order<const J: usize>(
     settings.seed = order.seed;
     // A fault of the data may reach back, or ahead, as far as it likes.
     let in_memory = in_memory || effects.first_fault().is_some();
-    let length = |settings: &Settings<J>| match in_memory {
-        true => settings.samples_in_memory(),
-        false => settings.samples(),
-    };
     // before a ladder of that length is built
-    length(&settings)?;
+    settings.samples(in_memory)?;
     let (drive, own_seconds) = drive(order, &plant)?;
     let start = initial.map_or(Ok(Start::Settled), |given| given.start(mechanism))?;
     settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
-    length(&settings)?;
+    settings.samples(in_memory)?;
 
     let mut recorder = Recorder::new(&settings.sensors, settings.seed);
     let mut waiting = Waiting::new(mechanism.joints());
@@ -223,10 +212,13 @@ fn run_order<const J: usize>(
     )?;
     recorder.hear(&run);
     let layout = LogLayout::of(order.robot, &run, warm);
-    let mut saturated = Saturated::default();
+    let (mut saturated, mut given) = ([0_u64; J], 0_u64);
     let mut give = |run: &mut SimulatedRun<J>| {
         recorder.measure(run, mechanism, &effects);
-        saturated.add(run);
+        given += run.rows() as u64;
+        for (i, status) in run.status.iter().flat_map(|row| row.iter().enumerate()) {
+            saturated[i] += u64::from(*status == MotorStatus::Saturated);
+        }
         go_on(rows.take(&layout.header, &layout.values(run)))
     };
     match in_memory {
@@ -239,9 +231,10 @@ fn run_order<const J: usize>(
             }
         }
     }
+    let shares = saturated.map(|count| count as f64 / given.max(1) as f64);
     Ok(SimulationSummary {
         truth: truth_of(order, &plant, &run, effect_values),
-        saturated: saturated.shares(&run.coordinates),
+        saturated: run.coordinates.iter().cloned().zip(shares).collect(),
         ending: run.ending,
         limits: run.limits,
     })
@@ -251,33 +244,6 @@ fn go_on(wish: ControlFlow<()>) -> Result<(), SimulateError> {
     match wish {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(SimulateError::Stopped),
-    }
-}
-
-/// How often the amplifiers saturate.
-#[derive(Debug, Default)]
-struct Saturated {
-    /// Saturated rows of each motor.
-    counts: Vec<u64>,
-    rows: u64,
-}
-
-impl Saturated {
-    fn add<const J: usize>(&mut self, run: &SimulatedRun<J>) {
-        self.counts.resize(J, 0);
-        for status in &run.status {
-            for (count, status) in self.counts.iter_mut().zip(status) {
-                *count += u64::from(*status == MotorStatus::Saturated);
-            }
-        }
-        self.rows += run.rows() as u64;
-    }
-
-    /// Share of the rows, by coordinate.
-    fn shares(&self, coordinates: &[String]) -> Vec<(String, f64)> {
-        let rows = self.rows.max(1) as f64;
-        let shares = self.counts.iter().map(|count| *count as f64 / rows);
-        coordinates.iter().cloned().zip(shares).collect()
     }
 }
 
@@ -299,11 +265,8 @@ fn drive<const J: usize>(
         return Ok((MotorInput::Follow { reference, control }, seconds));
     }
     let Experiment::Volts { times, volts } = experiment else {
-        return Err(SimulateError::Reference {
-            what: "there is neither a reference nor a series of volts"
-                .to_owned()
-                .into(),
-        });
+        let what = "there is neither a reference nor a series of volts";
+        return Err(SimulateError::reference(ErrorText::new(what)));
     };
     let n = mechanism.joints();
     if !volts.len().is_multiple_of(n) {
@@ -322,7 +285,7 @@ fn drive<const J: usize>(
     Ok((MotorInput::Volts(series), seconds))
 }
 
-/// Effects of the model, then those of the order. An effect of the model that cannot be run names its table.
+/// Effects of the model, then those of the order.
 fn built_effects(
     order: &Order,
     sites: &Sites,
@@ -370,25 +333,25 @@ fn truth_of<const J: usize>(
     effects: Vec<EffectValue>,
 ) -> TruthFile {
     let robot = &plant.mechanism.robot;
-    let n = robot.joints();
+    let (n, setup) = (robot.joints(), robot.transmission().setup());
     let mut ending = match recording.ending {
         RunEnding::Completed => "completed".to_owned(),
         RunEnding::StoppedAtLimit => "stopped at a limit".to_owned(),
     };
-    for event in &recording.limits {
-        ending += &format!(
-            "; {} = {:.5} at t = {:.4} s",
-            event.coordinate, event.value, event.t
-        );
+    for LimitEvent {
+        coordinate,
+        value,
+        t,
+        ..
+    } in &recording.limits
+    {
+        ending += &format!("; {coordinate} = {value:.5} at t = {t:.4} s");
     }
     TruthFile {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: order.seed,
         model: order.robot.robot.model.name().to_owned(),
-        setup: robot
-            .transmission()
-            .setup()
-            .map(|setup| setup.name().to_owned()),
+        setup: setup.map(|setup| setup.name().to_owned()),
         ending,
         volt_noise: recording.volt_noise[..n].to_vec(),
         torque_noise: recording.torque_noise[..n].to_vec(),

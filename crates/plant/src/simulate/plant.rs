@@ -8,13 +8,11 @@ use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
 use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::dynamics::Dynamics;
-use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::robot_file::{FrictionLawKind, RobotFile};
 use cft_ident_files::config::{ConfigError, ModelFile};
 
-/// Poses at which the inertia matrix must be positive definite before anything is run, where a grid would
-/// be too many; and steps of a grid over at most [`GRIDDED`] coordinates.
+/// Poses at which the inertia matrix must be positive definite, and steps of a grid over at most [`GRIDDED`] coordinates.
 const POSES: usize = 64;
 const STEPS: usize = 12;
 const GRIDDED: usize = 3;
@@ -53,9 +51,8 @@ impl<const J: usize> Plant<J> {
         let middle = plant.mechanism.pose(&plant.mechanism.middle())?;
         let (mass, _) = plant.rigid(&middle, &[0.0; J]);
         plant.inertia = plant.mechanism.filled(|j| mass[j][j]);
-        plant.laws = (0..plant.mechanism.joints())
-            .map(|j| friction(j, plant.inertia[j]))
-            .collect();
+        let law = |j| friction(j, plant.inertia[j]);
+        plant.laws = (0..plant.joints()).map(law).collect();
         Ok(plant)
     }
 
@@ -88,12 +85,11 @@ impl<const J: usize> Plant<J> {
             }
             (None, None) => {
                 let what = match robot.joints() {
-                    1 => "a single joint",
-                    _ => "a serial robot",
+                    1 => "a single joint has no parameters of its own",
+                    _ => "a serial robot has no parameters of its own",
                 };
                 return Err(SimulateError::Unsupported {
-                    what: ErrorText::new(format!("{what} has no parameters of its own"))
-                        .remedy("give a model with -m"),
+                    what: ErrorText::new(what).remedy("give a model with -m"),
                 });
             }
         };
@@ -117,8 +113,7 @@ impl<const J: usize> Plant<J> {
     /// [`SimulateError::NotPositiveDefinite`] with the pose where the parameters are those of no body: an
     /// unconstrained fit can be so.
     pub fn check(&self) -> Result<(), SimulateError> {
-        let n = self.joints();
-        let m = &self.mechanism;
+        let (n, m) = (self.joints(), &self.mechanism);
         if n == 1 {
             // the inertia of a single joint is a parameter, reported by its name
             self.check_joint(0)?;
@@ -140,44 +135,17 @@ impl<const J: usize> Plant<J> {
         // that of one joint is a parameter; else M as a whole is looked at
         let inertia = self.joints() > 1 || (self.inertia[j] > 0.0 && self.inertia[j].is_finite());
         let gain = m.gain[j] > 0.0 && m.gain[j].is_finite();
-        let order = m.lower[j] < m.upper[j];
-        let findings = [
-            (
-                inertia,
-                "inertia",
-                self.inertia[j],
-                "must be above 0: no machine moves so; give a model whose parameters can exist (`lsq` of torques in N or N m writes them beside its fit)",
-            ),
-            (
-                self.laws[j].is_finite(),
-                "friction",
-                f64::NAN,
-                "must be finite",
-            ),
-            (
-                self.offset[j].is_finite(),
-                "offset",
-                self.offset[j],
-                "must be finite",
-            ),
-            (gain, "gain", m.gain[j], "must be above 0"),
-            (
-                m.resolution[j] >= 0.0,
-                "resolution",
-                m.resolution[j],
-                "must be 0 or more",
-            ),
-            (
-                order,
-                "lower limit",
-                m.lower[j],
-                "must lie below the upper limit",
-            ),
-        ];
-        match findings.into_iter().find(|(good, ..)| !good) {
-            None => Ok(()),
-            Some((_, name, value, rule)) => Err(SimulateError::Parameter { name, value, rule }),
-        }
+        let rule = "must be above 0: no machine moves so; give a model whose parameters can exist (`lsq` of torques in N or N m writes them beside its fit)";
+        SimulateError::require(inertia, "inertia", self.inertia[j], rule)?;
+        let friction = self.laws[j].is_finite();
+        SimulateError::require(friction, "friction", f64::NAN, "must be finite")?;
+        let offset = self.offset[j];
+        SimulateError::require(offset.is_finite(), "offset", offset, "must be finite")?;
+        SimulateError::require(gain, "gain", m.gain[j], "must be above 0")?;
+        let step = m.resolution[j];
+        SimulateError::require(step >= 0.0, "resolution", step, "must be 0 or more")?;
+        let rule = "must lie below the upper limit";
+        SimulateError::require(m.lower[j] < m.upper[j], "lower limit", m.lower[j], rule)
     }
 
     /// Inertia matrix M(q), and C(q, v) v + G(q).
@@ -198,11 +166,8 @@ impl<const J: usize> Plant<J> {
     /// Friction F(v) of each joint.
     #[inline]
     pub fn friction(&self, v: &[f64; J]) -> [f64; J] {
-        let mut torque = [0.0; J];
-        for ((torque, law), v) in torque.iter_mut().zip(&self.laws).zip(v) {
-            *torque = law.torque(*v);
-        }
-        torque
+        let law = |i: usize| self.laws.get(i).map_or(0.0, |law| law.torque(v[i]));
+        std::array::from_fn(law)
     }
 
     /// Inertia matrix M(q), and C(q, v) v + G(q) + F(v) with the offset.
@@ -237,26 +202,17 @@ fn law_of(
     (name, model): (&str, &ModelFile),
     joint: &str,
 ) -> Result<Law, ConfigError> {
-    let law = match (model.joint_friction(name, joint)?, declared) {
-        (JointFriction::None, FrictionLawKind::DoubleTanh) => {
-            JointFriction::DoubleTanh(model.double_tanh(name, joint)?)
-        }
+    let bent = |law| -> Law { Box::new(move |_| SmoothFriction::DoubleTanh(law)) };
+    let straight =
+        |law| -> Law { Box::new(move |inertia| SmoothFriction::viscous_coulomb(law, inertia)) };
+    Ok(match (model.joint_friction(name, joint)?, declared) {
+        (JointFriction::DoubleTanh(law), _) => bent(law),
+        (JointFriction::ViscousCoulomb(law), _) => straight(law),
+        (JointFriction::None, FrictionLawKind::DoubleTanh) => bent(model.double_tanh(name, joint)?),
         (JointFriction::None, FrictionLawKind::ViscousCoulomb) => {
-            JointFriction::ViscousCoulomb(model.viscous_coulomb(name, joint)?)
+            straight(model.viscous_coulomb(name, joint)?)
         }
-        (law, _) => law,
-    };
-    Ok(Box::new(move |inertia| match &law {
-        JointFriction::DoubleTanh(law) => SmoothFriction::DoubleTanh(*law),
-        JointFriction::ViscousCoulomb(law) => SmoothFriction::viscous_coulomb(*law, inertia),
-        JointFriction::None => {
-            let none = ViscousCoulomb {
-                viscous: 0.0,
-                coulomb: 0.0,
-            };
-            SmoothFriction::viscous_coulomb(none, inertia)
-        }
-    }))
+    })
 }
 
 /// A matrix of n x n numbers in a row to one of J x J, with ones on the diagonal beyond.
@@ -289,37 +245,33 @@ pub(super) fn gather<const J: usize>(mass: &mut [[f64; J]; J], n: usize) {
 }
 
 impl<const J: usize> Mechanism<J> {
-    /// Motors' coordinates all over the limits, the middle among them or their corners: a grid where few
-    /// coordinates matter, else a Weyl sequence, which fills the box evenly.
+    /// Motors' coordinates all over the limits: a grid where few of them matter, else a Weyl sequence, which fills the box.
     fn poses(&self) -> Vec<[f64; J]> {
         let n = self.joints();
         let uniform = self.practice.as_ref().map(|practice| practice.uniform);
         let matter: Vec<usize> = (0..n).filter(|i| Some(*i) != uniform).collect();
         if matter.len() > GRIDDED {
-            return (0..POSES)
-                .map(|pose| {
-                    self.filled(|j| {
-                        let share = (pose as f64 * (0.5 + j as f64).sqrt()).fract();
-                        let (low, high) = self.travel(j);
-                        let middle = 0.5 * (low + high);
-                        middle + (share - if pose == 0 { 0.0 } else { 0.5 }) * (high - low)
-                    })
+            let pose = |pose: usize| {
+                self.filled(|j| {
+                    let share = (pose as f64 * (0.5 + j as f64).sqrt()).fract();
+                    let (low, high) = self.travel(j);
+                    let middle = 0.5 * (low + high);
+                    middle + (share - if pose == 0 { 0.0 } else { 0.5 }) * (high - low)
                 })
-                .collect();
+            };
+            return (0..POSES).map(pose).collect();
         }
         let each = STEPS + 1;
-        (0..each.pow(matter.len() as u32))
-            .map(|pose| {
-                // the last coordinate runs fastest
-                let mut rest = pose;
-                let mut x = self.filled(|i| self.travel(i).0);
-                for &i in matter.iter().rev() {
-                    let (low, high) = self.travel(i);
-                    x[i] = low + (high - low) * (rest % each) as f64 / STEPS as f64;
-                    rest /= each;
-                }
-                x
-            })
-            .collect()
+        let pose = |mut rest: usize| {
+            let mut x = self.filled(|i| self.travel(i).0);
+            // the last coordinate runs fastest
+            for &i in matter.iter().rev() {
+                let (low, high) = self.travel(i);
+                x[i] = low + (high - low) * (rest % each) as f64 / STEPS as f64;
+                rest /= each;
+            }
+            x
+        };
+        (0..each.pow(matter.len() as u32)).map(pose).collect()
     }
 }

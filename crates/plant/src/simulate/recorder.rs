@@ -45,8 +45,7 @@ impl<'a, const J: usize> Recorder<'a, J> {
         self.torque.add(&rows.torque);
     }
 
-    /// Turns the next perfect rows into what is logged. All rows must have been heard. Faults are put into the
-    /// rows of this call as a whole log.
+    /// Turns the next perfect rows into what is logged, when all have been heard; faults take them for a whole log.
     pub fn measure(
         &mut self,
         rows: &mut SimulatedRun<J>,
@@ -78,7 +77,6 @@ pub(super) struct Waiting {
 }
 
 impl Waiting {
-    /// Of rows of that many joints.
     pub fn new(joints: usize) -> Self {
         Self {
             file: BufWriter::new(SpooledTempFile::new(IN_MEMORY)),
@@ -87,18 +85,16 @@ impl Waiting {
         }
     }
 
-    /// Adds rows.
-    ///
-    /// # Errors
-    /// [`SimulateError::Waiting`] where the temporary file cannot be written.
     pub fn push<const J: usize>(&mut self, rows: &SimulatedRun<J>) -> Result<(), SimulateError> {
         let n = self.joints;
         for k in 0..rows.rows() {
             let status = rows.status[k][..n].iter().map(|s| f64::from(s.code()));
             let parts = [&rows.x, &rows.volts, &rows.q, &rows.torque, &rows.actual.v];
             let numbers = parts
+                .map(|part| &part[k][..n])
                 .into_iter()
-                .flat_map(|part| part[k][..n].iter().copied());
+                .flatten()
+                .copied();
             for number in std::iter::once(rows.t[k]).chain(numbers).chain(status) {
                 self.file.write_all(&number.to_le_bytes())?;
             }
@@ -108,9 +104,6 @@ impl Waiting {
     }
 
     /// The rows again, from the first on.
-    ///
-    /// # Errors
-    /// [`SimulateError::Waiting`] where the temporary file cannot be read.
     pub fn rewind(self) -> Result<Waited, SimulateError> {
         let mut file = self.file.into_inner().map_err(|error| error.into_error())?;
         file.rewind()?;
@@ -130,11 +123,7 @@ pub(super) struct Waited {
 }
 
 impl Waited {
-    /// Puts the next rows, at most `most`, in place of those of `rows`; whether there were any. What was true
-    /// beside them is not kept.
-    ///
-    /// # Errors
-    /// [`SimulateError::Waiting`] where the temporary file cannot be read.
+    /// Puts the next rows, at most `most`, in place of those of `rows`; whether there were any.
     pub fn next<const J: usize>(
         &mut self,
         most: u64,
@@ -143,14 +132,16 @@ impl Waited {
         rows.clear();
         let count = self.left.min(most);
         for _ in 0..count {
-            rows.t.push(self.number()?);
-            for part in [
-                &mut rows.x,
-                &mut rows.volts,
-                &mut rows.q,
-                &mut rows.torque,
-                &mut rows.actual.v,
-            ] {
+            rows.t.push(number(&mut self.file)?);
+            let SimulatedRun {
+                x,
+                volts,
+                q,
+                torque,
+                actual,
+                ..
+            } = &mut *rows;
+            for part in [x, volts, q, torque, &mut actual.v] {
                 let mut row = [0.0; J];
                 for value in &mut row[..self.joints] {
                     *value = number(&mut self.file)?;
@@ -165,10 +156,6 @@ impl Waited {
         }
         self.left -= count;
         Ok(count > 0)
-    }
-
-    fn number(&mut self) -> Result<f64, SimulateError> {
-        number(&mut self.file)
     }
 }
 

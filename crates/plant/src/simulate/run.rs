@@ -1,7 +1,7 @@
 //! The experiment: sample, control, hold the volts, integrate to the next sample.
 
 use super::SimulateError;
-use super::controller::{Controller, ControllerSettings};
+use super::controller::ControllerSettings;
 use super::effects::{Beginning, Effects};
 use super::integrate::DormandPrince;
 use super::mechanism::Mechanism;
@@ -9,7 +9,7 @@ use super::moving::{Moving, part};
 use super::plant::Plant;
 use super::recorder::Recorder;
 use super::reference::{Reference, ReferenceFrame, Target};
-use super::settings::{OnLimit, Settings};
+use super::settings::Settings;
 use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 use super::volts::VoltSeries;
 
@@ -35,8 +35,7 @@ pub enum Start<const J: usize> {
     State { position: [f64; J], speed: [f64; J] },
 }
 
-/// State sizes that the integrator is compiled for with J joints: the smallest that holds the plant and its
-/// effects is used.
+/// State sizes that the integrator is compiled for with J joints: the smallest with room is used.
 const fn sizes(joints: usize) -> [usize; 4] {
     if joints <= 8 {
         [2, 8, 16, 64]
@@ -64,7 +63,7 @@ pub fn run<const J: usize>(
     drive: &MotorInput<J>,
     settings: &Settings<J>,
 ) -> Result<SimulatedRun<J>, SimulateError> {
-    settings.samples_in_memory()?;
+    settings.samples(true)?;
     let whole = &mut |_: &mut SimulatedRun<J>| Ok(());
     let (mut run, effects) = run_in_blocks(plant, effects, start, drive, settings, None, whole)?;
     let mut recorder = Recorder::new(&settings.sensors, settings.seed);
@@ -77,9 +76,7 @@ pub fn run<const J: usize>(
 pub(super) type HandOn<'a, const J: usize> =
     &'a mut dyn FnMut(&mut SimulatedRun<J>) -> Result<(), SimulateError>;
 
-/// Runs one experiment as [`run`] does, and hands every `block` rows on; what comes back has the last rows,
-/// fewer than a block, or all where no block is asked for. The rows are those of a perfect log: no noise, no
-/// fault, none lost.
+/// Runs as [`run`] does without noise, faults and losses, hands every `block` rows on and gives back the last.
 pub(super) fn run_in_blocks<const J: usize>(
     plant: &Plant<J>,
     effects: Effects,
@@ -112,33 +109,6 @@ pub(super) fn run_in_blocks<const J: usize>(
     Err(SimulateError::TooManyStates { states, most })
 }
 
-/// The drive with its memory.
-enum Running<'a, const J: usize> {
-    Follow(&'a Reference<J>, Controller<J>),
-    Volts(&'a VoltSeries<J>),
-}
-
-impl<const J: usize> Running<'_, J> {
-    /// What is wanted of the motors that stand at `coordinates` and are seen at `seen`, and the volts that are
-    /// asked for.
-    fn at(
-        &mut self,
-        mechanism: &Mechanism<J>,
-        t: f64,
-        coordinates: &[f64; J],
-        seen: &[f64; J],
-    ) -> Result<([f64; J], [f64; J]), SimulateError> {
-        Ok(match self {
-            Self::Follow(reference, controller) => {
-                let target = wanted(mechanism, reference, t)?;
-                let volts = controller.volts(t, seen, &target.position, &target.velocity);
-                (target.position, volts)
-            }
-            Self::Volts(series) => (*coordinates, series.at(t)),
-        })
-    }
-}
-
 fn march<const J: usize, const N: usize>(
     mut moving: Moving<J>,
     start: &Start<J>,
@@ -147,29 +117,31 @@ fn march<const J: usize, const N: usize>(
     block: Option<usize>,
     hand_on: HandOn<J>,
 ) -> Result<(SimulatedRun<J>, Effects), SimulateError> {
-    let plant = moving.plant;
-    let mechanism = &plant.mechanism;
-    let samples = settings.samples()?;
+    let mechanism = &moving.plant.mechanism;
+    let samples = settings.samples(false)?;
     let block = block.unwrap_or(samples);
     let sensors = &settings.sensors;
     let mut instants = sensors.instants(settings.rate_hz, settings.seed);
     let mut recording = SimulatedRun::empty(mechanism, samples.min(block));
     let mut integrator = DormandPrince::new(settings.tolerance);
     let mut y = initial_state::<J, N>(&mut moving, start, drive, settings)?;
-    let mut drive = match drive {
-        MotorInput::Follow { reference, control } => {
-            Running::Follow(reference, Controller::new(*control))
-        }
-        MotorInput::Volts(series) => Running::Volts(series),
-    };
+    let mut memory = None;
     let mut t = instants.next().unwrap_or(0.0);
     for k in 0..samples {
-        let beyond = limits_reached(&moving, settings.on_limit, t, &mut y, &mut recording)?;
         let (q, v) = (part::<J, N>(&y, 0), part::<J, N>(&y, J));
+        let at_links = mechanism.coordinates(&q);
+        let beyond = limits_reached(mechanism, t, &at_links, &mut recording)?;
         let (motors, _) = moving.motor_side(&q, &v, &y[2 * J..]);
         let coordinates = mechanism.coordinates(&motors);
         let seen = sensors.encoders(&coordinates, &mechanism.resolution);
-        let (wanted, asked) = drive.at(mechanism, t, &coordinates, &seen)?;
+        let (wanted, asked) = match drive {
+            MotorInput::Follow { reference, control } => {
+                let target = wanted(mechanism, reference, t);
+                let volts = control.volts(&mut memory, t, &seen, &target);
+                (target.position, volts)
+            }
+            MotorInput::Volts(series) => (coordinates, series.at(t)),
+        };
         let limit = settings.saturation;
         moving.volts = asked.map(|u| u.clamp(-limit, limit));
         let measured = mechanism.pose(&seen).unwrap_or(motors);
@@ -177,23 +149,21 @@ fn march<const J: usize, const N: usize>(
         recording.x.push(seen);
         recording.volts.push(moving.volts);
         recording.q.push(measured);
-        recording
-            .torque
-            .push(mechanism.torque(&measured, &moving.volts));
-        recording
-            .status
-            .push(std::array::from_fn(|i| match beyond[i] {
-                true => MotorStatus::LimitReached,
-                false if asked[i].abs() >= limit => MotorStatus::Saturated,
-                false => MotorStatus::Running,
-            }));
+        let logged = mechanism.torque(&measured, &moving.volts);
+        recording.torque.push(logged);
+        let status = |i: usize| match beyond[i] {
+            true => MotorStatus::LimitReached,
+            false if asked[i].abs() >= limit => MotorStatus::Saturated,
+            false => MotorStatus::Running,
+        };
+        recording.status.push(std::array::from_fn(status));
         let actual = &mut recording.actual;
         actual.q.push(q);
         actual.v.push(v);
         actual.torque.push(mechanism.torque(&motors, &moving.volts));
         actual.a.push(moving.acceleration(t, &y));
         actual.target.push(wanted);
-        if beyond.contains(&true) && settings.on_limit == OnLimit::Stop {
+        if beyond.contains(&true) {
             recording.ending = RunEnding::StoppedAtLimit;
             break;
         }
@@ -207,104 +177,42 @@ fn march<const J: usize, const N: usize>(
             }
         }
     }
-    recording.effort = integrator.effort();
     Ok((recording, moving.effects))
 }
 
 /// Target of a reference in motor coordinates.
-fn wanted<const J: usize>(
-    mechanism: &Mechanism<J>,
-    reference: &Reference<J>,
-    t: f64,
-) -> Result<Target<J>, SimulateError> {
+fn wanted<const J: usize>(mechanism: &Mechanism<J>, reference: &Reference<J>, t: f64) -> Target<J> {
     let target = reference.path.at(t);
-    Ok(match reference.frame {
+    match reference.frame {
         ReferenceFrame::Motors => target,
         ReferenceFrame::Joints => Target {
             position: mechanism.coordinates(&target.position),
             velocity: mechanism.coordinate_speeds(&target.position, &target.velocity),
         },
-    })
+    }
 }
 
-/// Marks the coordinates beyond their limits, notes the first time of each, and clamps if asked to.
-fn limits_reached<const J: usize, const N: usize>(
-    moving: &Moving<J>,
-    on_limit: OnLimit,
+/// Marks the coordinates that are at x beyond their limits, and notes where.
+fn limits_reached<const J: usize>(
+    mechanism: &Mechanism<J>,
     t: f64,
-    y: &mut [f64; N],
+    x: &[f64; J],
     recording: &mut SimulatedRun<J>,
 ) -> Result<[bool; J], SimulateError> {
-    let mechanism = &moving.plant.mechanism;
     let (lower, upper) = (&mechanism.lower, &mechanism.upper);
-    let mut q = part::<J, N>(y, 0);
-    let mut x = mechanism.coordinates(&q);
     let beyond: [bool; J] = std::array::from_fn(|i| !(lower[i]..=upper[i]).contains(&x[i]));
-    if !beyond.contains(&true) {
-        return Ok(beyond);
-    }
-    if x.iter().any(|x| !x.is_finite()) {
+    if beyond.contains(&true) && x.iter().any(|x| !x.is_finite()) {
         return Err(SimulateError::Diverged { t });
     }
-    for i in (0..J).filter(|&i| beyond[i]) {
-        let coordinate = &recording.coordinates[i];
-        if !recording
-            .limits
-            .iter()
-            .any(|event| event.coordinate == *coordinate)
-        {
-            recording.limits.push(LimitEvent {
-                coordinate: coordinate.clone(),
-                t,
-                value: x[i],
-                lower: lower[i],
-                upper: upper[i],
-            });
-        }
-        x[i] = x[i].clamp(lower[i], upper[i]);
-    }
-    if on_limit == OnLimit::Stop {
-        return Ok(beyond);
-    }
-    q = mechanism.pose(&x)?;
-    let mut v = part::<J, N>(y, J);
-    stop_at(moving.plant, &q, &x, &mut v, &beyond);
-    y[..J].copy_from_slice(&q);
-    y[J..2 * J].copy_from_slice(&v);
+    let reached = (0..J).filter(|&i| beyond[i]).map(|i| LimitEvent {
+        coordinate: recording.coordinates[i].clone(),
+        t,
+        value: x[i],
+        lower: lower[i],
+        upper: upper[i],
+    });
+    recording.limits.extend(reached);
     Ok(beyond)
-}
-
-/// Takes the outward speeds away of the motors that stand at a limit, x, by inelastic stops.
-fn stop_at<const J: usize>(
-    plant: &Plant<J>,
-    q: &[f64; J],
-    x: &[f64; J],
-    v: &mut [f64; J],
-    beyond: &[bool; J],
-) {
-    let mechanism = &plant.mechanism;
-    let (mass, _) = plant.dynamics(q, v);
-    // The stop pushes where the motor pushes: an impulse along motor i takes the outward speed away, and
-    // what it does to the other coordinates follows from the inertia. Two rounds settle two stops.
-    for i in (0..J).chain(0..J).filter(|&i| beyond[i]) {
-        let speed = mechanism.coordinate_speeds(q, v)[i];
-        let outward = if x[i] >= mechanism.upper[i] {
-            speed > 0.0
-        } else {
-            speed < 0.0
-        };
-        let mut push = [0.0; J];
-        push[i] = 1.0;
-        let Some(change) = plant.solve(&mass, &mechanism.torque(q, &push)) else {
-            continue;
-        };
-        let per_push = mechanism.coordinate_speeds(q, &change)[i];
-        if outward && per_push > 0.0 {
-            for (v, change) in v.iter_mut().zip(change) {
-                *v -= speed / per_push * change;
-            }
-        }
-    }
 }
 
 /// Joint positions, speeds and effect states at t = 0.
@@ -329,19 +237,12 @@ fn initial_state<const J: usize, const N: usize>(
             (middle, mechanism.pose(&middle)?, [0.0; J])
         }
         (Start::Settled, MotorInput::Follow { reference, control }) => {
-            let target = wanted(mechanism, reference, 0.0)?;
+            let target = wanted(mechanism, reference, 0.0);
             settle(moving, &target, control)?
         }
     };
-    for i in 0..J {
-        if !(lower[i]..=upper[i]).contains(&x[i]) {
-            return Err(SimulateError::LimitAtStart {
-                coordinate: mechanism.robot.coordinate_names()[i].clone(),
-                value: x[i],
-                lower: lower[i],
-                upper: upper[i],
-            });
-        }
+    if let Some(i) = (0..J).find(|&i| !(lower[i]..=upper[i]).contains(&x[i])) {
+        return Err(mechanism.beyond_at_start(i, x[i]));
     }
     let mut y = [0.0; N];
     y[..J].copy_from_slice(&q);

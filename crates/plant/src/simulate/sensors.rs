@@ -44,14 +44,11 @@ impl<const J: usize> Noise<J> {
             Self::Absolute(std) => *std,
             Self::Relative(share) => [*share; J],
         };
-        match levels.into_iter().find(|x| !(*x >= 0.0 && x.is_finite())) {
-            None => Ok(()),
-            Some(value) => Err(SimulateError::Parameter {
-                name,
-                value,
-                rule: "must be 0 or more",
-            }),
+        for value in levels {
+            let good = value >= 0.0 && value.is_finite();
+            SimulateError::require(good, name, value, "must be 0 or more")?;
         }
+        Ok(())
     }
 }
 
@@ -97,35 +94,26 @@ impl<const J: usize> Sensors<J> {
     pub fn check(&self) -> Result<(), SimulateError> {
         self.volt_noise.check("noise of the volts")?;
         self.torque_noise.check("noise of the torques")?;
-        let shares = [
+        for (name, value) in [
             ("jitter", self.jitter),
             ("share of dropouts", self.dropouts),
-        ];
-        for (name, value) in shares {
-            if !(0.0..1.0).contains(&value) {
-                return Err(SimulateError::Parameter {
-                    name,
-                    value,
-                    rule: "must be at least 0 and below 1",
-                });
-            }
+        ] {
+            let good = (0.0..1.0).contains(&value);
+            SimulateError::require(good, name, value, "must be at least 0 and below 1")?;
         }
         Ok(())
     }
 
     /// What the encoders show of the motor coordinates x.
     pub fn encoders(&self, x: &[f64; J], resolution: &[f64; J]) -> [f64; J] {
-        std::array::from_fn(|i| {
-            if self.quantisation && resolution[i] > 0.0 {
-                (x[i] / resolution[i]).round() * resolution[i]
-            } else {
-                x[i]
-            }
+        std::array::from_fn(|i| match self.quantisation && resolution[i] > 0.0 {
+            true => (x[i] / resolution[i]).round() * resolution[i],
+            false => x[i],
         })
     }
 
     /// Sampling instants \[s\] at the given rate, without end; the first is 0.
-    pub(crate) fn instants(&self, rate_hz: f64, seed: u64) -> impl Iterator<Item = f64> + use<J> {
+    pub(super) fn instants(&self, rate_hz: f64, seed: u64) -> impl Iterator<Item = f64> + use<J> {
         let mut chance = stream(seed, Purpose::Jitter);
         let jitter = self.jitter;
         (0_u64..).map(move |k| {
@@ -141,9 +129,8 @@ impl<const J: usize> Sensors<J> {
 
     /// Which of the next rows are kept.
     pub(super) fn kept(&self, rows: usize, chance: &mut ChaCha8Rng) -> Vec<bool> {
-        (0..rows)
-            .map(|_| chance.random::<f64>() >= self.dropouts)
-            .collect()
+        let kept = (0..rows).map(|_| chance.random::<f64>() >= self.dropouts);
+        kept.collect()
     }
 }
 
@@ -221,11 +208,8 @@ mod tests {
         assert!((deviation[1] - 0.01 * 0.5f64.sqrt()).abs() < 1e-12);
         let mut noisy = clean.clone();
         disturb(&mut noisy, &deviation, &mut stream(5, Purpose::Torque));
-        let differences: Vec<[f64; 2]> = noisy
-            .iter()
-            .zip(&clean)
-            .map(|(a, b)| [a[0] - b[0], a[1] - b[1]])
-            .collect();
+        let pairs = noisy.iter().zip(&clean);
+        let differences: Vec<[f64; 2]> = pairs.map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
         let measured = rms(&differences);
         for (found, asked) in measured.iter().zip(&deviation) {
             assert!((found / asked - 1.0).abs() < 0.02, "{found} for {asked}");
@@ -236,11 +220,8 @@ mod tests {
     fn instants_increase_at_any_jitter_and_are_even_without() {
         let mut sensors = Sensors::<1>::default();
         let even: Vec<f64> = sensors.instants(500.0, 1).take(1001).collect();
-        assert!(
-            even.iter()
-                .enumerate()
-                .all(|(k, t)| (t - 0.002 * k as f64).abs() < 1e-12)
-        );
+        let mut steps = even.iter().enumerate();
+        assert!(steps.all(|(k, t)| (t - 0.002 * k as f64).abs() < 1e-12));
         sensors.jitter = 0.9;
         let uneven: Vec<f64> = sensors.instants(500.0, 1).take(1001).collect();
         assert!(uneven.windows(2).all(|t| t[1] > t[0]));
@@ -253,11 +234,8 @@ mod tests {
         let mut chance = stream(2, Purpose::Dropout);
         assert!(sensors.kept(1000, &mut chance).iter().all(|kept| *kept));
         sensors.dropouts = 0.1;
-        let lost = sensors
-            .kept(20_000, &mut chance)
-            .iter()
-            .filter(|kept| !**kept)
-            .count();
+        let kept = sensors.kept(20_000, &mut chance);
+        let lost = kept.iter().filter(|kept| !**kept).count();
         assert!((1800..2200).contains(&lost), "{lost}");
     }
 

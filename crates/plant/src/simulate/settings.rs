@@ -4,16 +4,6 @@ use super::SimulateError;
 use super::integrate::Tolerance;
 use super::sensors::Sensors;
 
-/// What happens when a motor coordinate leaves its limits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum OnLimit {
-    /// The run ends at that sample.
-    #[default]
-    Stop,
-    /// The coordinate stays at the limit by an inelastic stop, looked at once per sample.
-    Clamp,
-}
-
 /// How the experiment is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings<const J: usize> {
@@ -24,7 +14,6 @@ pub struct Settings<const J: usize> {
     /// Largest voltage of the amplifiers, in both directions \[V\].
     pub saturation: f64,
     pub tolerance: Tolerance,
-    pub on_limit: OnLimit,
     pub sensors: Sensors<J>,
     pub seed: u64,
 }
@@ -37,17 +26,12 @@ const MOST_NUMBERS: f64 = (1u64 << 28) as f64;
 const NUMBERS_OF_JOINT: usize = 13;
 
 impl<const J: usize> Settings<J> {
-    /// Rows of the log.
-    pub(super) fn samples(&self) -> Result<usize, SimulateError> {
-        self.at_most(MOST_ROWS)
-    }
-
-    /// Rows of a log that is wanted as a whole.
-    pub(super) fn samples_in_memory(&self) -> Result<usize, SimulateError> {
-        self.at_most((MOST_NUMBERS / (NUMBERS_OF_JOINT * J + 2) as f64).floor())
-    }
-
-    fn at_most(&self, most: f64) -> Result<usize, SimulateError> {
+    /// Rows of the log, handed on block by block or wanted as a whole.
+    pub(super) fn samples(&self, in_memory: bool) -> Result<usize, SimulateError> {
+        let most = match in_memory {
+            true => (MOST_NUMBERS / (NUMBERS_OF_JOINT * J + 2) as f64).floor(),
+            false => MOST_ROWS,
+        };
         let rows = (self.seconds * self.rate_hz).round().max(1.0);
         if rows > most {
             return Err(SimulateError::TooLong {
@@ -67,7 +51,6 @@ impl<const J: usize> Settings<J> {
             rate_hz: 1000.0,
             saturation: 10.0,
             tolerance: Tolerance::default(),
-            on_limit: OnLimit::Stop,
             sensors: Sensors::default(),
             seed: 0,
         }
@@ -77,32 +60,15 @@ impl<const J: usize> Settings<J> {
     /// [`SimulateError::Parameter`] for the first number that no experiment can have.
     pub fn check(&self) -> Result<(), SimulateError> {
         self.sensors.check()?;
-        let numbers = [
-            ("duration", self.seconds, "must be above 0 s and finite"),
-            ("rate", self.rate_hz, "must be above 0 Hz and finite"),
-            (
-                "absolute tolerance",
-                self.tolerance.absolute,
-                "must be above 0",
-            ),
-            (
-                "relative tolerance",
-                self.tolerance.relative,
-                "must be above 0",
-            ),
-        ];
-        for (name, value, rule) in numbers {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(SimulateError::Parameter { name, value, rule });
-            }
-        }
-        if self.saturation.is_nan() || self.saturation <= 0.0 {
-            return Err(SimulateError::Parameter {
-                name: "saturation",
-                value: self.saturation,
-                rule: "must be above 0 V",
-            });
-        }
-        Ok(())
+        let finite = |x: f64| x > 0.0 && x.is_finite();
+        let rule = "must be above 0 s and finite";
+        SimulateError::require(finite(self.seconds), "duration", self.seconds, rule)?;
+        let rule = "must be above 0 Hz and finite";
+        SimulateError::require(finite(self.rate_hz), "rate", self.rate_hz, rule)?;
+        let (Tolerance { absolute, relative }, rule) = (self.tolerance, "must be above 0");
+        SimulateError::require(finite(absolute), "absolute tolerance", absolute, rule)?;
+        SimulateError::require(finite(relative), "relative tolerance", relative, rule)?;
+        let (most, rule) = (self.saturation, "must be above 0 V");
+        SimulateError::require(most > 0.0, "saturation", most, rule)
     }
 }

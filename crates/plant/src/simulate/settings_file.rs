@@ -27,10 +27,9 @@ pub(super) fn control<const J: usize>(
         }
     };
     // Gains without a derivative part are the report's P controller.
-    let derivative = if section.kp.is_empty() {
-        usual.derivative
-    } else {
-        [0.0; J]
+    let derivative = match section.kp.is_empty() {
+        true => usual.derivative,
+        false => [0.0; J],
     };
     Ok(ControllerSettings {
         proportional: gains("number of gains kp", &section.kp, usual.proportional)?,
@@ -39,7 +38,7 @@ pub(super) fn control<const J: usize>(
     })
 }
 
-/// Rate, saturation and sensors of `[control]`, `[limits]` and `[sensors]`; duration and seed are left as they are by default.
+/// Rate, saturation and sensors of `[control]`, `[limits]` and `[sensors]`.
 pub(super) fn settings<const J: usize>(
     file: &RobotFile,
     mechanism: &Mechanism<J>,
@@ -86,8 +85,7 @@ pub(super) fn settings<const J: usize>(
     Ok(settings)
 }
 
-/// Largest drive of the motors \[V\], the same for all: `[control] saturation_v`, that of known amplifiers,
-/// or what bounds the torque of one joint alone.
+/// Largest drive of the motors \[V\]: `[control] saturation_v`, that of known amplifiers, or the torque of one joint alone.
 fn saturation<const J: usize>(file: &RobotFile, mechanism: &Mechanism<J>) -> f64 {
     let amplifiers = mechanism.practice.as_ref().map(|practice| practice.volts);
     let own = || match mechanism.robot.joint_names() {

@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::effects::LoggedChannels;
-use super::integrate::Effort;
 use super::mechanism::Mechanism;
 
 /// State of one motor channel at a sample (the status output of the report's Figure 9).
@@ -26,10 +25,9 @@ impl MotorStatus {
 
     /// The state that [`Self::code`] names so.
     pub(super) fn of_code(code: f64) -> Self {
-        [Self::Running, Self::Saturated, Self::LimitReached]
-            .into_iter()
-            .find(|status| f64::from(status.code()) == code)
-            .unwrap_or_default()
+        let all = [Self::Running, Self::Saturated, Self::LimitReached];
+        let named = |status: &Self| f64::from(status.code()) == code;
+        all.into_iter().find(named).unwrap_or_default()
     }
 }
 
@@ -87,41 +85,36 @@ pub struct SimulatedRun<const J: usize> {
     pub torque: Vec<[f64; J]>,
     pub status: Vec<[MotorStatus; J]>,
     pub actual: Actual<J>,
-    /// The first time that each coordinate reached a limit.
+    /// The limits at which it ended.
     pub limits: Vec<LimitEvent>,
     pub ending: RunEnding,
     /// Standard deviation of the noise on the volts \[V\].
     pub volt_noise: [f64; J],
     /// Standard deviation of the noise on the torques themselves, N or N m.
     pub torque_noise: [f64; J],
-    /// What the integration cost.
-    pub effort: Effort,
 }
 
 impl<const J: usize> SimulatedRun<J> {
     pub(super) fn empty(mechanism: &Mechanism<J>, rows: usize) -> Self {
-        Self {
+        let mut run = Self {
             joints: mechanism.robot.joint_names().to_vec(),
             coordinates: mechanism.robot.coordinate_names(),
             t: Vec::with_capacity(rows),
-            x: Vec::with_capacity(rows),
-            volts: Vec::with_capacity(rows),
-            q: Vec::with_capacity(rows),
-            torque: Vec::with_capacity(rows),
+            x: Vec::new(),
+            volts: Vec::new(),
+            q: Vec::new(),
+            torque: Vec::new(),
             status: Vec::with_capacity(rows),
-            actual: Actual {
-                q: Vec::with_capacity(rows),
-                v: Vec::with_capacity(rows),
-                torque: Vec::with_capacity(rows),
-                a: Vec::with_capacity(rows),
-                target: Vec::with_capacity(rows),
-            },
+            actual: Actual::default(),
             limits: Vec::new(),
             ending: RunEnding::Completed,
             volt_noise: [0.0; J],
             torque_noise: [0.0; J],
-            effort: Effort::default(),
+        };
+        for column in run.columns() {
+            column.reserve_exact(rows);
         }
+        run
     }
 
     /// Number of rows.
@@ -169,35 +162,6 @@ impl<const J: usize> SimulatedRun<J> {
             q: self.q.as_flattened_mut(),
             torque: self.torque.as_flattened_mut(),
             joints: J,
-        }
-    }
-
-    /// Column names of the log: t, q_*, tau_*, and with `raw` also the motor coordinates, u_1.. and
-    /// status_1...
-    pub fn header(&self, raw: bool) -> Vec<String> {
-        let mut names = vec!["t".to_owned()];
-        names.extend(self.joints.iter().map(|joint| format!("q_{joint}")));
-        names.extend(self.joints.iter().map(|joint| format!("tau_{joint}")));
-        if raw {
-            names.extend(self.coordinates.iter().cloned());
-            let motors = 1..=self.coordinates.len();
-            names.extend(motors.clone().map(|i| format!("u_{i}")));
-            names.extend(motors.map(|i| format!("status_{i}")));
-        }
-        names
-    }
-
-    /// Writes row k into `out`, in the order of [`Self::header`].
-    pub fn row(&self, k: usize, raw: bool, out: &mut Vec<f64>) {
-        let n = self.joints.len();
-        out.clear();
-        out.push(self.t[k]);
-        out.extend(&self.q[k][..n]);
-        out.extend(&self.torque[k][..n]);
-        if raw {
-            out.extend(&self.x[k][..n]);
-            out.extend(&self.volts[k][..n]);
-            out.extend(self.status[k][..n].iter().map(|s| f64::from(s.code())));
         }
     }
 }

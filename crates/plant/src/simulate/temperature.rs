@@ -1,4 +1,4 @@
-//! PlantTemperatures of the simulated drives: of first order, towards a warmer end while the robot works and back in its
+//! Temperatures of the simulated drives: of first order, towards a warmer end while the robot works and back in its
 //! pauses. Nothing in the motion changes them.
 
 use std::collections::BTreeMap;

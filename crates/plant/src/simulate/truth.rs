@@ -51,12 +51,11 @@ impl<const J: usize> Plant<J> {
     pub fn parameters(&self) -> Vec<Parameter> {
         let robot = &self.mechanism.robot;
         let inertial = robot.parameters().iter().zip(self.theta());
-        let mut parameters: Vec<Parameter> = inertial
-            .map(|(info, value)| Parameter {
-                theta: info.theta,
-                ..parameter(&info.name, None, *value, &info.unit, &info.meaning)
-            })
-            .collect();
+        let inertial = inertial.map(|(info, value)| Parameter {
+            theta: info.theta,
+            ..parameter(&info.name, None, *value, &info.unit, &info.meaning)
+        });
+        let mut parameters: Vec<Parameter> = inertial.collect();
         for (j, (joint, law)) in robot.joint_names().iter().zip(&self.laws).enumerate() {
             let torque = robot.joint_unit(j);
             let own = |name: &str, value: f64, meaning: &str| {
@@ -100,18 +99,12 @@ fn parameter(name: &str, joint: Option<&str>, value: f64, unit: &str, meaning: &
 }
 
 impl TruthFile {
-    /// The file's text.
-    ///
-    /// # Errors
-    /// What the TOML writer says of a number that it cannot write.
+    /// The file's text, or what the TOML writer says of a number that it cannot write.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string_pretty(self)
     }
 
-    /// The truth from the file's text.
-    ///
-    /// # Errors
-    /// What the TOML reader says, with line and column.
+    /// The truth from the file's text, or what the TOML reader says, with line and column.
     pub fn parse(text: &str) -> Result<Self, toml::de::Error> {
         toml::from_str(text)
     }

@@ -16,33 +16,19 @@ impl<const J: usize> VoltSeries<J> {
     /// [`SimulateError::Volts`] when the series is empty, its times do not increase, its lengths differ
     /// or a number is not finite.
     pub fn new(times: Vec<f64>, volts: Vec<[f64; J]>) -> Result<Self, SimulateError> {
-        let reject = |what: ErrorText| Err(SimulateError::Volts { what });
-        if times.len() != volts.len() || times.is_empty() {
-            return reject(
-                ErrorText::new(format!(
-                    "{} times and {} rows of volts",
-                    times.len(),
-                    volts.len()
-                ))
-                .remedy("give as many of each, at least one"),
-            );
-        }
-        if let Some(k) = times.windows(2).position(|t| t[1] <= t[0]) {
-            return reject(
-                format!(
-                    "time does not increase from {} s to {} s at row {}",
-                    times[k],
-                    times[k + 1],
-                    k + 2
-                )
-                .into(),
-            );
-        }
-        let numbers = times.iter().chain(volts.as_flattened());
-        if numbers.into_iter().any(|x| !x.is_finite()) {
-            return reject("a time or a voltage is not finite".to_owned().into());
-        }
-        Ok(Self { times, volts })
+        let mut numbers = times.iter().chain(volts.as_flattened());
+        let what = if times.len() != volts.len() || times.is_empty() {
+            let text = format!("{} times and {} rows of volts", times.len(), volts.len());
+            ErrorText::new(text).remedy("give as many of each, at least one")
+        } else if let Some(k) = times.windows(2).position(|t| t[1] <= t[0]) {
+            let (from, to, row) = (times[k], times[k + 1], k + 2);
+            format!("time does not increase from {from} s to {to} s at row {row}").into()
+        } else if numbers.any(|x| !x.is_finite()) {
+            ErrorText::new("a time or a voltage is not finite")
+        } else {
+            return Ok(Self { times, volts });
+        };
+        Err(SimulateError::Volts { what })
     }
 
     /// Time at which the last row ends \[s\]; a single row lasts for ever.

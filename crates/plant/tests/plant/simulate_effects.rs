@@ -3,8 +3,8 @@
 mod accuracy;
 mod data;
 mod load_and_memory;
-mod missing;
-mod orders;
+pub mod missing;
+pub mod orders;
 mod serial;
 mod static_torques;
 

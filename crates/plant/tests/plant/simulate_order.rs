@@ -4,12 +4,15 @@ use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use cft_ident_files::config::{ModelFile, RobotFile, Trajectory};
+use cft_ident_files::config::model_file::Parameter;
+use cft_ident_files::config::{RobotFile, Trajectory};
 use cft_ident_logs::log::{Block, LogSpec, Reader};
 use cft_ident_plant::simulate::{
     Experiment, InitialConditions, Order, Rows, RunEnding, SimulateError, SimulatedLog, TruthFile,
     simulate, simulate_from, simulate_rows,
 };
+
+use crate::simulate_effects::orders::model;
 
 fn robot(name: &str) -> RobotFile {
     RobotFile::load(Path::new(name)).expect("embedded")
@@ -252,22 +255,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     .expect("runs");
     let mut parameters = synthetic.truth.parameters.clone();
     parameters[0].value = 130.0;
-    let model = ModelFile {
-        estimates: Vec::new(),
-        estimate_covariance: None,
-        friction_prior: Vec::new(),
-        held_out: Vec::new(),
-        excesses: None,
-        robot: robot.clone(),
-        parameters,
-        covariance: None,
-        residual_std: Default::default(),
-        effects: Vec::new(),
-        links: Vec::new(),
-        drive_inertia: Default::default(),
-        candidates: Vec::new(),
-        provenance: Default::default(),
-    };
+    let model = model(&robot, parameters, Vec::new());
     let heavy = simulate(&Order {
         seconds: Some(1.0),
         model: Some(("model.toml", &model)),
@@ -310,40 +298,24 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
     robot.sensors = extra.sensors;
     let refused = simulate(&order(&robot, Experiment::Usual)).expect_err("no parameters");
     assert!(refused.to_string().contains("-m"), "{refused}");
-    let parameter = |name: &str, joint: Option<&str>, value: f64| {
-        cft_ident_files::config::model_file::Parameter {
-            name: name.to_owned(),
-            theta: None,
-            joint: joint.map(str::to_owned),
-            value,
-            consistent: None,
-            std: None,
-            unit: String::new(),
-            meaning: String::new(),
-            verdict: None,
-        }
+    let parameter = |name: &str, joint: Option<&str>, value: f64| Parameter {
+        name: name.to_owned(),
+        theta: None,
+        joint: joint.map(str::to_owned),
+        value,
+        consistent: None,
+        std: None,
+        unit: String::new(),
+        meaning: String::new(),
+        verdict: None,
     };
-    let model = ModelFile {
-        estimates: Vec::new(),
-        estimate_covariance: None,
-        friction_prior: Vec::new(),
-        held_out: Vec::new(),
-        excesses: None,
-        robot: robot.clone(),
-        parameters: vec![
-            parameter("inertia", None, 95.1089),
-            parameter("viscous", Some("q1"), 203.5034),
-            parameter("coulomb", Some("q1"), 20.3935),
-            parameter("offset", Some("q1"), -3.1648),
-        ],
-        covariance: None,
-        residual_std: Default::default(),
-        effects: Vec::new(),
-        links: Vec::new(),
-        drive_inertia: Default::default(),
-        candidates: Vec::new(),
-        provenance: Default::default(),
-    };
+    let parameters = vec![
+        parameter("inertia", None, 95.1089),
+        parameter("viscous", Some("q1"), 203.5034),
+        parameter("coulomb", Some("q1"), 20.3935),
+        parameter("offset", Some("q1"), -3.1648),
+    ];
+    let model = model(&robot, parameters, Vec::new());
     let ordered = Order {
         model: Some(("emps-model.toml", &model)),
         ..order(&robot, Experiment::of_joint("q1"))
@@ -352,18 +324,10 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
     assert_eq!(log.header, ["t", "q1", "tau1"], "named as [log] reads them");
     assert_eq!(log.ending, RunEnding::Completed);
     assert!((span(&column(&log, "q1")) - 0.225).abs() < 0.005);
-    let values: Vec<(String, f64)> = log
-        .truth
-        .parameters
-        .iter()
-        .map(|p| (p.key(), p.value))
-        .collect();
-    let expected: Vec<(String, f64)> = model
-        .parameters
-        .iter()
-        .map(|p| (p.key(), p.value))
-        .collect();
-    assert_eq!(values, expected);
+    let values = |parameters: &[Parameter]| -> Vec<(String, f64)> {
+        parameters.iter().map(|p| (p.key(), p.value)).collect()
+    };
+    assert_eq!(values(&log.truth.parameters), values(&model.parameters));
     let other = simulate(&Order {
         experiment: Experiment::of_joint("q9"),
         ..ordered

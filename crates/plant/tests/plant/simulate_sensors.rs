@@ -2,8 +2,8 @@
 
 use cft_ident_core::robot::cft::actuation::{ENCODER_SCALE, counts};
 use cft_ident_core::robot::cft::{Setup, pantograph};
-use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
-use cft_ident_plant::simulate::{CftTruth, Noise, OneJointMove, Sensors, Settings, SimulatedRun};
+use cft_ident_plant::simulate::cft::{excitation, follow};
+use cft_ident_plant::simulate::{CftTruth, Noise, Sensors, Settings, SimulatedRun};
 
 fn run(sensors: Sensors<4>, seed: u64, effects: &[&str]) -> SimulatedRun<4> {
     let truth = CftTruth::synthetic(Setup::Tuedacs);
@@ -169,31 +169,4 @@ fn lost_rows_and_uneven_instants_leave_times_that_are_true() {
             recording.t[k]
         );
     }
-}
-
-#[test]
-fn header_and_rows_agree() {
-    let recording = run(Sensors::default(), 0, &[]);
-    let mut row = Vec::new();
-    for raw in [false, true] {
-        recording.row(17, raw, &mut row);
-        assert_eq!(row.len(), recording.header(raw).len());
-    }
-    let header = recording.header(true);
-    let at = |name: &str| header.iter().position(|h| h == name).expect("column");
-    assert_eq!(row[at("t")], recording.t[17]);
-    assert_eq!(row[at("tau_q4")], recording.torque[17][2]);
-    assert_eq!(row[at("x_c3")], recording.x[17][2]);
-    assert_eq!(row[at("u_4")], recording.volts[17][3]);
-}
-
-#[test]
-fn seeds_vary_the_order_of_a_ladder() {
-    let ladder = |seed| {
-        OneJointMove::new(0, 20.0, Some(seed))
-            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
-            .expect("fits")
-    };
-    assert_eq!(ladder(1), ladder(1));
-    assert_ne!(ladder(1), ladder(2));
 }

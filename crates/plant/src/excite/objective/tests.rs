@@ -27,7 +27,7 @@ fn compare(
 ) -> f64 {
     let n = machine.coordinates();
     let free = (0..n).map(|i| (i == 2).then_some(1.7)).collect();
-    let variables = Variables::new(&machine.channels, n, TAU * 0.4, 5, free);
+    let variables = Variables::new(&machine.channels, TAU * 0.4, 5, free);
     // motions fill twice the room that the objective allows, so that penalties press
     let tight: Vec<BoundedQuantity> = machine.channels.iter().map(|c| c.reserved(0.5)).collect();
     let objective = Objective::new(machine, criterion, &tight, variables, prior, 60);

@@ -27,7 +27,6 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Share of half the gap within which contact comes about.
 const CONTACT: f64 = 0.005;
 
-#[derive(Debug)]
 struct Backlash {
     joint: usize,
     half: f64,
@@ -45,10 +44,9 @@ impl Effect for Backlash {
         let (off, v) = (motion.q[self.joint] - centre, motion.v[self.joint]);
         let to_contact = self.half - off.abs();
         let opening = off * v < 0.0;
-        let missing = if opening {
-            1.0
-        } else {
-            (to_contact / (CONTACT * self.half)).clamp(0.0, 1.0)
+        let missing = match opening {
+            true => 1.0,
+            false => (to_contact / (CONTACT * self.half)).clamp(0.0, 1.0),
         };
         torque[self.joint] -= self.c * missing * sign(self.slope, v);
     }

@@ -20,27 +20,16 @@ const NEAR_POINT_M: f64 = 0.1;
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| {
-        let mut defaults = vec![
-            0.4 * site.scale / (FAR_POINT_M * NEAR_POINT_M),
-            0.5 * FAR_POINT_M,
-            FAR_POINT_M,
-            NEAR_POINT_M,
-        ];
-        let (from, to) = site.travel;
-        defaults.extend([site.middle() - std::f64::consts::FRAC_PI_2, from, to]);
-        defaults.extend([0.0; COUNT]);
-        defaults
+        let stiffness = 0.4 * site.scale / (FAR_POINT_M * NEAR_POINT_M);
+        let spring = [stiffness, 0.5 * FAR_POINT_M, FAR_POINT_M, NEAR_POINT_M];
+        let (angle, (from, to)) = (site.middle() - std::f64::consts::FRAC_PI_2, site.travel);
+        [&spring[..], &[angle, from, to], &[0.0; COUNT]].concat()
     },
     build,
 };
 
 fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
-    let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
-        effect: ENTRY.name.to_owned(),
-        key: key.to_owned(),
-        value,
-        rule: rule.to_owned(),
-    };
+    let refuse = |key, value, rule: &str| SimulateError::number(ENTRY.name, key, value, rule);
     let (stiffness, a, b) = (values[0], values[2], values[3]);
     if stiffness != 0.0 && !site.turns {
         return Err(site.refuse(
@@ -50,11 +39,8 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
         ));
     }
     if !(a > 0.0 && b > 0.0) || a == b {
-        return Err(refuse(
-            "a - b",
-            a - b,
-            "a and b must be above 0 and differ, or the spring's length reaches 0",
-        ));
+        let rule = "a and b must be above 0 and differ, or the spring's length reaches 0";
+        return Err(refuse("a - b", a - b, rule));
     }
     let (from, to) = (values[5], values[6]);
     if to <= from {
@@ -73,7 +59,6 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
     })
 }
 
-#[derive(Debug)]
 struct Counterbalance {
     joint: usize,
     stiffness: f64,

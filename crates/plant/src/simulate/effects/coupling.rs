@@ -21,22 +21,14 @@ pub static LAW: PlantLaw = PlantLaw {
         if machine.joints() < 2 {
             return Err(site.refuse(ENTRY.name, "there is no other joint to follow"));
         }
-        let from = values[0];
-        let known = (1..=machine.joints()).any(|number| number as f64 == from);
-        if !known || from == (site.joint() + 1) as f64 {
-            return Err(SimulateError::EffectNumber {
-                effect: ENTRY.name.to_owned(),
-                key: "from".to_owned(),
-                value: from,
-                rule: format!(
-                    "must be the number of another joint, 1 to {}",
-                    machine.joints()
-                ),
-            });
-        }
+        let Some(from) = machine.other_joint(site.joint(), values[0]) else {
+            let known = machine.joints();
+            let rule = format!("must be the number of another joint, 1 to {known}");
+            return Err(SimulateError::number(ENTRY.name, "from", values[0], rule));
+        };
         Built::plant(Coupling {
             joint: site.joint(),
-            from: from as usize - 1,
+            from,
             viscous: values[1],
             coulomb: values[2],
             inertia: values[3],
@@ -46,7 +38,6 @@ pub static LAW: PlantLaw = PlantLaw {
     },
 };
 
-#[derive(Debug)]
 struct Coupling {
     joint: usize,
     from: usize,

@@ -26,7 +26,6 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Time between two knots of the walk \[s\].
 const KNOT: f64 = 0.01;
 
-#[derive(Debug)]
 struct Drift {
     joint: usize,
     c: f64,
@@ -53,13 +52,12 @@ impl Effect for Drift {
         let count = (beginning.seconds / KNOT).ceil() as usize + 2;
         let step = self.walk * KNOT.sqrt();
         let mut value = 0.0;
-        self.knots = (0..count)
-            .map(|_| {
-                let here = value;
-                let draw: f64 = chance.sample(StandardNormal);
-                value += step * draw;
-                here
-            })
-            .collect();
+        let knot = |_| {
+            let here = value;
+            let draw: f64 = chance.sample(StandardNormal);
+            value += step * draw;
+            here
+        };
+        self.knots = (0..count).map(knot).collect();
     }
 }

@@ -18,7 +18,6 @@ pub static LAW: PlantLaw = PlantLaw {
     },
 };
 
-#[derive(Debug)]
 struct DriveEfficiency {
     joint: usize,
     k: f64,

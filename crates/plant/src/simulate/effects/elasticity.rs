@@ -21,22 +21,11 @@ pub static LAW: PlantLaw = PlantLaw {
         ]
     },
     build: |site, _, values| {
-        let &[stiffness, inertia, damping] = values else {
-            return Err(site.refuse(ENTRY.name, "it takes stiffness, inertia and damping"));
-        };
-        let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
-            effect: ENTRY.name.to_owned(),
-            key: key.to_owned(),
-            value,
-            rule: rule.to_owned(),
-        };
+        let (stiffness, inertia, damping) = (values[0], values[1], values[2]);
         let rotor = site.inertia - inertia;
         if rotor <= 0.0 || inertia <= 0.0 || rotor >= site.least_inertia {
-            return Err(refuse(
-                "inertia",
-                inertia,
-                "must be below the joint's, and leave the motor less than the joint's least",
-            ));
+            let rule = "must be below the joint's, and leave the motor less than the joint's least";
+            return Err(SimulateError::number(ENTRY.name, "inertia", inertia, rule));
         }
         Built::plant(Elasticity {
             joint: site.joint(),
@@ -61,7 +50,6 @@ fn rotor(site: &Site) -> f64 {
     (ROTOR * site.inertia).min(ROTOR_AT_MOST * site.least_inertia)
 }
 
-#[derive(Debug)]
 struct Elasticity {
     joint: usize,
     stiffness: f64,

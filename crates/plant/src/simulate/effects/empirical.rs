@@ -29,12 +29,8 @@ pub static LAW: PlantLaw = PlantLaw {
 fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     let (signal, from, to) = (values[0].round() as u32, values[1], values[2]);
     if to <= from {
-        return Err(SimulateError::EffectNumber {
-            effect: ENTRY.name.to_owned(),
-            key: "to - from".to_owned(),
-            value: to - from,
-            rule: "must be above 0".to_owned(),
-        });
+        let (key, rule) = ("to - from", "must be above 0");
+        return Err(SimulateError::number(ENTRY.name, key, to - from, rule));
     }
     if signal == 4 {
         return Err(site.refuse(
@@ -73,7 +69,6 @@ fn slopes(m: [f64; KNOTS]) -> [f64; KNOTS] {
     matrix.lu().solve(&right).unwrap_or_default().into()
 }
 
-#[derive(Debug)]
 struct Curve {
     joint: usize,
     signal: u32,
@@ -123,10 +118,9 @@ impl Effect for Curve {
             return false;
         }
         let (q, farthest) = (motion.q[self.joint], self.turning[1]);
-        let back = if self.forward {
-            farthest - q
-        } else {
-            q - farthest
+        let back = match self.forward {
+            true => farthest - q,
+            false => q - farthest,
         };
         let turned = back > TURN * (KNOTS - 1) as f64 * self.step;
         if turned {

@@ -14,26 +14,20 @@ pub struct LoggedChannels<'a> {
 }
 
 /// A fault of the log.
-pub trait Fault: std::fmt::Debug + Send {
+pub struct Fault {
     /// Spoils the channels.
-    fn apply(&self, log: &mut LoggedChannels);
-
+    pub(super) apply: Box<dyn Fn(&mut LoggedChannels) + Send>,
     /// Whether it lies between the motor and the noise of the torque, and not behind both.
-    fn before_noise(&self) -> bool {
-        false
-    }
+    pub(super) before_noise: bool,
 }
 
 impl LoggedChannels<'_> {
     /// Torques of one joint.
     pub(super) fn torques(&mut self, joint: usize) -> impl Iterator<Item = &mut f64> {
-        self.torque
-            .iter_mut()
-            .skip(joint)
-            .step_by(self.joints.max(1))
+        self.channel(joint, true).map(|(_, torque)| torque)
     }
 
-    /// Torques of one joint, or its positions.
+    /// Times, and torques of one joint, or its positions.
     pub(super) fn channel(
         &mut self,
         joint: usize,

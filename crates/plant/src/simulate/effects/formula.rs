@@ -12,7 +12,6 @@ use cft_ident_core::robot::FormulaSignal;
 use cft_ident_files::config::candidates::CandidateSection;
 
 /// A coefficient's formula with its number.
-#[derive(Debug)]
 struct Term {
     coefficient: f64,
     formula: Formula,
@@ -27,7 +26,6 @@ enum Input {
 }
 
 /// The formulas of one candidate at one joint.
-#[derive(Debug)]
 struct Own {
     joint: usize,
     terms: Vec<Term>,
@@ -50,33 +48,16 @@ pub(super) fn build(
     if LAWS.iter().any(|law| law.entry.name == candidate.name) {
         return Err(wrong(candidate, "an effect that is known has its name"));
     }
-    let keys: Vec<&String> = candidate
-        .shapes
-        .keys()
-        .chain(candidate.formulas.keys())
-        .collect();
-    for (key, _) in &spec.values {
-        if !keys.contains(&key) {
-            return Err(SimulateError::UnknownKey {
-                effect: spec.name.clone(),
-                key: key.clone(),
-                known: keys
-                    .iter()
-                    .map(|k| k.as_str())
-                    .collect::<Vec<_>>()
-                    .join(", "),
-            });
-        }
-    }
+    let keys = candidate.shapes.keys().chain(candidate.formulas.keys());
+    spec.check_keys(keys.map(String::as_str).collect())?;
     let mut out = Vec::new();
-    for site in spec.sites(&spec.name, Places::Joints, sites)? {
+    for site in spec.sites(Places::Joints, sites)? {
         let may = |joints: &Vec<String>| joints.contains(&site.name);
-        let fits = candidate.joints.as_ref().is_none_or(may);
-        if !fits && spec.joint.is_none() {
-            continue;
-        }
-        if !fits {
-            return Err(site.refuse(&spec.name, "its `joints` do not name it"));
+        if !candidate.joints.as_ref().is_none_or(may) {
+            match &spec.joint {
+                Some(_) => return Err(site.refuse(&spec.name, "its `joints` do not name it")),
+                None => continue,
+            }
         }
         let own = Own::of(spec, candidate, site, sites)?;
         let value = value(spec, candidate, site)?;
@@ -97,12 +78,10 @@ fn wrong(candidate: &CandidateSection, what: &str) -> SimulateError {
 
 /// The number of a key, which only the user knows.
 fn number(spec: &EffectSpec, key: &str) -> Result<f64, SimulateError> {
-    let given = spec.values.iter().find(|(name, _)| name == key);
-    let missing = || SimulateError::MissingKey {
+    spec.given(key).ok_or_else(|| SimulateError::MissingKey {
         effect: spec.name.clone(),
         key: key.to_owned(),
-    };
-    given.map(|(_, value)| *value).ok_or_else(missing)
+    })
 }
 
 /// The effect as the truth says it.
@@ -113,10 +92,8 @@ fn value(
 ) -> Result<EffectValue, SimulateError> {
     let shapes = candidate.shapes.iter();
     let shapes = shapes.map(|(key, range)| (key, range.unit.clone()));
-    let sizes = candidate.formulas.keys().map(|key| {
-        let unit = candidate.units.get(key).cloned();
-        (key, unit.unwrap_or_default())
-    });
+    let unit = |key| candidate.units.get(key).cloned().unwrap_or_default();
+    let sizes = candidate.formulas.keys().map(|key| (key, unit(key)));
     let parameters = shapes.chain(sizes).map(|(key, unit)| {
         let value = number(spec, key)?;
         Ok((key.clone(), PlantParameter { value, unit }))
@@ -139,12 +116,8 @@ impl Own {
         for (name, range) in &candidate.shapes {
             let value = number(spec, name)?;
             if !(range.from..=range.to).contains(&value) {
-                return Err(SimulateError::EffectNumber {
-                    effect: spec.name.clone(),
-                    key: name.clone(),
-                    value,
-                    rule: format!("must be from {} to {}", range.from, range.to),
-                });
+                let rule = format!("must be from {} to {}", range.from, range.to);
+                return Err(SimulateError::number(&spec.name, name, value, rule));
             }
         }
         let joints = sites.machine.robot.joint_names();
@@ -177,10 +150,8 @@ impl Own {
         };
         let term = |(key, text): (&String, &String)| {
             let formula = Formula::parse(text).map_err(|why| {
-                wrong(
-                    candidate,
-                    &format!("`{key}`: `{text}` is no formula: {why}"),
-                )
+                let what = format!("`{key}`: `{text}` is no formula: {why}");
+                wrong(candidate, &what)
             })?;
             let inputs = formula.names().iter().map(|name| input(key, name));
             Ok(Term {
@@ -191,22 +162,15 @@ impl Own {
         };
         let terms = candidate.formulas.iter().map(term);
         let terms: Vec<Term> = terms.collect::<Result<_, SimulateError>>()?;
-        let implicit = |input: &Input| {
-            matches!(
-                input,
-                Input::Signal(FormulaSignal::Acceleration | FormulaSignal::Load, _)
-            )
-        };
+        use FormulaSignal::{Acceleration, Load};
+        let implicit = |input: &Input| matches!(input, Input::Signal(Acceleration | Load, _));
+        let of = |site: &Site| [site.coulomb, site.viscous, site.slope()];
         Ok(Self {
             joint: site.joint(),
             implicit: terms.iter().any(|term| term.inputs.iter().any(implicit)),
             terms,
             temperatures: sites.temperatures.clone(),
-            friction: sites
-                .joints
-                .iter()
-                .map(|s| [s.coulomb, s.viscous, s.slope()])
-                .collect(),
+            friction: sites.joints.iter().map(of).collect(),
         })
     }
 

@@ -11,8 +11,6 @@ use cft_ident_core::robot::tree::{Coordinate, MOST_JOINTS, MOST_LINKS, Tree};
 pub(super) struct Frame {
     /// From the link's axes to the base's.
     pub rotation: Matrix3<f64>,
-    /// Origin \[m\].
-    pub origin: Vector3<f64>,
     /// Angular velocity \[rad/s\].
     pub spin: Vector3<f64>,
     /// Angular acceleration \[rad/s^2\].
@@ -58,7 +56,6 @@ fn moved(coordinate: &Coordinate, q: &[f64], v: &[f64]) -> ([f64; 3], [f64; MOST
 pub(super) fn frames(chain: &Tree, q: &[f64], v: &[f64], mut visit: impl FnMut(usize, &Frame)) {
     let base = Frame {
         rotation: Matrix3::identity(),
-        origin: Vector3::zeros(),
         spin: Vector3::zeros(),
         spin_bias: Vector3::zeros(),
         bias: Vector3::zeros(),
@@ -85,7 +82,6 @@ pub(super) fn frames(chain: &Tree, q: &[f64], v: &[f64], mut visit: impl FnMut(u
                 reach += along * position;
             }
         }
-        frame.origin += reach;
         frame.bias +=
             before.spin_bias.cross(&reach) + before.spin.cross(&before.spin.cross(&reach));
         for (slide, turn) in frame.slides.iter_mut().zip(&before.turns) {

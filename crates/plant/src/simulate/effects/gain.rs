@@ -14,7 +14,6 @@ pub static LAW: PlantLaw = PlantLaw {
     },
 };
 
-#[derive(Debug)]
 struct Gain {
     joint: usize,
     acting: f64,

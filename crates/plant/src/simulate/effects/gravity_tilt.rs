@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
-use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
+use super::{Built, PlantLaw, PlantRobot, Site};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::gravity_tilt::ENTRY;
 use cft_ident_core::robot::cft::dynamics::Coefficients;
@@ -28,20 +28,18 @@ fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Sim
     let [gx, gy] = [values[0], values[1]];
     let PlantRobot { robot, theta } = *machine;
     if let Some(chain) = robot.coefficients(theta) {
-        return Built::plant(Tilt { gx, gy, chain });
+        return of_cft(chain, gx, gy);
     }
     if robot.knows_links() {
-        return Built::plant(Askew {
-            chain: robot.tree().clone(),
-            moments: moments(robot, theta),
-            gravity: Vector3::new(gx, gy, 0.0),
-        });
+        let moments = moments(robot, theta);
+        return of_links(robot.tree().clone(), moments, Vector3::new(gx, gy, 0.0));
     }
     match robot.joint_kind(0) {
         // The base's x lies along the axis; y is across it and does no work.
-        JointKind::Prismatic => Built::plant(Constant {
-            force: -theta[0] * gx,
-        }),
+        JointKind::Prismatic => {
+            let force = -theta[0] * gx;
+            Built::inertia(move |_, _, torque| torque[0] += force)
+        }
         JointKind::Revolute => Err(site.refuse(
             ENTRY.name,
             "a single turning joint has an inertia and no centre of gravity; use `torque-offset` or \
@@ -50,15 +48,8 @@ fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Sim
     }
 }
 
-#[derive(Debug)]
-struct Tilt {
-    gx: f64,
-    gy: f64,
-    chain: Coefficients,
-}
-
-impl Effect for Tilt {
-    fn inertia(&self, motion: &PlantState, _mass: &mut [f64], torque: &mut [f64]) {
+fn of_cft(chain: Coefficients, gx: f64, gy: f64) -> Result<Built, SimulateError> {
+    Built::inertia(move |motion, _, torque| {
         let (Some(&[_, q2, q4, q5]), [tau1, tau2, tau4, tau5]) = (motion.q.first_chunk(), torque)
         else {
             return;
@@ -66,31 +57,18 @@ impl Effect for Tilt {
         let (s2, c2) = q2.sin_cos();
         let (s4, c4) = q4.sin_cos();
         let (s, c) = (q4 + q5).sin_cos();
-        let [a, b, cc, e] = self.chain.h;
-        let radial = self.chain.h0 + a * s4 + b * s + cc * c4 + e * c;
+        let [a, b, cc, e] = chain.h;
+        let radial = chain.h0 + a * s4 + b * s + cc * c4 + e * c;
         let by_psi = b * c - e * s;
         let by_q4 = a * c4 - cc * s4 + by_psi;
-        let o = self.chain.o;
+        let o = chain.o;
         // Along the arm and across it.
-        let (along, across) = (self.gx * s2 - self.gy * c2, self.gx * c2 + self.gy * s2);
-        *tau1 -= self.gy * (self.chain.t1 + self.chain.mr);
+        let (along, across) = (gx * s2 - gy * c2, gx * c2 + gy * s2);
+        *tau1 -= gy * (chain.t1 + chain.mr);
         *tau2 += o * along + radial * across;
         *tau4 += by_q4 * along;
         *tau5 += by_psi * along;
-    }
-}
-
-#[derive(Debug)]
-struct Constant {
-    force: f64,
-}
-
-impl Effect for Constant {
-    fn inertia(&self, _motion: &PlantState, _mass: &mut [f64], torque: &mut [f64]) {
-        if let Some(torque) = torque.first_mut() {
-            *torque += self.force;
-        }
-    }
+    })
 }
 
 /// Mass and first moments of each link in its own frame, as far as base parameters know them.
@@ -111,24 +89,20 @@ fn moments(robot: &Robot, theta: &[f64]) -> Vec<(f64, Vector3<f64>)> {
     moments
 }
 
-/// A serial robot in gravity that has something beside what is declared.
-#[derive(Debug)]
-struct Askew {
+/// Gravity beside the declared one, in the base's frame \[m/s^2\].
+fn of_links(
     chain: Tree,
     moments: Vec<(f64, Vector3<f64>)>,
-    /// Beside the declared one, in the base's frame \[m/s^2\].
     gravity: Vector3<f64>,
-}
-
-impl Effect for Askew {
-    fn inertia(&self, motion: &PlantState, _mass: &mut [f64], torque: &mut [f64]) {
-        frames(&self.chain, motion.q, motion.v, |link, frame: &Frame| {
-            let (mass, moment) = self.moments[link];
+) -> Result<Built, SimulateError> {
+    Built::inertia(move |motion, _, torque| {
+        frames(&chain, motion.q, motion.v, |link, frame: &Frame| {
+            let (mass, moment) = moments[link];
             let arm = frame.rotation * moment;
             for (i, torque) in torque.iter_mut().enumerate() {
                 let moved = mass * frame.slides[i] + frame.turns[i].cross(&arm);
-                *torque -= self.gravity.dot(&moved);
+                *torque -= gravity.dot(&moved);
             }
         });
-    }
+    })
 }

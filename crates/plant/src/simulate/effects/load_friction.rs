@@ -14,14 +14,9 @@ pub static LAW: PlantLaw = PlantLaw {
     build: |site, _, values| {
         let most = values[0].abs() + values[1].abs() * 4.0 * site.speed;
         if most >= MAX_LOAD_SHARE {
-            return Err(SimulateError::EffectNumber {
-                effect: ENTRY.name.to_owned(),
-                key: "mu_c + mu_v |v|".to_owned(),
-                value: most,
-                rule: format!(
-                    "must stay below {MAX_LOAD_SHARE}: beyond it the joint locks itself under load"
-                ),
-            });
+            let (key, beyond) = ("mu_c + mu_v |v|", "beyond it the joint locks itself under load");
+            let rule = format!("must stay below {MAX_LOAD_SHARE}: {beyond}");
+            return Err(SimulateError::number(ENTRY.name, key, most, rule));
         }
         Built::plant(LoadFriction {
             joint: site.joint(),
@@ -35,7 +30,6 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Share of the load that friction may take.
 const MAX_LOAD_SHARE: f64 = 0.95;
 
-#[derive(Debug)]
 struct LoadFriction {
     joint: usize,
     mu_c: f64,

@@ -2,7 +2,7 @@
 //!
 //! An effect is named on the command line as `NAME[:JOINT][:key=value,...]`; without a joint it acts on
 //! every joint, and a key that is left out takes a default that scales with the joint (docs/effects.md).
-//! Most effects are torques or states of the plant ([`Effect`]); delays and faults of the data are put
+//! Most effects are torques or states of the plant ([`Effect`], [`Built`]); delays and faults of the data are put
 //! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`LAWS`]. Effects of a
 //! user's own come with their formulas ([`EffectSpec::own`]).
 //!
@@ -21,6 +21,8 @@ pub use fault::{Fault, LoggedChannels};
 pub use plant_law::{Built, PlantLaw};
 pub use site::{PlantRobot, Site, Sites};
 pub use spec::{EffectSpec, EffectValue, PlantParameter};
+
+use std::ops::Range;
 
 use super::SimulateError;
 
@@ -70,7 +72,7 @@ pub struct Twist {
 }
 
 /// One effect on the plant. Everything has a default: most effects are static torques.
-pub trait Effect: std::fmt::Debug + Send {
+pub trait Effect: Send {
     /// Adds to `torque` what the motors must supply because of the effect, in N or N m per joint.
     fn torque(&self, _motion: &PlantState, _torque: &mut [f64]) {}
 
@@ -161,11 +163,17 @@ catalogue! {
 }
 
 /// The effects of one plant, each with its slice of the extra states, and the faults of its log.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Effects {
-    list: Vec<(Box<dyn Effect>, std::ops::Range<usize>)>,
+    list: Vec<(Box<dyn Effect>, Range<usize>)>,
     /// By name.
-    faults: Vec<(&'static str, Box<dyn Fault>)>,
+    faults: Vec<(&'static str, Fault)>,
+}
+
+impl std::fmt::Debug for Effects {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{} effects", self.list.len() + self.faults.len())
+    }
 }
 
 impl Effects {
@@ -189,7 +197,7 @@ impl Effects {
                 continue;
             }
             let law = spec.law()?;
-            for site in spec.sites(law.entry.name, law.entry.places, sites)? {
+            for site in spec.sites(law.entry.places, sites)? {
                 let numbers = spec.numbers(law, site)?;
                 match law.built(site, &sites.machine, &numbers)? {
                     Built::Plant(effect) => effects.push(effect),
@@ -209,7 +217,7 @@ impl Effects {
     }
 
     /// Extra states of all effects.
-    pub fn states(&self) -> usize {
+    pub(super) fn states(&self) -> usize {
         self.list.last().map_or(0, |(_, states)| states.end)
     }
 
@@ -220,76 +228,49 @@ impl Effects {
     }
 
     /// Name of the first fault of the log.
-    pub(crate) fn first_fault(&self) -> Option<&'static str> {
+    pub(super) fn first_fault(&self) -> Option<&'static str> {
         self.faults.first().map(|(name, _)| *name)
     }
 
-    /// Adds every effect's torque.
-    pub fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
+    /// Shows every effect the motion with its own states.
+    pub(super) fn each(
+        &self,
+        motion: &PlantState,
+        mut visit: impl FnMut(&dyn Effect, &PlantState),
+    ) {
         for (effect, states) in &self.list {
-            effect.torque(&own(motion, states), torque);
+            visit(effect.as_ref(), &own(motion, states));
         }
     }
 
     /// Joints whose torque hangs on accelerations or loads, some more than once.
-    pub fn implicit_joints(&self) -> impl Iterator<Item = usize> {
-        self.list
-            .iter()
-            .filter_map(|(effect, _)| effect.implicit_joint())
-    }
-
-    /// Adds every effect's torque that hangs on accelerations or loads.
-    pub fn implicit(&self, motion: &PlantState, torque: &mut [f64]) {
-        for (effect, states) in &self.list {
-            effect.implicit(&own(motion, states), torque);
-        }
-    }
-
-    /// Adds every effect's inertia.
-    pub fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
-        for (effect, states) in &self.list {
-            effect.inertia(&own(motion, states), mass, torque);
-        }
-    }
-
-    /// Adds every effect's share of the load.
-    pub fn load(&self, motion: &PlantState, share: &mut [[f64; 2]]) {
-        for (effect, states) in &self.list {
-            effect.load(&own(motion, states), share);
-        }
-    }
-
-    /// Multiplies what acts per unit of logged torque.
-    pub fn drive(&self, acting: &mut [f64]) {
-        for (effect, _) in &self.list {
-            effect.drive(acting);
-        }
+    pub(super) fn implicit_joints(&self) -> impl Iterator<Item = usize> {
+        let each = self.list.iter();
+        each.filter_map(|(effect, _)| effect.implicit_joint())
     }
 
     /// The springs between motors and links, for the states z of all effects.
-    pub(crate) fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = Twist> + 'a {
-        let own = |(effect, states): &'a (Box<dyn Effect>, std::ops::Range<usize>)| {
-            effect.twist(&z[states.clone()])
-        };
-        self.list.iter().filter_map(own)
+    pub(super) fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = Twist> + 'a {
+        let each = self.list.iter();
+        each.filter_map(|(effect, states)| effect.twist(&z[states.clone()]))
     }
 
     /// Writes the rates of every effect's states.
-    pub fn rates(&self, motion: &PlantState, dz: &mut [f64]) {
+    pub(super) fn rates(&self, motion: &PlantState, dz: &mut [f64]) {
         for (effect, states) in &self.list {
             effect.rates(&own(motion, states), &mut dz[states.clone()]);
         }
     }
 
     /// Readies every effect before the first step.
-    pub fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
+    pub(super) fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
         for (effect, states) in &mut self.list {
             effect.begin(beginning, &mut z[states.clone()]);
         }
     }
 
     /// Informs every effect of an accepted step; `true` when one of them changed.
-    pub fn moved(&mut self, motion: &PlantState) -> bool {
+    pub(super) fn moved(&mut self, motion: &PlantState) -> bool {
         let mut changed = false;
         for (effect, states) in &mut self.list {
             changed |= effect.moved(&own(motion, states));
@@ -298,17 +279,17 @@ impl Effects {
     }
 
     /// Puts the faults into a log: those that come before the noise of the torque, or those after.
-    pub fn spoil(&self, log: &mut LoggedChannels, before_noise: bool) {
+    pub(super) fn spoil(&self, log: &mut LoggedChannels, before_noise: bool) {
         for (_, fault) in &self.faults {
-            if fault.before_noise() == before_noise {
-                fault.apply(log);
+            if fault.before_noise == before_noise {
+                (fault.apply)(log);
             }
         }
     }
 }
 
 /// The motion with the states of one effect.
-fn own<'a>(motion: &PlantState<'a>, states: &std::ops::Range<usize>) -> PlantState<'a> {
+fn own<'a>(motion: &PlantState<'a>, states: &Range<usize>) -> PlantState<'a> {
     PlantState {
         z: &motion.z[states.clone()],
         ..*motion

@@ -9,7 +9,8 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
-use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
+use super::rotor_inertia::at_joint;
+use super::{Built, PlantLaw, PlantRobot, Site};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::payload::ENTRY;
 use cft_ident_core::robot::JointKind;
@@ -26,41 +27,25 @@ fn build(_: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Simula
     let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
     let robot = machine.robot;
     if !robot.knows_links() {
-        return Built::plant(AtOneJoint {
-            inertia: match robot.joint_kind(0) {
-                JointKind::Prismatic => mass,
-                JointKind::Revolute => (mx * mx + my * my) / mass + inertia,
-            },
-        });
+        let inertia = match robot.joint_kind(0) {
+            JointKind::Prismatic => mass,
+            JointKind::Revolute => (mx * mx + my * my) / mass + inertia,
+        };
+        return at_joint(0, inertia);
     }
     if robot.tool_stays_level() {
-        return Built::plant(Carried {
-            mass,
-            outward: mx / mass,
-            sideways: mz / mass,
-            inertia,
-        });
+        return carried(mass, [mx / mass, mz / mass], inertia);
     }
-    Built::plant(LinkLoad {
-        chain: robot.tree().clone(),
-        mass,
-        centre: Vector3::new(mx, my, mz) / mass,
-        inertia,
-    })
+    on_last_link(robot.tree().clone(), mass, Vector3::new(mx, my, mz) / mass, inertia)
 }
 
-#[derive(Debug)]
-struct Carried {
-    mass: f64,
-    /// Place in the frame of link 8 \[m\]; its height does not matter, for the tool stays level.
-    outward: f64,
-    sideways: f64,
-    /// About the vertical axis through its own centre; the tool stays level [kg m^2].
+/// At a place in the frame of link 8 \[m\], whose height does not matter, for the tool stays level.
+fn carried(
+    carried: f64,
+    [outward, side]: [f64; 2],
     inertia: f64,
-}
-
-impl Effect for Carried {
-    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
+) -> Result<Built, SimulateError> {
+    Built::inertia(move |motion, mass, torque| {
         let (Some(&[_, q2, q4, q5]), Some(&[v1, v2, v4, v5])) =
             (motion.q.first_chunk(), motion.v.first_chunk())
         else {
@@ -72,11 +57,10 @@ impl Effect for Carried {
         let (s, c) = (q4 + q5).sin_cos();
         let w = v4 + v5;
         // Reach from the axis of q2, its rate, and the acceleration that the speeds alone give it.
-        let reach = self.outward + D - L6 * s4 - U * s;
+        let reach = outward + D - L6 * s4 - U * s;
         let rate = -L6 * c4 * v4 - U * c * w;
         let bend = L6 * s4 * v4 * v4 + U * s * w * w;
         let (by_q4, by_q5) = (-L6 * c4 - U * c, -U * c);
-        let side = self.sideways;
         // p = (-reach s2 + side c2, q1 + reach c2 + side s2, (L4 + L6) c4 + L5 c) up to constants.
         let jacobian = [
             [0.0, -reach * c2 - side * s2, -s2 * by_q4, -s2 * by_q5],
@@ -89,64 +73,44 @@ impl Effect for Carried {
             along * c2 - across * s2,
             -(L4 + L6) * c4 * v4 * v4 - L5 * c * w * w + GRAVITY,
         ];
-        mass[4 + 1] += self.inertia;
+        mass[4 + 1] += inertia;
         for i in 0..v.len() {
             for (row, bias) in jacobian.iter().zip(turned) {
-                torque[i] += self.mass * row[i] * bias;
+                torque[i] += carried * row[i] * bias;
                 for j in 0..v.len() {
-                    mass[4 * i + j] += self.mass * row[i] * row[j];
+                    mass[4 * i + j] += carried * row[i] * row[j];
                 }
             }
         }
-    }
+    })
 }
 
-#[derive(Debug)]
-struct AtOneJoint {
-    inertia: f64,
-}
-
-impl Effect for AtOneJoint {
-    fn inertia(&self, _motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
-        if let Some(mass) = mass.first_mut() {
-            *mass += self.inertia;
-        }
-    }
-}
-
-/// On the last link of a chain: m J'J + I J_w'J_w, and the same of what the speeds and gravity ask for. The
-/// spin of a ball has no torque of its own.
-#[derive(Debug)]
-struct LinkLoad {
+/// A ball on the last link of a chain, its centre in that link's frame \[m\]: m J'J + I J_w'J_w; its spin has no torque.
+fn on_last_link(
     chain: Tree,
-    mass: f64,
-    /// In the last link's frame \[m\].
+    carried: f64,
     centre: Vector3<f64>,
-    /// About any axis through the centre [kg m^2].
     inertia: f64,
-}
-
-impl Effect for LinkLoad {
-    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
-        let n = self.chain.joints();
-        let last = self.chain.links().len() - 1;
-        let gravity = Vector3::from(self.chain.gravity());
-        frames(&self.chain, motion.q, motion.v, |link, frame: &Frame| {
+) -> Result<Built, SimulateError> {
+    Built::inertia(move |motion, mass, torque| {
+        let n = chain.joints();
+        let last = chain.links().len() - 1;
+        let gravity = Vector3::from(chain.gravity());
+        frames(&chain, motion.q, motion.v, |link, frame: &Frame| {
             if link != last {
                 return;
             }
-            let arm = frame.rotation * self.centre;
+            let arm = frame.rotation * centre;
             let swept = frame.spin.cross(&frame.spin.cross(&arm));
-            let pull = self.mass * (frame.bias + frame.spin_bias.cross(&arm) + swept - gravity);
-            let twist = self.inertia * frame.spin_bias;
+            let pull = carried * (frame.bias + frame.spin_bias.cross(&arm) + swept - gravity);
+            let twist = inertia * frame.spin_bias;
             for i in 0..n {
-                let (turns, slides) =
-                    (frame.turns[i], frame.slides[i] + frame.turns[i].cross(&arm));
+                let moved = |j: usize| frame.slides[j] + frame.turns[j].cross(&arm);
+                let (turns, slides) = (frame.turns[i], moved(i));
                 torque[i] += slides.dot(&pull) + turns.dot(&twist);
                 for j in 0..=i {
-                    let other = frame.slides[j] + frame.turns[j].cross(&arm);
-                    let both =
-                        self.mass * slides.dot(&other) + self.inertia * turns.dot(&frame.turns[j]);
+                    let turned = inertia * turns.dot(&frame.turns[j]);
+                    let both = carried * slides.dot(&moved(j)) + turned;
                     mass[n * i + j] += both;
                     if i != j {
                         mass[n * j + i] += both;
@@ -154,5 +118,5 @@ impl Effect for LinkLoad {
                 }
             }
         });
-    }
+    })
 }

@@ -10,12 +10,8 @@ use cft_ident_core::effect::presliding::ENTRY;
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| {
-        let sigma0 = site.coulomb / bend(site.turns);
-        vec![
-            sigma0,
-            0.002 * site.coulomb / bend(site.turns),
-            site.coulomb,
-        ]
+        let (level, bend) = (site.coulomb, bend(site.turns));
+        vec![level / bend, 0.002 * level / bend, level]
     },
     build: |site, _, values| {
         let level = values[2];
@@ -41,7 +37,6 @@ const fn bend(turns: bool) -> f64 {
     if turns { 1e-3 } else { 1e-4 }
 }
 
-#[derive(Debug)]
 struct Presliding {
     joint: usize,
     sigma0: f64,

@@ -1,29 +1,17 @@
 //! `quantisation`: the logged torque of a joint is rounded to whole steps.
 
-use super::{Built, Fault, LoggedChannels, PlantLaw};
+use super::{Built, PlantLaw};
 use cft_ident_core::effect::quantisation::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.1 * site.scale],
     build: |site, _, values| {
-        Built::log(Quantisation {
-            joint: site.joint(),
-            step: values[0],
+        let (joint, step) = (site.joint(), values[0]);
+        Built::log(false, move |log| {
+            for torque in log.torques(joint) {
+                *torque = (*torque / step).round() * step;
+            }
         })
     },
 };
-
-#[derive(Debug)]
-struct Quantisation {
-    joint: usize,
-    step: f64,
-}
-
-impl Fault for Quantisation {
-    fn apply(&self, log: &mut LoggedChannels) {
-        for torque in log.torques(self.joint) {
-            *torque = (*torque / self.step).round() * self.step;
-        }
-    }
-}

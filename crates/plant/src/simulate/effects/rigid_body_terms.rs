@@ -2,8 +2,7 @@
 //!
 //! M, C and G are linear in the parameters, so the ten alone make the inertia and the torque that are added.
 
-use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
-use crate::simulate::SimulateError;
+use super::{Built, PlantLaw};
 use cft_ident_core::effect::rigid_body_terms::ENTRY;
 use cft_ident_core::robot::cft::dynamics::{Coefficients, inertia_and_bias};
 
@@ -15,37 +14,29 @@ pub static LAW: PlantLaw = PlantLaw {
             -0.25, 0.002, 0.003, 0.0005, -0.001, -0.12, 0.002, -0.002, -0.02, 0.03,
         ]
     },
-    build,
+    build: |site, machine, values| {
+        if machine.robot.coefficients(machine.theta).is_none() {
+            return Err(site.refuse(
+                ENTRY.name,
+                "a single joint has one inertia and nothing that its structure drops",
+            ));
+        }
+        let mut theta = [0.0; 22];
+        for (own, value) in theta[12..].iter_mut().zip(values) {
+            *own = *value;
+        }
+        let terms = Coefficients::from_theta22(&theta);
+        Built::inertia(move |motion, mass, torque| {
+            let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
+                return;
+            };
+            let (own, bias) = inertia_and_bias(q, v, &terms);
+            for (mass, own) in mass.iter_mut().zip(own.as_flattened()) {
+                *mass += own;
+            }
+            for (torque, own) in torque.iter_mut().zip(bias) {
+                *torque += own;
+            }
+        })
+    },
 };
-
-fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
-    if machine.robot.coefficients(machine.theta).is_none() {
-        return Err(site.refuse(
-            ENTRY.name,
-            "a single joint has one inertia and nothing that its structure drops",
-        ));
-    }
-    let mut theta = [0.0; 22];
-    for (own, value) in theta[12..].iter_mut().zip(values) {
-        *own = *value;
-    }
-    Built::plant(RigidBodyTerms(Coefficients::from_theta22(&theta)))
-}
-
-#[derive(Debug)]
-struct RigidBodyTerms(Coefficients);
-
-impl Effect for RigidBodyTerms {
-    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
-        let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
-            return;
-        };
-        let (own, bias) = inertia_and_bias(q, v, &self.0);
-        for (mass, own) in mass.iter_mut().zip(own.as_flattened()) {
-            *mass += own;
-        }
-        for (torque, own) in torque.iter_mut().zip(bias) {
-            *torque += own;
-        }
-    }
-}

@@ -3,8 +3,7 @@
 //! E(q) = sum over h = 1, 2, 3 of sin_h sin(h k q) + cos_h cos(h k q), with k = order per radian of a
 //! joint that turns (order 1/rev) and k = 2 pi order per metre of one that slides (order 1/m).
 
-use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
-use crate::simulate::SimulateError;
+use super::{Built, PlantLaw, Site};
 use cft_ident_core::effect::ripple::ENTRY;
 
 const HARMONICS: usize = 3;
@@ -12,7 +11,21 @@ const HARMONICS: usize = 3;
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![12.0, 0.1 * site.scale, 0.0, 0.0, 0.0, 0.0, 0.0],
-    build,
+    build: |site, _, values| {
+        let (joint, wavenumber) = (site.joint(), wavenumber(site, values[0]));
+        // sine and cosine part of each harmonic
+        let amplitudes: [[f64; 2]; HARMONICS] =
+            std::array::from_fn(|h| [values[1 + 2 * h], values[2 + 2 * h]]);
+        Built::torques(move |motion, torque| {
+            let angle = wavenumber * motion.q[joint];
+            for (h, [sin, cos]) in amplitudes.iter().enumerate() {
+                if *sin != 0.0 || *cos != 0.0 {
+                    let (s, c) = ((h + 1) as f64 * angle).sin_cos();
+                    torque[joint] += sin * s + cos * c;
+                }
+            }
+        })
+    },
 };
 
 /// Waves per radian of a joint that turns, or 2 pi times the waves per metre of one that slides.
@@ -21,34 +34,5 @@ pub(super) fn wavenumber(site: &Site, order: f64) -> f64 {
         order
     } else {
         std::f64::consts::TAU * order
-    }
-}
-
-fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
-    Built::plant(Ripple {
-        joint: site.joint(),
-        wavenumber: wavenumber(site, values[0]),
-        amplitudes: std::array::from_fn(|h| [values[1 + 2 * h], values[2 + 2 * h]]),
-    })
-}
-
-#[derive(Debug)]
-struct Ripple {
-    joint: usize,
-    /// rad per m or per rad.
-    wavenumber: f64,
-    /// Sine and cosine part of each harmonic.
-    amplitudes: [[f64; 2]; HARMONICS],
-}
-
-impl Effect for Ripple {
-    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
-        let angle = self.wavenumber * motion.q[self.joint];
-        for (h, [sin, cos]) in self.amplitudes.iter().enumerate() {
-            if *sin != 0.0 || *cos != 0.0 {
-                let (s, c) = ((h + 1) as f64 * angle).sin_cos();
-                torque[self.joint] += sin * s + cos * c;
-            }
-        }
     }
 }

@@ -3,7 +3,8 @@
 //! At x_r or y_r, J is a mass in kg on the screw's nut and the joints feel J_a^T J (J_a a + dJ_a/dt v) with the
 //! Jacobian J_a of the pantograph; at a joint they feel J a.
 
-use super::{Built, Effect, PlantLaw, PlantState};
+use super::{Built, PlantLaw};
+use crate::simulate::SimulateError;
 use cft_ident_core::effect::Place;
 use cft_ident_core::effect::rotor_inertia::ENTRY;
 use cft_ident_core::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
@@ -12,48 +13,29 @@ pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.25 * site.inertia],
     build: |site, _, values| match site.place {
-        Place::Actuator(row) => Built::plant(AtScrew {
-            row,
-            mass: values[0],
-        }),
-        _ => Built::plant(AtJoint {
-            joint: site.joint(),
-            inertia: values[0],
-        }),
+        Place::Actuator(row) => at_screw(row, values[0]),
+        _ => at_joint(site.joint(), values[0]),
     },
 };
 
-#[derive(Debug)]
-struct AtJoint {
-    joint: usize,
-    inertia: f64,
+/// Inertia of one joint, kg or kg m^2.
+pub(super) fn at_joint(joint: usize, inertia: f64) -> Result<Built, SimulateError> {
+    Built::inertia(move |motion, mass, _| mass[joint * (motion.q.len() + 1)] += inertia)
 }
 
-impl Effect for AtJoint {
-    fn inertia(&self, motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
-        mass[self.joint * (motion.q.len() + 1)] += self.inertia;
-    }
-}
-
-#[derive(Debug)]
-struct AtScrew {
-    row: usize,
-    mass: f64,
-}
-
-impl Effect for AtScrew {
-    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
+fn at_screw(row: usize, moving: f64) -> Result<Built, SimulateError> {
+    Built::inertia(move |motion, mass, torque| {
         let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
             return;
         };
-        let own = reference_jacobian(q)[self.row];
-        let rate = reference_jacobian_rate(q, v)[self.row];
+        let own = reference_jacobian(q)[row];
+        let rate = reference_jacobian_rate(q, v)[row];
         let drift = rate[0] * v[2] + rate[1] * v[3];
         for i in 0..2 {
-            torque[2 + i] += self.mass * own[i] * drift;
+            torque[2 + i] += moving * own[i] * drift;
             for j in 0..2 {
-                mass[4 * (2 + i) + 2 + j] += self.mass * own[i] * own[j];
+                mass[4 * (2 + i) + 2 + j] += moving * own[i] * own[j];
             }
         }
-    }
+    })
 }

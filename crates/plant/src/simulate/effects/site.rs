@@ -6,17 +6,16 @@ use crate::simulate::plant::Plant;
 use crate::simulate::temperature::PlantTemperatures;
 use cft_ident_core::effect::Place;
 use cft_ident_core::explain::ErrorText;
+use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::cft::geometry::L4;
 use cft_ident_core::robot::cft::pantograph;
-use cft_ident_core::robot::{JointKind, Robot};
 
 /// Middling speeds of a joint that slides \[m/s\] and of one that turns \[rad/s\].
 const SLIDING_SPEED: f64 = 0.2;
 const TURNING_SPEED: f64 = 0.5;
 /// Middling speed of the screws' nuts \[m/s\].
 const SCREW_SPEED: f64 = 0.05;
-/// Rate at which a torque of [`Site::scale`] that changes sign with the speed brings the joint to rest
-/// within its steep part \[1/s\]: steps of 0.3 ms stay stable.
+/// Rate at which a torque of [`Site::scale`] against the speed brings the joint to rest \[1/s\]: steps of 0.3 ms stay stable.
 const SIGN_RATE: f64 = 10_000.0;
 
 /// What an effect is built for.
@@ -61,20 +60,19 @@ impl Site {
     }
 
     /// Half of the travel, m or rad.
-    pub(crate) fn half_travel(&self) -> f64 {
+    pub(super) fn half_travel(&self) -> f64 {
         0.5 * (self.travel.1 - self.travel.0)
     }
 
     /// Refusal of a kind at this site.
     pub(super) fn refuse(&self, effect: &str, why: impl Into<ErrorText>) -> SimulateError {
-        let place = if self.name.is_empty() {
-            "this robot".to_owned()
-        } else {
-            self.name.clone()
+        let place = match self.name.as_str() {
+            "" => "this robot",
+            name => name,
         };
         SimulateError::EffectPlace {
             effect: effect.to_owned(),
-            place,
+            place: place.to_owned(),
             why: why.into(),
         }
     }
@@ -94,9 +92,9 @@ impl PlantRobot<'_> {
         self.robot.joints()
     }
 
-    /// Whether the joint of that index turns.
-    pub fn turns(&self, joint: usize) -> bool {
-        self.robot.joint_kind(joint) == JointKind::Revolute
+    /// The joint of a number, counted from one, that is another than `joint`.
+    pub(super) fn other_joint(&self, joint: usize, number: f64) -> Option<usize> {
+        (0..self.joints()).find(|&other| other != joint && (other + 1) as f64 == number)
     }
 }
 
@@ -119,8 +117,8 @@ impl<'a> Sites<'a> {
     /// [`SimulateError::NotPositiveDefinite`].
     pub fn of<const J: usize>(plant: &'a Plant<J>) -> Result<Self, SimulateError> {
         let robot = &plant.mechanism.robot;
-        let joints = match Workspace::of(plant)? {
-            Some(workspace) => workspace.joints()?,
+        let joints = match workspace(plant) {
+            Some((middle, poses)) => joints_in(plant, &middle, &poses)?,
             None => joints(plant),
         };
         let screws = screws(plant, &joints)?;
@@ -142,8 +140,7 @@ impl<'a> Sites<'a> {
     }
 }
 
-/// The joints of a robot whose workspace only its file knows: scales are the friction at a middling speed and
-/// the inertia in the middle of the travel.
+/// The joints of a robot whose workspace only its file knows, with their inertia in the middle of the travel.
 fn joints<const J: usize>(plant: &Plant<J>) -> Vec<Site> {
     let m = &plant.mechanism;
     // one joint alone has its inertia in every pose
@@ -151,28 +148,35 @@ fn joints<const J: usize>(plant: &Plant<J>) -> Vec<Site> {
         1 => (1.0, 1.0, 0.2),
         _ => (0.3, 0.5, 0.5),
     };
-    let names = m.robot.joint_names().iter().enumerate();
-    names
-        .map(|(j, name)| {
-            let [coulomb, viscous] = plant.laws[j].levels();
-            Site {
-                place: Place::Joint(j),
-                name: name.clone(),
-                turns: m.robot.joint_kind(j) == JointKind::Revolute,
-                scale: plant.laws[j].torque(at).abs(),
-                speed,
-                inertia: plant.inertia[j],
-                least_inertia: least * plant.inertia[j],
-                travel: m.travel(j),
-                coulomb,
-                viscous,
-            }
-        })
-        .collect()
+    let site = |j: usize| Site {
+        scale: plant.laws[j].torque(at).abs(),
+        inertia: plant.inertia[j],
+        least_inertia: least * plant.inertia[j],
+        travel: m.travel(j),
+        ..joint(plant, j, speed)
+    };
+    (0..m.joints()).map(site).collect()
 }
 
-/// Inertia that a motor feels that pushes along a direction of the joints at the motors' coordinates x, while
-/// the others are free to move.
+/// A joint with its friction at a middling speed, whose inertia and travel are still to be given.
+fn joint<const J: usize>(plant: &Plant<J>, j: usize, speed: f64) -> Site {
+    let robot = &plant.mechanism.robot;
+    let [coulomb, viscous] = plant.laws[j].levels();
+    Site {
+        place: Place::Joint(j),
+        name: robot.joint_names()[j].clone(),
+        turns: plant.mechanism.turns(j),
+        scale: plant.laws[j].torque(speed).abs(),
+        speed,
+        inertia: 0.0,
+        least_inertia: 0.0,
+        travel: (f64::INFINITY, f64::NEG_INFINITY),
+        coulomb,
+        viscous,
+    }
+}
+
+/// Inertia felt by a motor that pushes along a direction of the joints at the motors' coordinates x, the others free.
 fn felt<const J: usize>(
     plant: &Plant<J>,
     x: &[f64; J],
@@ -186,77 +190,57 @@ fn felt<const J: usize>(
     Ok(1.0 / speed)
 }
 
-/// A robot whose workspace is known.
-struct Workspace<'a, const J: usize> {
-    plant: &'a Plant<J>,
-    middle: [f64; J],
-    /// Motors' coordinates all over the limits, corners and middles included; the others stay at both ends.
-    poses: Vec<[f64; J]>,
+/// The middle of the motors' coordinates and poses all over their limits, where the robot's workspace is known.
+fn workspace<const J: usize>(plant: &Plant<J>) -> Option<([f64; J], Vec<[f64; J]>)> {
+    const STEPS: usize = 4;
+    const EACH: usize = STEPS + 1;
+    let m = &plant.mechanism;
+    let (limits, practice) = (m.robot.transmission().limits()?, m.practice.as_ref()?);
+    let spans = limits.spans();
+    let share = |i: usize, k: usize| limits.lower[i] + spans[i] * k as f64 / STEPS as f64;
+    let matter: Vec<usize> = (0..m.joints()).filter(|i| *i != practice.uniform).collect();
+    // corners and middles; a coordinate that changes nothing but its own position stays at both ends
+    let poses = (0..EACH.pow(matter.len() as u32)).flat_map(|k| [(k, 0), (k, STEPS)]);
+    let pose = |(mut rest, end): (usize, usize)| {
+        let mut x = m.filled(|i| share(i, end));
+        for &i in &matter {
+            x[i] = share(i, rest % EACH);
+            rest /= EACH;
+        }
+        x
+    };
+    Some((m.filled(|i| limits.middles()[i]), poses.map(pose).collect()))
 }
 
-impl<'a, const J: usize> Workspace<'a, J> {
-    fn of(plant: &'a Plant<J>) -> Result<Option<Self>, SimulateError> {
-        const STEPS: usize = 4;
-        const EACH: usize = STEPS + 1;
-        let m = &plant.mechanism;
-        let limits = m.robot.transmission().limits();
-        let (Some(limits), Some(practice)) = (limits, &m.practice) else {
-            return Ok(None);
+/// The joints by the poses of their workspace: scales are the friction at a middling speed and the inertia in the middle.
+fn joints_in<const J: usize>(
+    plant: &Plant<J>,
+    middle: &[f64; J],
+    poses: &[[f64; J]],
+) -> Result<Vec<Site>, SimulateError> {
+    let m = &plant.mechanism;
+    let mut joints = Vec::with_capacity(m.joints());
+    for j in 0..m.joints() {
+        let mut direction = [0.0; J];
+        direction[j] = 1.0;
+        let speed = match m.turns(j) {
+            true => TURNING_SPEED,
+            false => SLIDING_SPEED,
         };
-        let spans = limits.spans();
-        let share = |i: usize, k: usize| limits.lower[i] + spans[i] * k as f64 / STEPS as f64;
-        let matter: Vec<usize> = (0..m.joints()).filter(|i| *i != practice.uniform).collect();
-        let mut poses = Vec::with_capacity(2 * EACH.pow(matter.len() as u32));
-        for k in 0..EACH.pow(matter.len() as u32) {
-            for end in [0, STEPS] {
-                let (mut x, mut rest) = (m.filled(|i| share(i, end)), k);
-                for &i in &matter {
-                    x[i] = share(i, rest % EACH);
-                    rest /= EACH;
-                }
-                poses.push(x);
-            }
+        let mut site = Site {
+            inertia: felt(plant, middle, &direction)?,
+            least_inertia: f64::INFINITY,
+            ..joint(plant, j, speed)
+        };
+        for x in poses {
+            let felt = felt(plant, x, &direction)?;
+            site.least_inertia = site.least_inertia.min(felt);
+            let q = m.pose(x)?[j];
+            site.travel = (site.travel.0.min(q), site.travel.1.max(q));
         }
-        Ok(Some(Self {
-            plant,
-            middle: m.filled(|i| limits.middles()[i]),
-            poses,
-        }))
+        joints.push(site);
     }
-
-    /// Scales are the friction of each joint at a middling speed and its inertia in the middle of the limits.
-    fn joints(&self) -> Result<Vec<Site>, SimulateError> {
-        let m = &self.plant.mechanism;
-        let mut joints = Vec::with_capacity(m.joints());
-        for (j, name) in m.robot.joint_names().iter().enumerate() {
-            let law = &self.plant.laws[j];
-            let mut direction = [0.0; J];
-            direction[j] = 1.0;
-            let mut least = f64::INFINITY;
-            let mut travel = (f64::INFINITY, f64::NEG_INFINITY);
-            for x in &self.poses {
-                least = least.min(felt(self.plant, x, &direction)?);
-                let q = m.pose(x)?[j];
-                travel = (travel.0.min(q), travel.1.max(q));
-            }
-            let [coulomb, viscous] = law.levels();
-            let turns = m.robot.joint_kind(j) == JointKind::Revolute;
-            let speed = if turns { TURNING_SPEED } else { SLIDING_SPEED };
-            joints.push(Site {
-                place: Place::Joint(j),
-                name: name.clone(),
-                turns,
-                scale: law.torque(speed).abs(),
-                speed,
-                inertia: felt(self.plant, &self.middle, &direction)?,
-                least_inertia: least,
-                travel,
-                coulomb,
-                viscous,
-            });
-        }
-        Ok(joints)
-    }
+    Ok(joints)
 }
 
 /// The screws of the pantograph.

@@ -103,30 +103,21 @@ impl EffectSpec {
         let found = LAWS.iter().find(|law| law.entry.name == self.name);
         found.copied().ok_or_else(|| {
             let known: Vec<&str> = LAWS.iter().map(|law| law.entry.name).collect();
-            SimulateError::UnknownEffect {
-                name: self.name.clone(),
-                known: known.join(", "),
-            }
+            let (name, known) = (self.name.clone(), known.join(", "));
+            SimulateError::UnknownEffect { name, known }
         })
     }
 
     /// The sites that the effect acts on: the one that is named, or all that the effect may sit at.
     pub(super) fn sites<'a>(
         &self,
-        effect: &str,
         places: Places,
         sites: &'a Sites,
     ) -> Result<&'a [Site], SimulateError> {
         let whole = sites.whole.as_slice();
-        let refuse = |why: ErrorText| {
-            let first = whole.first().or(sites.joints.first());
-            first.map_or_else(
-                || SimulateError::UnknownJoint {
-                    name: String::new(),
-                    known: String::new(),
-                },
-                |site| site.refuse(effect, why),
-            )
+        let refuse = |why: ErrorText| match whole.first().or(sites.joints.first()) {
+            Some(site) => site.refuse(&self.name, why),
+            None => SimulateError::unknown_joint("", &[]),
         };
         let (joints, screws): (&[Site], &[Site]) = match places {
             Places::Joints | Places::JointsOrAll | Places::Pairs => (&sites.joints, &[]),
@@ -150,30 +141,38 @@ impl EffectSpec {
             list.get(place..=place)
         };
         named(joints).or_else(|| named(screws)).ok_or_else(|| {
-            let known = joints.iter().chain(screws).map(|site| site.name.as_str());
-            SimulateError::UnknownJoint {
-                name: name.clone(),
-                known: known.collect::<Vec<_>>().join(", "),
-            }
+            let known = joints.iter().chain(screws).map(|site| site.name.clone());
+            SimulateError::unknown_joint(name, &known.collect::<Vec<_>>())
         })
+    }
+
+    /// Refuses the first key that is none of those known.
+    pub(super) fn check_keys(&self, known: Vec<&str>) -> Result<(), SimulateError> {
+        let mut given = self.values.iter().map(|(key, _)| key);
+        match given.find(|key| !known.contains(&key.as_str())) {
+            None => Ok(()),
+            Some(key) => Err(SimulateError::UnknownKey {
+                effect: self.name.clone(),
+                key: key.clone(),
+                known: known.join(", "),
+            }),
+        }
+    }
+
+    /// The number that is given for a key.
+    pub(super) fn given(&self, key: &str) -> Option<f64> {
+        let mut all = self.values.iter();
+        all.find(|(name, _)| name == key).map(|(_, value)| *value)
     }
 
     /// One number per key of the effect.
     pub(super) fn numbers(&self, law: &PlantLaw, site: &Site) -> Result<Vec<f64>, SimulateError> {
         let keys = law.entry.keys;
-        for (key, _) in &self.values {
-            if law.entry.key(key).is_none() {
-                return Err(SimulateError::UnknownKey {
-                    effect: law.entry.name.to_owned(),
-                    key: key.clone(),
-                    known: keys.iter().map(|k| k.name).collect::<Vec<_>>().join(", "),
-                });
-            }
-        }
-        let given = |key: &Key| self.values.iter().find(|(k, _)| k == key.name);
-        let sized = keys.iter().any(|key| key.size && given(key).is_some());
-        let number = |(key, default): (&Key, f64)| match given(key) {
-            Some((_, number)) => *number,
+        self.check_keys(keys.iter().map(|key| key.name).collect())?;
+        let sized = |key: &Key| key.size && self.given(key.name).is_some();
+        let sized = keys.iter().any(sized);
+        let number = |(key, default): (&Key, f64)| match self.given(key.name) {
+            Some(number) => number,
             None if key.size && sized => 0.0,
             None => default,
         };
@@ -185,16 +184,14 @@ impl EffectSpec {
 impl EffectValue {
     pub(super) fn new(entry: &Entry, site: &Site, machine: &PlantRobot, numbers: &[f64]) -> Self {
         let pairs = || entry.keys.iter().zip(numbers);
-        let kind = |turns: bool| match turns {
+        let own = match site.turns {
             true => JointKind::Revolute,
             false => JointKind::Prismatic,
         };
-        let own = kind(site.turns);
         // Joints are counted from one; `from` is a joint where units follow it.
         let from = pairs().find(|(key, _)| entry.places == Places::Pairs && key.name == "from");
-        let from = from.map_or(own, |(_, number)| {
-            kind(machine.turns((*number - 1.0).max(0.0) as usize))
-        });
+        let joint = |(_, number): (_, &f64)| (*number - 1.0).max(0.0) as usize;
+        let from = from.map_or(own, |pair| machine.robot.joint_kind(joint(pair)));
         let torque = if site.turns { "Nm" } else { "N" };
         let parameter = |(key, &value): (&Key, &f64)| {
             let unit = key.unit.text(own, from, torque);

@@ -1,32 +1,16 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3, a cable or a return spring.
 
-use super::{Built, Effect, PlantLaw, PlantState};
+use super::{Built, PlantLaw};
 use cft_ident_core::effect::spring::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.3 * site.scale / site.half_travel(), site.middle(), 0.0],
     build: |site, _, values| {
-        Built::plant(Spring {
-            joint: site.joint(),
-            k: values[0],
-            rest: values[1],
-            cubic: values[2],
+        let (k, rest, cubic) = (values[0], values[1], values[2]);
+        Built::torque(site, move |m| {
+            let x = m.q - rest;
+            x * (k + cubic * x * x)
         })
     },
 };
-
-#[derive(Debug)]
-struct Spring {
-    joint: usize,
-    k: f64,
-    rest: f64,
-    cubic: f64,
-}
-
-impl Effect for Spring {
-    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
-        let x = motion.q[self.joint] - self.rest;
-        torque[self.joint] += x * (self.k + self.cubic * x * x);
-    }
-}

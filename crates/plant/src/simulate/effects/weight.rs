@@ -1,6 +1,6 @@
 //! `weight`: the moment of a point mass on a lever.
 
-use super::{Built, Effect, PlantLaw, PlantState};
+use super::{Built, PlantLaw};
 use cft_ident_core::effect::weight::ENTRY;
 use cft_ident_core::explain::ErrorText;
 
@@ -15,25 +15,8 @@ pub static LAW: PlantLaw = PlantLaw {
                     .remedy("use `torque-offset`"),
             ));
         }
-        Built::plant(Weight {
-            joint: site.joint(),
-            moment: values[0].hypot(values[1]),
-            level: values[0].atan2(values[1]),
-        })
+        // mass times gravity times lever [Nm], and where the lever is level [rad]
+        let (moment, level) = (values[0].hypot(values[1]), values[0].atan2(values[1]));
+        Built::torque(site, move |m| moment * (m.q - level).cos())
     },
 };
-
-#[derive(Debug)]
-struct Weight {
-    joint: usize,
-    /// Mass times gravity times lever [Nm].
-    moment: f64,
-    /// Where the lever is level [rad].
-    level: f64,
-}
-
-impl Effect for Weight {
-    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
-        torque[self.joint] += self.moment * (motion.q[self.joint] - self.level).cos();
-    }
-}

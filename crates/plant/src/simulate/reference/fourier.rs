@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use rand::RngExt;
 
-use super::{Clock, Target};
+use super::{Blend, Target};
 use crate::simulate::SimulateError;
 use crate::simulate::chance::{Purpose, stream};
 use cft_ident_core::robot::cft::{Setup, practice};
@@ -75,51 +75,30 @@ impl<const J: usize> Fourier<J> {
     /// [`SimulateError::Reference`] when a number is not finite, the frequency not positive, or a and
     /// b differ in length.
     pub fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
-        if !(self.fundamental > 0.0 && self.fundamental.is_finite()) {
-            return reject(
-                ErrorText::new(format!(
-                    "the fundamental frequency is {} rad/s",
-                    self.fundamental
-                ))
-                .remedy("it must be positive"),
-            );
-        }
-        if !(self.blend >= 0.0 && self.blend.is_finite() && self.start.is_finite()) {
-            return reject(
-                format!(
-                    "the blend time {} s or the start phase {} s is no usable time",
-                    self.blend, self.start
-                )
-                .into(),
-            );
-        }
-        if self.a.len() != self.b.len() {
-            return reject(
-                ErrorText::new(format!(
-                    "the series has {} coefficients a and {} coefficients b",
-                    self.a.len(),
-                    self.b.len()
-                ))
-                .remedy("give as many of each"),
-            );
-        }
-        let numbers = self.a.iter().chain(&self.b).flatten().chain(&self.offset);
-        for number in numbers {
-            if !number.is_finite() {
-                return reject(format!("a coefficient of the series is {number}").into());
-            }
-        }
-        Ok(())
+        let (w, blend, start) = (self.fundamental, self.blend, self.start);
+        let (a, b) = (self.a.len(), self.b.len());
+        let mut numbers = self.a.iter().chain(&self.b).flatten().chain(&self.offset);
+        let what = if !(w > 0.0 && w.is_finite()) {
+            let text = format!("the fundamental frequency is {w} rad/s");
+            ErrorText::new(text).remedy("it must be positive")
+        } else if !(blend >= 0.0 && blend.is_finite() && start.is_finite()) {
+            format!("the blend time {blend} s or the start phase {start} s is no usable time")
+                .into()
+        } else if a != b {
+            let text = format!("the series has {a} coefficients a and {b} coefficients b");
+            ErrorText::new(text).remedy("give as many of each")
+        } else if let Some(number) = numbers.find(|x| !x.is_finite()) {
+            format!("a coefficient of the series is {number}").into()
+        } else {
+            return Ok(());
+        };
+        Err(SimulateError::Reference { what })
     }
 
     /// Position and velocity at time t >= 0 \[s\].
     pub fn at(&self, t: f64) -> Target<J> {
-        let [phase, rate, _] = self.clock().at(self.period(), t);
-        let mut target = Target {
-            position: self.offset,
-            velocity: [0.0; J],
-        };
+        let [phase, rate, _] = self.ends().clock(self.period(), t);
+        let mut target = Target::rest(self.offset);
         for (l, (a, b)) in self.a.iter().zip(&self.b).enumerate() {
             let omega = self.fundamental * (l + 1) as f64;
             let (sin, cos) = (omega * phase).sin_cos();
@@ -133,13 +112,13 @@ impl<const J: usize> Fourier<J> {
 
     /// Duration of the motion \[s\], where it ends.
     pub fn seconds(&self) -> Option<f64> {
-        self.clock().seconds(self.period())
+        self.ends().end(self.period())
     }
 
-    fn clock(&self) -> Clock {
-        Clock {
+    fn ends(&self) -> Blend {
+        Blend {
             start: self.start,
-            blend: self.blend,
+            seconds: self.blend,
             periods: self.periods,
         }
     }
@@ -155,41 +134,34 @@ mod tests {
         let h = 1e-5;
         for k in 1..200 {
             let t = 0.05 * f64::from(k);
-            let (before, here, after) = (series.at(t - h), series.at(t), series.at(t + h));
+            let [before, here, after] = [t - h, t, t + h].map(|t| series.at(t));
             for i in 0..4 {
                 let slope = (after.position[i] - before.position[i]) / (2.0 * h);
-                assert!(
-                    (slope - here.velocity[i]).abs() < 1e-8,
-                    "t {t}, coordinate {i}: {slope} against {}",
-                    here.velocity[i]
-                );
+                let off = (slope - here.velocity[i]).abs();
+                assert!(off < 1e-8, "t {t}, coordinate {i}: {slope} is {off} off");
             }
         }
     }
 
     #[test]
-    fn motion_starts_at_rest_and_ends_periodic() {
-        let series = Fourier::table_3();
-        assert_eq!(series.at(0.0).velocity, [0.0; 4]);
-        let (one, next) = (series.at(5.0), series.at(5.0 + series.period()));
+    fn motion_starts_at_rest_repeats_itself_and_ends_at_rest_behind_whole_periods() {
+        let endless = Fourier::table_3();
+        assert_eq!(endless.seconds(), None);
+        assert_eq!(endless.at(0.0).velocity, [0.0; 4]);
+        let (one, next) = (endless.at(5.0), endless.at(5.0 + endless.period()));
         for i in 0..4 {
             assert!((one.position[i] - next.position[i]).abs() < 1e-12);
             assert!((one.velocity[i] - next.velocity[i]).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn motion_of_whole_periods_ends_at_rest() {
         let series = Fourier {
             periods: Some(3),
-            ..Fourier::table_3()
+            ..endless
         };
         let end = series.seconds().expect("it ends");
         assert!((end - 11.5).abs() < 1e-12);
         assert_eq!(series.at(end).velocity, [0.0; 4]);
         assert_eq!(series.at(end + 1.0), series.at(end));
-        assert_eq!(series.at(5.0), Fourier::table_3().at(5.0));
-        assert_eq!(Fourier::table_3().seconds(), None);
+        assert_eq!(series.at(5.0), one);
     }
 
     #[test]

@@ -66,16 +66,16 @@ impl LadderPlan {
         count: usize,
         acceleration: f64,
     ) -> Vec<f64> {
-        let top = top.min(top_speed(range, acceleration)).max(lowest);
+        let top = top.min(Self::fastest(range, acceleration)).max(lowest);
         let steps = count.max(2) - 1;
-        (0..=steps)
-            .map(|k| top * (lowest / top).powf(k as f64 / steps as f64))
-            .collect()
+        let speed = |k| top * (lowest / top).powf(k as f64 / steps as f64);
+        (0..=steps).map(speed).collect()
     }
 
-    /// Largest plateau speed that a range leaves room for at an acceleration.
-    pub fn fastest(range: (f64, f64), acceleration: f64) -> f64 {
-        top_speed(range, acceleration)
+    /// Largest plateau speed whose ramps leave [`PLATEAU_SHARE`] of the range.
+    pub(crate) fn fastest((low, high): (f64, f64), acceleration: f64) -> f64 {
+        let ramps = 2.0 * PEAK * Meeting::Turn.distance(1.0);
+        ((1.0 - PLATEAU_SHARE) * (high - low) * acceleration / ramps).sqrt()
     }
 
     /// Ladder of ten speeds in equal ratios from `top` (as far as the range lets it) to `lowest`, or of as
@@ -97,14 +97,8 @@ impl LadderPlan {
             };
             plan.build_seeded(seed)
         };
-        let mut outcome = build(SPEEDS);
-        for count in (2..SPEEDS).rev() {
-            if outcome.is_ok() {
-                break;
-            }
-            outcome = build(count);
-        }
-        outcome
+        let fewer = |outcome: Result<_, _>, count| outcome.or_else(|_| build(count));
+        (2..SPEEDS).rev().fold(build(SPEEDS), fewer)
     }
 
     /// [`LadderPlan::build`] with the chance of a seed, or without.
@@ -118,18 +112,19 @@ impl LadderPlan {
     /// # Errors
     /// [`SimulateError::Reference`] when the range is empty, a speed does not fit into it, or the time
     /// does not suffice for one pass.
-    pub fn build(&self, chance: Option<&mut ChaCha8Rng>) -> Result<LadderReference, SimulateError> {
+    pub fn build(
+        &self,
+        mut chance: Option<&mut ChaCha8Rng>,
+    ) -> Result<LadderReference, SimulateError> {
         self.check()?;
         let mut speeds = self.speeds.clone();
         speeds.sort_by(|a, b| b.total_cmp(a));
         let passes = (self.seconds / PASS).round().max(1.0) as usize;
-        let sweeping = self.sweeping(&speeds, self.seconds / passes as f64);
-        let mut mirrored = false;
+        let pass = self.seconds / passes as f64;
+        let sweeping = self.sweeping(&speeds, pass);
         let mut order = Vec::with_capacity(2 * speeds.len() * passes);
-        let mut chance = chance;
-        if let Some(chance) = chance.as_deref_mut() {
-            mirrored = chance.random_bool(0.5);
-        }
+        let turned = chance.as_deref_mut().map(|chance| chance.random_bool(0.5));
+        let mirrored = turned.unwrap_or(false);
         for _ in 0..passes {
             let (mut fast, mut slow) = (speeds[..sweeping].to_vec(), speeds[sweeping..].to_vec());
             if let Some(chance) = chance.as_deref_mut() {
@@ -141,24 +136,21 @@ impl LadderPlan {
         // The plateau time of the slow strokes fills what the sweeps leave.
         let shortest = self.lay_out(&order, 0.0, mirrored);
         if shortest.end > self.seconds {
-            return Err(SimulateError::Reference {
-                what: ErrorText::new(format!(
-                    "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s",
-                    speeds.len(),
-                    shortest.end / passes as f64,
-                    self.seconds / passes as f64
-                ))
-                .remedy("give more seconds, fewer speeds or a smaller range"),
-            });
+            let needed = shortest.end / passes as f64;
+            let text = format!(
+                "the ladder of {} speeds needs at least {needed:.1} s in each pass and has {pass:.1} s",
+                speeds.len()
+            );
+            let remedy = "give more seconds, fewer speeds or a smaller range";
+            return Err(SimulateError::reference(
+                ErrorText::new(text).remedy(remedy),
+            ));
         }
         let (mut low, mut high) = (0.0, self.seconds);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.lay_out(&order, middle, mirrored).end > self.seconds {
-                high = middle;
-            } else {
-                low = middle;
-            }
+            let long = self.lay_out(&order, middle, mirrored).end > self.seconds;
+            *(if long { &mut high } else { &mut low }) = middle;
         }
         Ok(self.lay_out(&order, low, mirrored))
     }
@@ -178,41 +170,44 @@ impl LadderPlan {
         let Some(stroke) = ladder.strokes.iter().find(leaves) else {
             return Ok(ladder);
         };
-        Err(SimulateError::Reference {
-            what: ErrorText::new(format!("the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]", stroke.speed, self.turn, stroke.length())).remedy("give a shorter turn, a lower speed or a wider range"),
-        })
+        let text = format!(
+            "the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]",
+            stroke.speed,
+            self.turn,
+            stroke.length()
+        );
+        let remedy = "give a shorter turn, a lower speed or a wider range";
+        Err(SimulateError::reference(
+            ErrorText::new(text).remedy(remedy),
+        ))
     }
 
     fn check(&self) -> Result<(), SimulateError> {
-        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
-        let (low, high) = self.range;
+        let reject = |what: String| Err(SimulateError::reference(what));
+        let ((low, high), acceleration) = (self.range, self.acceleration);
+        let (turn, seconds) = (self.turn, self.seconds);
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(low.is_finite() && high.is_finite() && high > low) {
-            return reject(format!("the range [{low}, {high}] of the ladder is empty").into());
+            return reject(format!("the range [{low}, {high}] of the ladder is empty"));
         }
-        if !(positive(self.acceleration) && positive(self.turn) && positive(self.seconds)) {
-            return reject(
-                format!(
-                    "acceleration {}, turn time {} s and duration {} s must be positive",
-                    self.acceleration, self.turn, self.seconds
-                )
-                .into(),
-            );
+        if ![acceleration, turn, seconds].into_iter().all(positive) {
+            return reject(format!(
+                "acceleration {acceleration}, turn time {turn} s and duration {seconds} s must be positive"
+            ));
         }
         if self.speeds.is_empty() {
-            return reject(ErrorText::new("the ladder has no speeds").remedy("give at least one"));
+            let none = ErrorText::new("the ladder has no speeds");
+            return Err(SimulateError::reference(none.remedy("give at least one")));
         }
-        let fastest = top_speed(self.range, self.acceleration);
-        for &speed in &self.speeds {
-            if !positive(speed) || speed > fastest * (1.0 + 1e-9) {
-                return reject(format!(
-                    "the speed {speed} does not fit: over the range [{low}, {high}] at an acceleration of {} \
-                     the ladder reaches {fastest:.4}",
-                    self.acceleration
-                ).into());
-            }
+        let fastest = Self::fastest(self.range, acceleration);
+        let fits = |speed: f64| positive(speed) && speed <= fastest * (1.0 + 1e-9);
+        match self.speeds.iter().find(|speed| !fits(**speed)) {
+            None => Ok(()),
+            Some(speed) => reject(format!(
+                "the speed {speed} does not fit: over the range [{low}, {high}] at an acceleration of {acceleration} \
+                 the ladder reaches {fastest:.4}"
+            )),
         }
-        Ok(())
     }
 
     /// How many of the (descending) speeds sweep the whole range: as many as fit into half the time.
@@ -235,6 +230,7 @@ impl LadderPlan {
         (PEAK * before.max(after) / self.turn).min(self.acceleration)
     }
 
+    /// The strokes in order, the slow ones with that time at their speed.
     fn lay_out(&self, order: &[Rung], plateau: f64, mirrored: bool) -> LadderReference {
         let (low, high) = self.range;
         let mut strokes = Vec::with_capacity(order.len());
@@ -244,11 +240,7 @@ impl LadderPlan {
             let before = k.checked_sub(1).map(|k| order[k].speed);
             let after = order.get(k + 1).map(|r| r.speed);
             let ramp = |neighbour: Option<f64>| {
-                let meeting = if neighbour.is_some() {
-                    Meeting::Turn
-                } else {
-                    Meeting::Rest
-                };
+                let meeting = neighbour.map_or(Meeting::Rest, |_| Meeting::Turn);
                 let acceleration = self.meeting(rung.speed, neighbour.unwrap_or(0.0));
                 (meeting, PEAK * rung.speed / acceleration)
             };
@@ -261,10 +253,9 @@ impl LadderPlan {
                 plateau,
                 fall: ramp(after),
             };
-            let room = if direction > 0.0 {
-                high - position
-            } else {
-                position - low
+            let room = match direction > 0.0 {
+                true => high - position,
+                false => position - low,
             };
             let longest = ((room - stroke.ramps()) / rung.speed).max(0.0);
             if rung.sweeps || plateau > longest {
@@ -283,26 +274,14 @@ impl LadderPlan {
     }
 }
 
-/// Largest plateau speed whose ramps leave [`PLATEAU_SHARE`] of the range.
-fn top_speed((low, high): (f64, f64), acceleration: f64) -> f64 {
-    let ramps = 2.0 * PEAK * Meeting::Turn.distance(1.0);
-    ((1.0 - PLATEAU_SHARE) * (high - low) * acceleration / ramps).sqrt()
-}
-
 /// Each fast speed sweeps there and back; the slow ones follow in pairs, spread evenly behind the sweeps.
 fn interleave(fast: &[f64], slow: &[f64], order: &mut Vec<Rung>) {
     let slots = 2 * fast.len();
+    let rung = |speed, sweeps| Rung { speed, sweeps };
     for slot in 0..slots {
-        order.push(Rung {
-            speed: fast[slot / 2],
-            sweeps: true,
-        });
+        order.push(rung(fast[slot / 2], true));
         for &speed in &slow[slot * slow.len() / slots..(slot + 1) * slow.len() / slots] {
-            let rung = Rung {
-                speed,
-                sweeps: false,
-            };
-            order.extend([rung, rung]);
+            order.extend([rung(speed, false); 2]);
         }
     }
 }
@@ -315,9 +294,8 @@ impl LadderReference {
 
     /// Plateau speeds with their durations \[s\], in time order; negative in the downward direction.
     pub fn plateaus(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.strokes
-            .iter()
-            .map(|s| (s.direction * s.speed, s.plateau))
+        let each = self.strokes.iter();
+        each.map(|s| (s.direction * s.speed, s.plateau))
     }
 
     /// Position and velocity at time t \[s\].
@@ -353,9 +331,7 @@ mod tests {
     #[test]
     fn ladder_fills_its_time_and_stays_inside_its_range() {
         for seed in 0..50 {
-            let ladder = plan()
-                .build(Some(&mut stream(seed, Purpose::Reference)))
-                .expect("feasible");
+            let ladder = plan().build_seeded(Some(seed)).expect("feasible");
             assert!(ladder.end > 19.0 && ladder.end <= 20.0, "{}", ladder.end);
             for k in 0..=20_000 {
                 let (x, v) = ladder.at(1e-3 * f64::from(k));
@@ -370,15 +346,10 @@ mod tests {
         let ladder = plan().build(None).expect("feasible");
         for speed in plan().speeds {
             for sign in [1.0, -1.0] {
-                let longest = ladder
-                    .plateaus()
-                    .filter(|(v, _)| (v / (sign * speed) - 1.0).abs() < 1e-9)
-                    .map(|(_, seconds)| seconds)
-                    .fold(0.0, f64::max);
-                assert!(
-                    longest > 0.15,
-                    "{speed} m/s in direction {sign}: {longest} s"
-                );
+                let near = |v: f64| (v / (sign * speed) - 1.0).abs() < 1e-9;
+                let own = ladder.plateaus().filter(|(v, _)| near(*v));
+                let longest = own.fold(0.0, |longest, (_, seconds)| seconds.max(longest));
+                assert!(longest > 0.15, "{} m/s: {longest} s", sign * speed);
             }
         }
     }
@@ -389,7 +360,7 @@ mod tests {
         let h = 1e-5;
         for k in 1..19_999 {
             let t = 1e-3 * f64::from(k);
-            let ((x0, v0), (_, v), (x1, v1)) = (ladder.at(t - h), ladder.at(t), ladder.at(t + h));
+            let [(x0, v0), (_, v), (x1, v1)] = [t - h, t, t + h].map(|t| ladder.at(t));
             assert!(((x1 - x0) / (2.0 * h) - v).abs() < 1e-6, "at {t} s");
             assert!((v1 - v0).abs() / (2.0 * h) < 3.0 + 1e-6, "at {t} s");
         }
@@ -403,56 +374,34 @@ mod tests {
             (0.5 / 200.0..2.0 / 200.0).contains(&v)
         });
         assert!(inside.count() > 2000);
-        let crossing = (1..19_000).filter(|&k| {
-            let (before, after) = (
-                ladder.at(1e-3 * f64::from(k)).1,
-                ladder.at(1e-3 * f64::from(k + 1)).1,
-            );
-            before == 0.0 && after == 0.0
-        });
-        assert_eq!(crossing.count(), 0);
+        let still = |k: i32| ladder.at(1e-3 * f64::from(k)).1 == 0.0;
+        assert!(!(1..19_000).any(|k| still(k) && still(k + 1)));
     }
 
     #[test]
     fn short_ladders_have_fewer_speeds_and_still_both_ends_of_the_range_of_speeds() {
+        let usual = |seconds| LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, seconds, None);
         for seconds in [4.0, 6.0, 10.0, 15.0] {
-            let ladder =
-                LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, seconds, None).expect("fits");
-            assert!(
-                ladder.end <= seconds && ladder.end > 0.9 * seconds,
-                "{}",
-                ladder.end
-            );
+            let ladder = usual(seconds).expect("fits");
+            let end = ladder.end;
+            assert!(end <= seconds && end > 0.9 * seconds, "{end}");
             let speeds = ladder.plateaus().map(|(v, _)| v.abs());
             let (low, high) = speeds.fold((f64::MAX, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
-            assert!(
-                (low - 0.0015).abs() < 1e-12 && (high - 0.633).abs() < 0.03,
-                "{low} {high}"
-            );
+            assert!((low - 0.0015).abs() < 1e-12, "{low}");
+            assert!((high - 0.633).abs() < 0.03, "{high}");
         }
-        assert!(LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, 1.0, None).is_err());
+        assert!(usual(1.0).is_err());
     }
 
     #[test]
-    fn seeds_change_the_order_and_repeat_it() {
-        let build = |seed| {
-            plan()
-                .build(Some(&mut stream(seed, Purpose::Reference)))
-                .expect("feasible")
-        };
+    fn seeds_change_the_order_and_repeat_it_and_long_ladders_repeat_their_passes() {
+        let build = |seed| plan().build_seeded(Some(seed)).expect("feasible");
         assert_eq!(build(3), build(3));
         assert_ne!(build(3), build(4));
-    }
-
-    #[test]
-    fn long_ladders_repeat_their_passes() {
-        let long = LadderPlan {
-            seconds: 100.0,
-            ..plan()
-        };
+        let mut long = plan();
+        long.seconds = 100.0;
         let ladder = long.build(None).expect("feasible");
-        assert_eq!(ladder.strokes.len(), 100);
-        assert!(ladder.end > 95.0);
+        assert!(ladder.strokes.len() == 100 && ladder.end > 95.0);
     }
 
     #[test]

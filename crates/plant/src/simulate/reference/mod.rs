@@ -1,13 +1,13 @@
 //! References that the controller follows: Fourier series (43), one-joint ladder, point list, hold.
 
-mod clock;
+mod blend;
 mod fourier;
 mod ladder;
 mod points;
 mod stroke;
 mod travel;
 
-pub use clock::Clock;
+pub use blend::Blend;
 pub use fourier::Fourier;
 pub use ladder::{LadderPlan, LadderReference, TURN};
 pub use points::Points;
@@ -22,6 +22,13 @@ pub struct Target<const J: usize> {
     pub position: [f64; J],
     /// m/s or rad/s.
     pub velocity: [f64; J],
+}
+
+impl<const J: usize> Target<J> {
+    fn rest(position: [f64; J]) -> Self {
+        let velocity = [0.0; J];
+        Self { position, velocity }
+    }
 }
 
 /// Coordinates that a reference is written in.
@@ -61,10 +68,7 @@ impl<const J: usize> Path<J> {
     /// Position and velocity at time t \[s\], in the path's own frame.
     pub fn at(&self, t: f64) -> Target<J> {
         match self {
-            Self::Hold(pose) => Target {
-                position: *pose,
-                velocity: [0.0; J],
-            },
+            Self::Hold(pose) => Target::rest(*pose),
             Self::Fourier(series) => series.at(t),
             Self::Points(points) => points.at(t),
             Self::Ladder {
@@ -72,10 +76,7 @@ impl<const J: usize> Path<J> {
                 pose,
                 ladder,
             } => {
-                let mut target = Target {
-                    position: *pose,
-                    velocity: [0.0; J],
-                };
+                let mut target = Target::rest(*pose);
                 (target.position[*moving], target.velocity[*moving]) = ladder.at(t);
                 target
             }
@@ -97,9 +98,9 @@ impl<const J: usize> Path<J> {
     pub fn check(&self) -> Result<(), SimulateError> {
         match self {
             Self::Fourier(series) => series.check(),
-            Self::Ladder { moving, .. } if *moving >= J => Err(SimulateError::Reference {
-                what: format!("the ladder moves coordinate {moving} of {J}").into(),
-            }),
+            Self::Ladder { moving, .. } if *moving >= J => Err(SimulateError::reference(format!(
+                "the ladder moves coordinate {moving} of {J}"
+            ))),
             _ => Ok(()),
         }
     }

@@ -22,27 +22,24 @@ impl<const J: usize> Points<J> {
     /// [`SimulateError::Reference`] for fewer than two points, times that do not increase, and numbers
     /// that are not finite.
     pub fn new(points: &[(f64, [f64; J])]) -> Result<Self, SimulateError> {
-        let reject = |what: ErrorText| Err(SimulateError::Reference { what });
+        let reject = |what: String| Err(SimulateError::reference(what));
         if points.len() < 2 {
-            return reject(
-                ErrorText::new(format!("the point list has {} points", points.len()))
-                    .remedy("it needs at least two"),
-            );
+            let what = ErrorText::new(format!("the point list has {} points", points.len()));
+            return Err(SimulateError::reference(
+                what.remedy("it needs at least two"),
+            ));
         }
-        for (k, (t, pose)) in points.iter().enumerate() {
+        let mut before = f64::NEG_INFINITY;
+        for (k, (t, pose)) in (1..).zip(points) {
             if !t.is_finite() || pose.iter().any(|x| !x.is_finite()) {
-                return reject(format!("point {} of the list is not finite", k + 1).into());
+                return reject(format!("point {k} of the list is not finite"));
             }
-            if k > 0 && *t <= points[k - 1].0 {
-                return reject(
-                    format!(
-                        "point {} of the list is at {t} s, not after the point before it at {} s",
-                        k + 1,
-                        points[k - 1].0
-                    )
-                    .into(),
-                );
+            if *t <= before {
+                return reject(format!(
+                    "point {k} of the list is at {t} s, not after the point before it at {before} s"
+                ));
             }
+            before = *t;
         }
         let times: Vec<f64> = points.iter().map(|p| p.0).collect();
         let positions: Vec<[f64; J]> = points.iter().map(|p| p.1).collect();
@@ -73,21 +70,14 @@ impl<const J: usize> Points<J> {
         let n = self.times.len();
         let after = self.times.partition_point(|&x| x <= t);
         if after == 0 || after == n {
-            let end = if after == 0 { 0 } else { n - 1 };
-            return Target {
-                position: self.positions[end],
-                velocity: [0.0; J],
-            };
+            return Target::rest(self.positions[if after == 0 { 0 } else { n - 1 }]);
         }
         let k = after - 1;
         let h = self.times[after] - self.times[k];
         let x = (t - self.times[k]) / h;
         // Hermite form on [0, 1].
         let (x2, x3) = (x * x, x * x * x);
-        let mut target = Target {
-            position: [0.0; J],
-            velocity: [0.0; J],
-        };
+        let mut target = Target::rest([0.0; J]);
         for i in 0..J {
             let (p0, p1) = (self.positions[k][i], self.positions[after][i]);
             let (v0, v1) = (self.velocities[k][i], self.velocities[after][i]);
@@ -102,8 +92,7 @@ impl<const J: usize> Points<J> {
     }
 }
 
-/// Slopes of the cubic spline through points `first..=last` with zero slope at both ends: continuity of
-/// the second derivative is a tridiagonal system, solved by elimination.
+/// Slopes of the cubic spline through points `first..=last`, zero at both ends: a tridiagonal system, by elimination.
 fn clamped_slopes<const J: usize>(
     times: &[f64],
     positions: &[[f64; J]],
@@ -139,39 +128,26 @@ fn clamped_slopes<const J: usize>(
 mod tests {
     use super::*;
 
-    fn list() -> Points<2> {
-        Points::new(&[
-            (0.0, [0.0, 1.0]),
-            (1.0, [0.5, 1.2]),
-            (1.7, [0.1, 1.1]),
-            (2.5, [0.1, 1.1]),
-            (3.0, [0.3, 0.9]),
-            (4.0, [0.6, 0.7]),
-        ])
-        .expect("usable list")
-    }
+    const LIST: [(f64, [f64; 2]); 6] = [
+        (0.0, [0.0, 1.0]),
+        (1.0, [0.5, 1.2]),
+        (1.7, [0.1, 1.1]),
+        (2.5, [0.1, 1.1]),
+        (3.0, [0.3, 0.9]),
+        (4.0, [0.6, 0.7]),
+    ];
 
     #[test]
-    fn spline_passes_through_every_point() {
-        let points = list();
-        for (t, pose) in points.times.iter().zip(&points.positions) {
-            assert_eq!(points.at(*t).position, *pose);
+    fn a_spline_passes_smoothly_through_every_point_and_rests_where_it_dwells() {
+        let points = Points::new(&LIST).expect("usable list");
+        for (t, pose) in LIST {
+            assert_eq!(points.at(t).position, pose);
         }
-    }
-
-    #[test]
-    fn dwell_stays_at_rest() {
-        let points = list();
         for k in 0..=80 {
             let target = points.at(1.7 + 0.01 * f64::from(k));
             assert!((target.position[0] - 0.1).abs() < 1e-15);
             assert!(target.velocity[0].abs() < 1e-15);
         }
-    }
-
-    #[test]
-    fn velocity_and_acceleration_are_continuous_inside_a_stretch() {
-        let points = list();
         let h = 1e-6;
         for t in [1.0, 3.0] {
             let acceleration = |t: f64| {
@@ -184,10 +160,15 @@ mod tests {
     }
 
     #[test]
-    fn times_that_stand_still_are_refused() {
-        let outcome = Points::new(&[(0.0, [0.0]), (0.0, [1.0])]);
-        assert!(matches!(outcome, Err(SimulateError::Reference { .. })));
-        assert!(Points::new(&[(0.0, [0.0])]).is_err());
-        assert!(Points::new(&[(0.0, [0.0]), (1.0, [f64::NAN])]).is_err());
+    fn lists_that_are_no_motion_are_refused() {
+        let lists: [&[(f64, [f64; 1])]; 3] = [
+            &[(0.0, [0.0]), (0.0, [1.0])],
+            &[(0.0, [0.0])],
+            &[(0.0, [0.0]), (1.0, [f64::NAN])],
+        ];
+        for list in lists {
+            let outcome = Points::new(list);
+            assert!(matches!(outcome, Err(SimulateError::Reference { .. })));
+        }
     }
 }

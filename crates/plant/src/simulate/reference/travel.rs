@@ -40,12 +40,7 @@ pub fn travel<const J: usize>(
         })
     };
     if let Some(i) = outside(pose) {
-        return Err(SimulateError::LimitAtStart {
-            coordinate: mechanism.robot.coordinate_names()[i].clone(),
-            value: mechanism.coordinates(pose)[i],
-            lower: lower[i],
-            upper: upper[i],
-        });
+        return Err(mechanism.beyond_at_start(i, mechanism.coordinates(pose)[i]));
     }
     let at = |offset: f64| {
         let mut q = *pose;
@@ -62,11 +57,8 @@ pub fn travel<const J: usize>(
                 let mut beyond = next;
                 for _ in 0..50 {
                     let middle = 0.5 * (inside + beyond);
-                    if outside(&at(middle)).is_some() {
-                        beyond = middle;
-                    } else {
-                        inside = middle;
-                    }
+                    let left = outside(&at(middle)).is_some();
+                    *(if left { &mut beyond } else { &mut inside }) = middle;
                 }
                 break;
             }

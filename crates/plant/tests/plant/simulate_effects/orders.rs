@@ -6,7 +6,7 @@ use std::path::Path;
 use cft_ident_core::effect::{Places, Unit};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::Setup;
-use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
+use cft_ident_files::config::model_file::{EffectParameter, EffectSection, Parameter};
 use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_plant::simulate::cft::effects;
 use cft_ident_plant::simulate::effects::LAWS;
@@ -220,8 +220,12 @@ fn units_follow_the_joint() {
     assert_eq!(values[0].parameters["inertia"].unit, "kg m");
 }
 
-/// A model of the robot with the synthetic parameters.
-fn model(robot: &RobotFile, effects: Vec<EffectSection>) -> ModelFile {
+/// A model file without what only a fit knows.
+pub fn model(
+    robot: &RobotFile,
+    parameters: Vec<Parameter>,
+    effects: Vec<EffectSection>,
+) -> ModelFile {
     ModelFile {
         estimates: Vec::new(),
         estimate_covariance: None,
@@ -229,10 +233,7 @@ fn model(robot: &RobotFile, effects: Vec<EffectSection>) -> ModelFile {
         held_out: Vec::new(),
         excesses: None,
         robot: robot.clone(),
-        parameters: CftTruth::synthetic(Setup::Tuedacs)
-            .plant()
-            .expect("a pose")
-            .parameters(),
+        parameters,
         covariance: None,
         residual_std: BTreeMap::new(),
         effects,
@@ -266,7 +267,8 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> EffectSec
 fn effects_of_a_model_run_as_those_of_the_command_line_do() {
     let robot = robot();
     let run = |effects: Vec<EffectSection>, texts: &[&str]| {
-        let model = model(&robot, effects);
+        let plant = CftTruth::synthetic(Setup::Tuedacs).plant();
+        let model = model(&robot, plant.expect("a pose").parameters(), effects);
         let order = Order {
             robot: &robot,
             model: Some(("m.toml", &model)),
