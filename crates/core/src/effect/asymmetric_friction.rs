@@ -1,8 +1,6 @@
 //! `asymmetric-friction`: more friction in one direction, (coulomb + viscous v) H(v).
 
-use super::entry::{Entry, Family, Key, Ladder};
-use super::law::Law;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "asymmetric-friction",
@@ -40,13 +38,7 @@ pub static ENTRY: Entry = Entry {
 };
 
 pub static LAW: Law = Law {
-    starts: |cover, place| {
-        if cover.at(place).both_ways() {
-            Ok(vec![Vec::new()])
-        } else {
-            Err("the joint moves in one direction only: move it both ways".into())
-        }
-    },
+    starts: |cover, place| cover.both_ways(place).map(|_| vec![Vec::new()]),
     code: Some(|to| {
         let (v, direction) = (to.v(), to.direction());
         to.friction(format!(
@@ -55,17 +47,10 @@ pub static LAW: Law = Law {
             to.x(1)
         ));
     }),
-    ..Law::linear(
-        &ENTRY,
-        &["coulomb", "viscous"],
-        |scene, place, _, _, out| {
-            let Some(j) = place.joint() else { return };
-            for (k, v) in scene.stretch.v[j].iter().enumerate() {
-                // half at standstill, where neither direction has it; between as smooth as the joint's own law
-                let forward = 0.5 * (1.0 + scene.direction(j, k));
-                out[0][k] = forward;
-                out[1][k] = forward * v;
-            }
-        },
-    )
+    ..Law::linear(&ENTRY, &["coulomb", "viscous"], |at, _, out| {
+        // half at standstill, where neither direction has it; between as smooth as the joint's own law
+        let forward = 0.5 * (1.0 + at.direction());
+        out[0] = forward;
+        out[1] = forward * at.v();
+    })
 };

@@ -1,7 +1,6 @@
 //! `disturbance`: somebody pushes. The diagnosis finds such an episode and cuts it out; it has no parameter.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "disturbance",

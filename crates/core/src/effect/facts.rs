@@ -1,6 +1,6 @@
 //! What an effect that was found is called by a person who knows machines: `ripple of q1, 2.5 mm pitch`.
 
-use super::signal::CurveSignal;
+use super::CurveSignal;
 use crate::number;
 use crate::robot::JointKind;
 

@@ -49,7 +49,7 @@ impl Place {
         match self {
             Place::Pair { of, .. } => Some(of),
             Place::Geared { other, .. } => Some(other),
-            Place::Joint(_) | Place::Actuator(_) | Place::All => None,
+            _ => None,
         }
     }
 
@@ -147,11 +147,9 @@ impl Places {
             known: list(names.iter().map(String::as_str)),
         })?;
         match self {
-            Places::Joints | Places::JointsOrAll | Places::JointsAndActuators => {
-                Ok(Place::Joint(on))
-            }
             Places::Pairs => pair(on, names.len(), values),
             Places::Actuators | Places::Whole => Err(nowhere()),
+            _ => Ok(Place::Joint(on)),
         }
     }
 }

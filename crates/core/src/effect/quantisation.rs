@@ -1,7 +1,6 @@
 //! `quantisation`: a logged torque of few digits.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "quantisation",

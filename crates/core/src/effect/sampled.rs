@@ -1,8 +1,6 @@
 //! A model with effects one sample after the other, as rows arrive.
 
-use super::augmented_model::AugmentedModel;
-use super::entry::Role;
-use super::scene::Scene;
+use super::{AugmentedModel, Role, Scene};
 use crate::motion::Stretch;
 
 /// A model, and what its effects keep from sample to sample.
@@ -15,7 +13,6 @@ pub struct Sampled {
     load: Vec<Vec<f64>>,
     direction: Vec<Vec<f64>>,
     plain: Vec<f64>,
-    columns: Vec<Vec<Vec<f64>>>,
     /// Of each effect, joint after joint.
     kept: Vec<Vec<f64>>,
     out: Vec<f64>,
@@ -26,14 +23,9 @@ impl Sampled {
     pub fn new(model: AugmentedModel, dt: f64) -> Self {
         let n = model.model.robot.joints();
         let one = || vec![vec![0.0]; n];
-        let effects = model.effects.iter();
-        let columns = effects
-            .clone()
-            .map(|e| vec![vec![0.0]; e.law.linear.len()])
-            .collect();
-        let kept = effects
-            .map(|e| vec![f64::NAN; n * e.law.remembered()])
-            .collect();
+        let kept = model.effects.iter();
+        let kept = kept.map(|e| vec![f64::NAN; n * e.law.remembered()]);
+        let kept = kept.collect();
         let most = model.effects.iter().map(|e| e.law.linear.len()).max();
         Self {
             stretch: Stretch {
@@ -50,7 +42,6 @@ impl Sampled {
             load: one(),
             direction: vec![Vec::new(); n],
             plain: vec![0.0; n],
-            columns,
             kept,
             out: vec![0.0; most.unwrap_or(0)],
             model,
@@ -112,23 +103,11 @@ impl Sampled {
                 }
                 let out = &mut self.out[..effect.linear.len()];
                 out.fill(0.0);
-                let (law, size) = (effect.law, effect.law.remembered());
-                if size > 0 {
-                    let kept = &mut self.kept[i][j * size..(j + 1) * size];
-                    law.step(&scene, effect.place, (&effect.shape, j), (kept, out));
-                } else {
-                    let columns = &mut self.columns[i];
-                    columns.iter_mut().for_each(|column| column[0] = 0.0);
-                    law.fill(&scene, effect.place, (&effect.shape, j), columns);
-                    for (x, column) in out.iter_mut().zip(columns) {
-                        *x = column[0];
-                    }
-                }
-                *tau += out
-                    .iter()
-                    .zip(&effect.linear)
-                    .map(|(x, c)| c * x)
-                    .sum::<f64>();
+                let size = self.kept[i].len() / n;
+                let kept = &mut self.kept[i][j * size..(j + 1) * size];
+                effect.at(&scene, (j, 0), kept, out);
+                let terms = out.iter().zip(&effect.linear);
+                *tau += terms.map(|(x, c)| c * x).sum::<f64>();
             }
         }
     }

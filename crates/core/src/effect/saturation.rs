@@ -1,7 +1,6 @@
 //! `saturation`: a logged torque with flat tops.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "saturation",

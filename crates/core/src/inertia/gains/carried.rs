@@ -21,14 +21,10 @@ pub fn by_gains(
     let inverse = solve(factors, &triangles, weights, None)?.inverse;
     let mut slopes = DMatrix::zeros(columns.unknowns(), columns.joints);
     for (j, r) in triangles.iter().enumerate() {
-        let own = columns.unknowns_of(j);
-        let x = r.columns(0, own);
+        let x = r.columns(0, columns.unknowns_of(j));
         let torque = r.column(r.ncols() - 1) + x * factors.own_unknowns(shift, j);
-        let score = x.tr_mul(&torque) * (weights[j] * weights[j]);
         let mut whole = DVector::zeros(columns.unknowns());
-        for (c, s) in score.iter().enumerate() {
-            whole[columns.unknown(j, c)] += s;
-        }
+        columns.add_own(j, weights[j] * weights[j], &x.tr_mul(&torque), &mut whole);
         slopes.set_column(j, &(&inverse * whole));
     }
     Ok(slopes)

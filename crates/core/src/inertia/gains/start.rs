@@ -1,4 +1,7 @@
 //! Where the search begins: total least squares with the channels among the columns.
+//!
+//! With weights 1/(g_j std_j) the noise of the n channel columns is alike, and the right singular vector of the smallest
+//! singular value holds the gains.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,9 +10,7 @@ use crate::inertia::solution::FitError;
 use crate::math::rank;
 use crate::math::rfactor::RFactor;
 
-/// Gains up to a common factor, from channels and regressor as columns of one matrix: with weights
-/// 1/(g_j std_j) the noise of its n channel columns is alike, and the right singular vector of the smallest
-/// singular value holds the gains (Gautier and Briot 2014). `gains` and `std` are those of the step before.
+/// Gains up to a common factor by those of the step before (Gautier and Briot 2014).
 pub(super) fn total_least_squares(
     problem: &Problem,
     gains: &[f64],
