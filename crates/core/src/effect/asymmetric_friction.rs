@@ -5,10 +5,7 @@ use super::{Entry, Family, Key, Ladder, Law, Unit};
 pub static ENTRY: Entry = Entry {
     name: "asymmetric-friction",
     families: &[Family::Velocity, Family::Offset],
-    keys: &[
-        Key::size("coulomb", Unit::Torque),
-        Key::size("viscous", Unit::Viscous),
-    ],
+    keys: &[Key::torque("coulomb"), Key::size("viscous", Unit::Viscous)],
     ladder: Some(Ladder::USUAL),
     friction: true,
     separate_by: "move the joint both ways at three or more constant speeds and hold it still \

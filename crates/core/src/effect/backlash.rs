@@ -11,7 +11,7 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Memory],
     keys: &[
         Key::shape("gap", Unit::Position).above_zero("must be above 0"),
-        Key::size("c", Unit::Torque),
+        Key::torque("c"),
     ],
     search: Search::Refined,
     must: &[

@@ -9,11 +9,6 @@ use crate::robot::JointKind;
 /// Coefficients of the spline.
 const COUNT: usize = 6;
 
-/// A coefficient of the spline.
-const fn moment(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque)
-}
-
 pub static ENTRY: Entry = Entry {
     name: "counterbalance",
     families: &[Family::Position],
@@ -25,12 +20,12 @@ pub static ENTRY: Entry = Entry {
         Key::shape("angle", Unit::Fixed("rad")),
         Key::shape("from", Unit::Position),
         Key::shape("to", Unit::Position),
-        moment("m_1"),
-        moment("m_2"),
-        moment("m_3"),
-        moment("m_4"),
-        moment("m_5"),
-        moment("m_6"),
+        Key::torque("m_1"),
+        Key::torque("m_2"),
+        Key::torque("m_3"),
+        Key::torque("m_4"),
+        Key::torque("m_5"),
+        Key::torque("m_6"),
     ],
     search: Search::Grid,
     must: &[Rule::at_least(

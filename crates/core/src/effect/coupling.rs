@@ -14,7 +14,7 @@ pub static ENTRY: Entry = Entry {
     keys: &[
         Key::shape("from", Unit::One),
         Key::size("viscous", Unit::CoupledViscous),
-        Key::size("coulomb", Unit::Torque),
+        Key::torque("coulomb"),
         Key::size("inertia", Unit::CoupledInertia),
         Key::shape("r", Unit::CoupledRatio),
     ],

@@ -13,10 +13,6 @@ const KNOTS: usize = 6;
 const TURN: f64 = 0.01;
 const VALUES: [&str; KNOTS] = ["m_1", "m_2", "m_3", "m_4", "m_5", "m_6"];
 
-const fn value(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque)
-}
-
 pub static ENTRY: Entry = Entry {
     name: "empirical",
     families: &[
@@ -34,12 +30,12 @@ pub static ENTRY: Entry = Entry {
         ),
         Key::shape("from", Unit::Signal),
         Key::shape("to", Unit::Signal),
-        value("m_1"),
-        value("m_2"),
-        value("m_3"),
-        value("m_4"),
-        value("m_5"),
-        value("m_6"),
+        Key::torque("m_1"),
+        Key::torque("m_2"),
+        Key::torque("m_3"),
+        Key::torque("m_4"),
+        Key::torque("m_5"),
+        Key::torque("m_6"),
     ],
     role: Role::StandIn,
     search: Search::Grid,

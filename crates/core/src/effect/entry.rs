@@ -139,6 +139,11 @@ impl Key {
         }
     }
 
+    /// A size that is a torque.
+    pub(super) const fn torque(name: &'static str) -> Self {
+        Self::size(name, Unit::Torque)
+    }
+
     /// A number that shapes the effect.
     pub const fn shape(name: &'static str, unit: Unit) -> Self {
         Self {

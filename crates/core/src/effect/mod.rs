@@ -168,7 +168,7 @@ mod tests {
     use crate::robot::JointKind;
 
     #[test]
-    fn every_effect_that_can_be_found_is_told_in_words_with_what_to_do_about_it() {
+    fn every_effect_that_can_be_found_has_words_and_a_remedy() {
         for law in LAWS {
             let entry = law.entry;
             let number = |key: &Key| (key.name.to_owned(), 0.5, "N".to_owned());

@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_formula_of_this_robot_is_told() {
+    fn a_text_that_is_no_formula_of_this_robot_is_refused() {
         for (formula, says) in [
             ("cos(", "no formula"),
             ("2 q", "no formula"),

@@ -1,6 +1,6 @@
 //! Where effects sit: at joints, at the actuators of the CFT robot, between two joints, on the whole robot.
 
-use super::values::{EffectError, Values, list};
+use super::{EffectError, Values};
 use crate::robot::{JointKind, Robot};
 
 /// What an effect acts on.
@@ -144,7 +144,7 @@ impl Places {
         let on = on.ok_or_else(|| EffectError::Joint {
             name: values.effect.to_owned(),
             joint: joint.escape_debug().to_string(),
-            known: list(names.iter().map(String::as_str)),
+            known: names.join(", "),
         })?;
         match self {
             Places::Pairs => pair(on, names.len(), values),

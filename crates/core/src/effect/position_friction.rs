@@ -10,8 +10,8 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Position],
     keys: &[
         Key::shape("order", Unit::Order),
-        Key::size("sin", Unit::Torque),
-        Key::size("cos", Unit::Torque),
+        Key::torque("sin"),
+        Key::torque("cos"),
     ],
     search: Search::Orders,
     must: &[Rule::at_most(

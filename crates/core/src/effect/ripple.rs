@@ -4,22 +4,17 @@
 use super::order::{order_limits, orders};
 use super::{Entry, Family, Key, Ladder, Law, Search, Unit};
 
-/// The sine or cosine part of a harmonic.
-const fn amplitude(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque)
-}
-
 pub static ENTRY: Entry = Entry {
     name: "ripple",
     families: &[Family::Position],
     keys: &[
         Key::shape("order", Unit::Order),
-        amplitude("sin"),
-        amplitude("cos"),
-        amplitude("sin2"),
-        amplitude("cos2"),
-        amplitude("sin3"),
-        amplitude("cos3"),
+        Key::torque("sin"),
+        Key::torque("cos"),
+        Key::torque("sin2"),
+        Key::torque("cos2"),
+        Key::torque("sin3"),
+        Key::torque("cos3"),
     ],
     search: Search::Orders,
     ladder: Some(Ladder::USUAL),

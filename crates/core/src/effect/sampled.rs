@@ -122,7 +122,6 @@ mod tests {
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
     use crate::robot::{JointKind, Robot};
-    use std::collections::BTreeMap;
 
     /// A formula of the user's own in all that hangs on the way before.
     fn remembers(robot: &Robot) -> Added {
@@ -142,12 +141,8 @@ mod tests {
             ..Definition::default()
         };
         let law = effect::own::law(&definition, robot).unwrap();
-        Added::new(
-            law,
-            effect::Place::Joint(0),
-            vec![0.05, 0.1],
-            vec![0.3, 0.2],
-        )
+        let place = effect::Place::Joint(0);
+        Added::new(law, place, vec![0.05, 0.1], vec![0.3, 0.2])
     }
 
     #[test]
@@ -157,10 +152,12 @@ mod tests {
             viscous: 0.4,
             coulomb: 1.3,
         };
-        let add = |name: &str, values: &[(&str, f64)]| {
-            let values = values.iter().map(|(k, x)| ((*k).to_owned(), *x));
-            let values: BTreeMap<String, f64> = values.collect();
-            effect::read(&robot, name, Some("q1"), &values).unwrap()
+        let add = |text: &str| {
+            let mut words = text.split(' ');
+            let name = words.next().unwrap();
+            let keys = words.filter_map(|word| word.split_once('='));
+            let keys = keys.map(|(key, x)| (key.to_owned(), x.parse().unwrap()));
+            effect::read(&robot, name, Some("q1"), &keys.collect()).unwrap()
         };
         let model = AugmentedModel {
             model: Model {
@@ -170,18 +167,13 @@ mod tests {
                 offset: vec![0.1],
             },
             effects: vec![
-                add(
-                    "presliding",
-                    &[("sigma0", 300.0), ("sigma1", 0.2), ("fc", 1.1)],
-                ),
-                add("backlash", &[("gap", 0.02), ("c", 0.3)]),
-                add("warm-up", &[("k", -0.2), ("T", 3.0)]),
-                add("ripple", &[("order", 6.0), ("sin", 0.2), ("cos", -0.1)]),
-                add(
-                    "load-friction",
-                    &[("mu_c", 0.1), ("mu_v", 0.02), ("w", 50.0)],
-                ),
-                add("gain", &[("k", 0.05)]),
+                add("presliding sigma0=300 sigma1=0.2 fc=1.1"),
+                add("backlash gap=0.02 c=0.3"),
+                add("warm-up k=-0.2 T=3"),
+                add("ripple order=6 sin=0.2 cos=-0.1"),
+                add("load-friction mu_c=0.1 mu_v=0.02 w=50"),
+                add("gain k=0.05"),
+                add("empirical signal=5 from=0 to=0.4 m_1=0 m_2=0.1 m_3=0.2 m_4=0.2 m_5=0.1 m_6=0"),
                 remembers(&robot),
             ],
         };

@@ -12,7 +12,7 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Velocity],
     keys: &[
         Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
-        Key::size("fc", Unit::Torque),
+        Key::torque("fc"),
     ],
     search: Search::Refined,
     friction: true,

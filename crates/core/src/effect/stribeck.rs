@@ -11,7 +11,7 @@ pub static ENTRY: Entry = Entry {
     name: "stribeck",
     families: &[Family::Velocity],
     keys: &[
-        Key::size("c", Unit::Torque),
+        Key::torque("c"),
         Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
     ],
     search: Search::Refined,

@@ -1,11 +1,11 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::{Entry, Family, Key, Ladder, Law, Unit};
+use super::{Entry, Family, Key, Ladder, Law};
 
 pub static ENTRY: Entry = Entry {
     name: "torque-offset",
     families: &[Family::Offset],
-    keys: &[Key::size("c", Unit::Torque)],
+    keys: &[Key::torque("c")],
     ladder: Some(Ladder::USUAL),
     separate_by: "hold the joint still at several poses under brake-free control, then move it \
                   both ways at three or more constant speeds",

@@ -1,15 +1,12 @@
 //! `weight`: the moment of a weight that the declared model has no column for, as on a hinge declared without gravity.
 
-use super::{Entry, Family, Key, Ladder, Law, Unit};
+use super::{Entry, Family, Key, Ladder, Law};
 use crate::robot::JointKind;
 
 pub static ENTRY: Entry = Entry {
     name: "weight",
     families: &[Family::Position],
-    keys: &[
-        Key::size("sin", Unit::Torque),
-        Key::size("cos", Unit::Torque),
-    ],
+    keys: &[Key::torque("sin"), Key::torque("cos")],
     ladder: Some(Ladder::USUAL),
     separate_by: "log a slow sweep over the whole travel with two payloads (a weight grows with them, a spring does not)",
     formula: "sin * sin(q) + cos * cos(q)",

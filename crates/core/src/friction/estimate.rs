@@ -196,18 +196,15 @@ fn value(
     let si = law.parameters();
     let std = |i: usize| covariance[i][i].max(0.0).sqrt();
     let verdict = verdict_of(si[i], std(i));
-    let plain = EstimatedValue {
-        value: si[i],
-        std: std(i),
+    let of = |value: f64, std: f64, verdict: Verdict| EstimatedValue {
+        value,
+        std,
         verdict,
     };
     if maximum.fixed.contains(&i) {
-        return EstimatedValue {
-            std: f64::NAN,
-            verdict: Verdict::NotIdentifiable,
-            ..plain
-        };
+        return of(si[i], f64::NAN, Verdict::NotIdentifiable);
     }
+    let plain = of(si[i], std(i), verdict);
     if i < 3 {
         return plain;
     }
@@ -224,15 +221,8 @@ fn value(
     // where its own term is there
     let term = i == 3 || height != Verdict::NotIdentifiable;
     match profile_slope(problem, maximum, i).filter(|_| term) {
-        Some(bound) => EstimatedValue {
-            value: bound,
-            std: f64::NAN,
-            verdict: Verdict::LowerBound,
-        },
-        None => EstimatedValue {
-            verdict: Verdict::NotIdentifiable,
-            ..plain
-        },
+        Some(bound) => of(bound, f64::NAN, Verdict::LowerBound),
+        None => of(si[i], std(i), Verdict::NotIdentifiable),
     }
 }
 

@@ -90,8 +90,7 @@ impl WindowAverages {
 
     /// Linear part for a pair of tanh columns, [nuisance, viscous, coulomb_1, coulomb_2], and the squared residual.
     fn solve(&self, one: &[f64], two: &[f64]) -> Option<(DVector<f64>, f64)> {
-        let e = self.nuisance;
-        let n = e + 3;
+        let (e, n) = (self.nuisance, self.nuisance + 3);
         let mut gram = vec![0.0; (n + 1) * (n + 1)];
         let mut row = vec![0.0; n + 1];
         for (i, given) in self.rows.chunks_exact(e + 2).enumerate() {

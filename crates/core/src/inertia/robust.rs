@@ -96,10 +96,9 @@ impl Tally {
 
     fn add(&mut self, residual: f64, weight: f64, slope: f64) {
         let size = residual.abs();
-        let bin = if size > self.lowest && self.lowest > 0.0 {
-            ((size / self.lowest).ln() / RATIO.ln()) as usize + 1
-        } else {
-            0
+        let bin = match size > self.lowest && self.lowest > 0.0 {
+            true => ((size / self.lowest).ln() / RATIO.ln()) as usize + 1,
+            false => 0,
         };
         self.bins[bin.min(BINS - 1)] += 1;
         self.rows += 1;

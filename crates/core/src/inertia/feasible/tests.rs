@@ -151,7 +151,7 @@ fn rows_whose_free_fit_is_inconsistent_give_links_that_are_not() {
 }
 
 #[test]
-fn a_prior_fills_what_torques_do_not_tell() {
+fn a_prior_fills_in_where_torques_determine_nothing() {
     let robot = arm();
     let map = robot.standard_map();
     let mut standard = bodies(3);

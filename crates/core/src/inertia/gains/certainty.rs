@@ -36,10 +36,9 @@ impl Solved {
         let svd = rank::svd(&scaled)?;
         let kept = |k: &usize| svd.s[*k] > RANK_TOLERANCE * svd.s[0];
         let (sure, open): (Vec<usize>, Vec<usize>) = (0..svd.s.len()).partition(kept);
+        let entry = |a: usize, c: usize| svd.v[(a, sure[c])] * unscale(a) / svd.s[sure[c]];
         Ok(Solved {
-            sure: DMatrix::from_fn(u, sure.len(), |a, c| {
-                svd.v[(a, sure[c])] * unscale(a) / svd.s[sure[c]]
-            }),
+            sure: DMatrix::from_fn(u, sure.len(), entry),
             open: svd.v.select_columns(&open),
             scale,
         })
