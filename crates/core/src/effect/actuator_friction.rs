@@ -1,10 +1,7 @@
 //! `actuator-friction`: friction in the actuator coordinates, tau = J' F(J v). On the CFT robot it
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::place::{Place, Places};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law, Place, Places, Search, Unit};
 use crate::robot::cft::pantograph::reference_jacobian;
 
 pub static ENTRY: Entry = Entry {
@@ -42,22 +39,13 @@ pub static LAW: Law = Law {
             format!("{viscous} * {speed} + {coulomb} * tanh({slope} * {speed})")
         });
     }),
-    ..Law::linear(
-        &ENTRY,
-        &["viscous", "coulomb"],
-        |scene, place, shape, joint, out| {
-            let Place::Actuator(r) = place else { return };
-            let s = scene.stretch;
-            let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-            let [viscous, coulomb] = out else { return };
-            for (k, (viscous, coulomb)) in viscous.iter_mut().zip(coulomb).enumerate() {
-                s.at(k, &mut q, &mut v, &mut a);
-                let jacobian = reference_jacobian(&q);
-                let speed = jacobian[r][0] * v[2] + jacobian[r][1] * v[3];
-                let share = jacobian[r][joint - 2];
-                *viscous = share * speed;
-                *coulomb = share * (shape[0] * speed).tanh();
-            }
-        },
-    )
+    ..Law::linear(&ENTRY, &["viscous", "coulomb"], |at, _, out| {
+        let Place::Actuator(r) = at.place else { return };
+        let [q, v, _] = at.state();
+        let jacobian = reference_jacobian(&q);
+        let speed = jacobian[r][0] * v[2] + jacobian[r][1] * v[3];
+        let share = jacobian[r][at.joint - 2];
+        out[0] = share * speed;
+        out[1] = share * (at.shape[0] * speed).tanh();
+    })
 };

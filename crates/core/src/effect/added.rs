@@ -1,13 +1,6 @@
 //! An effect with its numbers, as it stands in a model.
 
-use super::entry::{Family, Role};
-use super::facts::Facts;
-use super::law::{KeyValue, Law};
-use super::physics::{Rule, Seen};
-use super::place::Place;
-use super::scene::Scene;
-use super::unit::Unit;
-use super::values::{EffectError, Values};
+use super::{Facts, Family, Instant, KeyValue, Law, Place, Role, Rule, Scene, Seen, Unit};
 use crate::robot::Robot;
 
 /// One number of an effect as results and files have it: key, value, standard deviation, unit.
@@ -51,18 +44,6 @@ impl Added {
             shape,
             linear,
         }
-    }
-
-    /// The effect at the place and with the numbers that a file gives.
-    pub(crate) fn of_values(
-        law: &'static Law,
-        robot: &Robot,
-        joint: Option<&str>,
-        values: &Values,
-    ) -> Result<Self, EffectError> {
-        let place = law.entry.places.named(robot, joint, values)?;
-        let [shape, linear] = law.of_keys(values)?;
-        Ok(Added::new(law, place, shape, linear))
     }
 
     /// Holds the numbers whose keys are at a bound, as a file says; none of an effect whose keys are not its shape and
@@ -118,15 +99,12 @@ impl Added {
         let mut keys = self.law.keys(&self.shape, &self.linear);
         keys.retain(|k| size(k) && shown(k));
         let of = |a: &KeyValue| {
-            let row = keys
-                .iter()
-                .map(|b| spread(&a.slopes, &b.slopes, covariance));
-            row.collect()
+            let row = keys.iter();
+            row.map(|b| spread(&a.slopes, &b.slopes, covariance))
+                .collect()
         };
-        (
-            keys.iter().map(|k| k.value).collect(),
-            keys.iter().map(of).collect(),
-        )
+        let values = keys.iter().map(|k| k.value).collect();
+        (values, keys.iter().map(of).collect())
     }
 
     /// What the effect adds to joint `joint` along a scene, into `out` (zeroed before); nothing for
@@ -148,19 +126,42 @@ impl Added {
     pub fn columns(&self, scene: &Scene, joint: usize) -> Vec<Vec<f64>> {
         let mut out = vec![vec![0.0; scene.len()]; self.law.linear.len()];
         if self.place.touches(joint) {
-            self.law
-                .fill(scene, self.place, (&self.shape, joint), &mut out);
+            let mut kept = vec![f64::NAN; self.law.remembered()];
+            let mut row = vec![0.0; out.len()];
+            for k in 0..scene.len() {
+                row.fill(0.0);
+                self.at(scene, (joint, k), &mut kept, &mut row);
+                for (column, x) in out.iter_mut().zip(&row) {
+                    column[k] = *x;
+                }
+            }
         }
         out
     }
 
+    /// The same at sample k, by what the law keeps; zero before.
+    pub(super) fn at(
+        &self,
+        scene: &Scene,
+        (joint, k): (usize, usize),
+        kept: &mut [f64],
+        out: &mut [f64],
+    ) {
+        let (place, shape) = (self.place, self.shape.as_slice());
+        let at = Instant {
+            scene,
+            place,
+            shape,
+            joint,
+            k,
+        };
+        self.law.at(&at, kept, out);
+    }
+
     /// Time by which it shifts the torque of joint `joint` \[s\].
     pub fn shift(&self, joint: usize) -> f64 {
-        if self.law.entry.role == Role::Shift && self.place.touches(joint) {
-            self.linear[0]
-        } else {
-            0.0
-        }
+        let shifts = self.law.entry.role == Role::Shift && self.place.touches(joint);
+        if shifts { self.linear[0] } else { 0.0 }
     }
 
     /// Whether its numbers are among those that a file of it may hold.

@@ -5,7 +5,7 @@
 //! what the model remembers, `let x = ..;` begins a constant, and `&state.x` hands a memory to a function.
 //! Each text is that of the effect's columns, which a test compares along motions.
 
-use super::law_text::exact;
+use super::exact;
 use super::site::{CodeSite, saturating};
 pub use super::site::{EffectsCode, Property, Remembered};
 use super::{Added, AugmentedModel, EffectError, Place, entry};

@@ -1,16 +1,11 @@
 //! `asymmetric-friction`: more friction in one direction, (coulomb + viscous v) H(v).
 
-use super::entry::{Entry, Family, Key, Ladder};
-use super::law::Law;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "asymmetric-friction",
     families: &[Family::Velocity, Family::Offset],
-    keys: &[
-        Key::size("coulomb", Unit::Torque),
-        Key::size("viscous", Unit::Viscous),
-    ],
+    keys: &[Key::torque("coulomb"), Key::size("viscous", Unit::Viscous)],
     ladder: Some(Ladder::USUAL),
     friction: true,
     separate_by: "move the joint both ways at three or more constant speeds and hold it still \
@@ -40,13 +35,7 @@ pub static ENTRY: Entry = Entry {
 };
 
 pub static LAW: Law = Law {
-    starts: |cover, place| {
-        if cover.at(place).both_ways() {
-            Ok(vec![Vec::new()])
-        } else {
-            Err("the joint moves in one direction only: move it both ways".into())
-        }
-    },
+    starts: |cover, place| cover.both_ways(place).map(|_| vec![Vec::new()]),
     code: Some(|to| {
         let (v, direction) = (to.v(), to.direction());
         to.friction(format!(
@@ -55,17 +44,10 @@ pub static LAW: Law = Law {
             to.x(1)
         ));
     }),
-    ..Law::linear(
-        &ENTRY,
-        &["coulomb", "viscous"],
-        |scene, place, _, _, out| {
-            let Some(j) = place.joint() else { return };
-            for (k, v) in scene.stretch.v[j].iter().enumerate() {
-                // half at standstill, where neither direction has it; between as smooth as the joint's own law
-                let forward = 0.5 * (1.0 + scene.direction(j, k));
-                out[0][k] = forward;
-                out[1][k] = forward * v;
-            }
-        },
-    )
+    ..Law::linear(&ENTRY, &["coulomb", "viscous"], |at, _, out| {
+        // half at standstill, where neither direction has it; between as smooth as the joint's own law
+        let forward = 0.5 * (1.0 + at.direction());
+        out[0] = forward;
+        out[1] = forward * at.v();
+    })
 };

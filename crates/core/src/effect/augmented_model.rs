@@ -1,8 +1,7 @@
 //! A model with effects: what torque it reconstructs along whole stretches.
 
-use super::added::Added;
-use super::place::Place;
 use super::scene::{Scene, TiltTorques};
+use super::{Added, Place};
 use crate::motion::Stretch;
 use crate::robot::model::Model;
 
@@ -150,9 +149,8 @@ pub fn shifted(x: &mut [f64], d: f64) {
     ];
     for (k, x) in x.iter_mut().enumerate() {
         let first = (k as isize).saturating_add(whole).saturating_sub(1);
-        *x = weights
-            .iter()
-            .enumerate()
+        let terms = weights.iter().enumerate();
+        *x = terms
             .map(|(m, w)| w * at(first.saturating_add(m as isize)))
             .sum();
     }

@@ -4,9 +4,8 @@
 //!
 //! Files and tables have first moments in the place of the centre: mx = mass x.
 
-use super::law::{KeyValue, Law, Reparametrisation};
-use super::payload::{self, body};
-use super::site::Property;
+use super::payload;
+use super::{KeyValue, Law, Property, Reparametrisation};
 use crate::robot::standard::Body;
 use crate::robot::tree::MOST_JOINTS;
 
@@ -19,12 +18,9 @@ pub static LAW: Law = Law {
     fits: |robot, _, _| !robot.tool_stays_level(),
     shape: &["x", "y", "z"],
     starts: |_, _| {
-        let corner = |k: usize, axis: usize| {
-            if k >> axis & 1 == 0 {
-                START_DISTANCE_M
-            } else {
-                -START_DISTANCE_M
-            }
+        let corner = |k: usize, axis: usize| match k >> axis & 1 {
+            0 => START_DISTANCE_M,
+            _ => -START_DISTANCE_M,
         };
         let corners = (0..8).map(|k| (0..3).map(|axis| corner(k, axis)).collect());
         Ok(corners.collect())
@@ -32,7 +28,7 @@ pub static LAW: Law = Law {
     limits: |_, _| vec![[-MAX_DISTANCE_M, MAX_DISTANCE_M]; 3],
     reparametrised: Some(Reparametrisation {
         of_keys: |values| {
-            let [mass, moments @ ..] = body(values)?;
+            let [mass, moments @ ..] = payload::body(values)?;
             let centre = moments.map(|moment| moment / mass);
             Ok([centre.to_vec(), vec![mass, values.get_or("inertia", 0.0)?]])
         },
@@ -58,8 +54,8 @@ pub static LAW: Law = Law {
         },
     }),
     code: Some(|to| {
-        if let (&[x, y, z], &[mass, ball]) = (to.shape(), to.linear()) {
-            to.bodies(to.robot().tool_links([mass, ball], [x, y, z]));
+        if let (&[x, y, z], &[mass, ball]) = (to.shape, to.linear) {
+            to.bodies(to.model.robot.tool_links([mass, ball], [x, y, z]));
         }
     }),
     property: |_, centre, linear| {
@@ -69,35 +65,22 @@ pub static LAW: Law = Law {
             inertia: [linear[1], 0.0, 0.0, linear[1], 0.0, linear[1]],
         }))
     },
-    ..Law::linear(
-        &payload::ENTRY,
-        &["mass", "inertia"],
-        |scene, _, centre, joint, out| {
-            let [of_mass, of_inertia] = out else { return };
-            let &[x, y, z] = centre else { return };
-            let point = Body {
-                mass: 1.0,
-                centre: [x, y, z],
-                inertia: [0.0; 6],
-            }
-            .standard();
-            let ball = Body {
-                mass: 0.0,
-                centre: [0.0; 3],
-                inertia: [1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
-            }
-            .standard();
-            let s = scene.stretch;
-            let n = scene.robot.joints();
-            let mut state = [[0.0; MOST_JOINTS]; 3];
-            for k in 0..s.len() {
-                let [q, v, a] = state.each_mut().map(|x| &mut x[..n]);
-                s.at(k, q, v, a);
-                let row = scene.robot.tool_row(joint, q, v, a);
-                let of = |body: &[f64]| row.iter().zip(body).map(|(y, x)| y * x).sum();
-                of_mass[k] = of(&point);
-                of_inertia[k] = of(&ball);
-            }
-        },
-    )
+    ..Law::linear(&payload::ENTRY, &["mass", "inertia"], |at, _, out| {
+        let &[x, y, z] = at.shape else { return };
+        let robot = at.scene.robot;
+        let state = at.state::<MOST_JOINTS>();
+        let [q, v, a] = state.each_ref().map(|x| &x[..robot.joints()]);
+        let row = robot.tool_row(at.joint, q, v, a);
+        let of = |body: Body| row.iter().zip(body.standard()).map(|(y, x)| y * x).sum();
+        out[0] = of(Body {
+            mass: 1.0,
+            centre: [x, y, z],
+            inertia: [0.0; 6],
+        });
+        out[1] = of(Body {
+            mass: 0.0,
+            centre: [0.0; 3],
+            inertia: [1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
+        });
+    })
 };

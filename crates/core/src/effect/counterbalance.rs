@@ -1,21 +1,13 @@
 //! `counterbalance`: a smooth moment over position, as of a spring or gas cylinder between two fixed
 //! points, as a cubic B-spline over the travel that was seen; constant beyond it.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::law_text::exact;
-use super::physics::{Limit, Number, Rule};
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit, exact,
+};
 use crate::robot::JointKind;
 
 /// Coefficients of the spline.
 const COUNT: usize = 6;
-
-/// A coefficient of the spline.
-const fn moment(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque)
-}
 
 pub static ENTRY: Entry = Entry {
     name: "counterbalance",
@@ -28,12 +20,12 @@ pub static ENTRY: Entry = Entry {
         Key::shape("angle", Unit::Fixed("rad")),
         Key::shape("from", Unit::Position),
         Key::shape("to", Unit::Position),
-        moment("m_1"),
-        moment("m_2"),
-        moment("m_3"),
-        moment("m_4"),
-        moment("m_5"),
-        moment("m_6"),
+        Key::torque("m_1"),
+        Key::torque("m_2"),
+        Key::torque("m_3"),
+        Key::torque("m_4"),
+        Key::torque("m_5"),
+        Key::torque("m_6"),
     ],
     search: Search::Grid,
     must: &[Rule::at_least(
@@ -58,15 +50,12 @@ pub static LAW: Law = Law {
     // a lever that turns
     fits: |robot, _, place| place.kind(robot) == JointKind::Revolute,
     starts: |cover, place| {
-        let joint = cover.at(place);
-        if joint.reversals < 4 {
-            return Err("fewer than four sweeps over the travel".into());
-        }
+        let joint = cover.reversing(place, 4, "fewer than four sweeps over the travel")?;
         Ok(vec![joint.position.to_vec()])
     },
     code: Some(|to| {
-        let width = (to.shape()[1] - to.shape()[0]).max(f64::MIN_POSITIVE);
-        let moments: Vec<String> = to.linear().iter().copied().map(exact).collect();
+        let width = (to.shape[1] - to.shape[0]).max(f64::MIN_POSITIVE);
+        let moments: Vec<String> = to.linear.iter().copied().map(exact).collect();
         to.added(format!(
             "$spline(({} - {}) / {}, {})",
             to.q(),
@@ -78,17 +67,13 @@ pub static LAW: Law = Law {
     ..Law::linear(
         &ENTRY,
         &["m_1", "m_2", "m_3", "m_4", "m_5", "m_6"],
-        |scene, place, shape, _, out| {
-            let Some(j) = place.joint() else { return };
-            let width = (shape[1] - shape[0]).max(f64::MIN_POSITIVE);
+        |at, _, out| {
+            let [from, to] = [at.shape[0], at.shape[1]];
+            let width = (to - from).max(f64::MIN_POSITIVE);
             let pieces = (COUNT - 3) as f64;
-            for (k, q) in scene.stretch.q[j].iter().enumerate() {
-                let x = ((q - shape[0]) / width * pieces).clamp(0.0, pieces);
-                let piece = (x as usize).min(COUNT - 4);
-                for (i, b) in basis(x - piece as f64).into_iter().enumerate() {
-                    out[piece + i][k] = b;
-                }
-            }
+            let x = ((at.q() - from) / width * pieces).clamp(0.0, pieces);
+            let piece = (x as usize).min(COUNT - 4);
+            out[piece..piece + 4].copy_from_slice(&basis(x - piece as f64));
         },
     )
 };

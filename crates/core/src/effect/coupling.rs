@@ -5,12 +5,7 @@
 //! joint j too: power is kept, so that both rows have the same three numbers. That place is named by
 //! `both`.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::physics::Rule;
-use super::place::{Place, Places};
-use super::site::CodeSite;
-use super::unit::Unit;
+use super::{CodeSite, Entry, Family, Key, Ladder, Law, Place, Places, Rule, Search, Unit};
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
@@ -19,7 +14,7 @@ pub static ENTRY: Entry = Entry {
     keys: &[
         Key::shape("from", Unit::One),
         Key::size("viscous", Unit::CoupledViscous),
-        Key::size("coulomb", Unit::Torque),
+        Key::torque("coulomb"),
         Key::size("inertia", Unit::CoupledInertia),
         Key::shape("r", Unit::CoupledRatio),
     ],
@@ -55,50 +50,38 @@ const TRAIN: &str = "what a gear train turns has mass, and takes power";
 
 pub static LAW: Law = Law {
     shape: &["r"],
-    starts: |cover, place| match place {
-        Place::Pair { of, .. } if cover.joints[of].reversals >= 2 => {
-            Ok(vec![vec![1.0], vec![-1.0]])
+    starts: |cover, place| {
+        let reverses = |j: usize| cover.joints[j].reversals >= 2;
+        match place {
+            Place::Pair { of, .. } if reverses(of) => Ok(vec![vec![1.0], vec![-1.0]]),
+            Place::Geared { motor, other } if reverses(motor) && reverses(other) => {
+                Ok(vec![vec![1.0], vec![-1.0]])
+            }
+            _ => Err("the other joint reverses fewer than two times".into()),
         }
-        Place::Geared { motor, other }
-            if cover.joints[motor].reversals >= 2 && cover.joints[other].reversals >= 2 =>
-        {
-            Ok(vec![vec![1.0], vec![-1.0]])
-        }
-        _ => Err("the other joint reverses fewer than two times".into()),
     },
     code: Some(written),
-    ..Law::linear(
-        &ENTRY,
-        &["viscous", "coulomb", "inertia"],
-        |scene, place, shape, joint, out| {
-            let s = scene.stretch;
-            let r = shape[0];
-            // whose motion the row gets, what turns the motor, and how the row sees the motor
-            let (of, [a, b], scale, lever) = match place {
-                Place::Pair { on, of } => (of, [on, of], 1.0, 1.0),
-                Place::Geared { motor, other } if joint == motor => (other, [motor, other], r, 1.0),
-                Place::Geared { motor, other } => (motor, [motor, other], r, r),
-                _ => return,
-            };
-            for (k, x) in out[0].iter_mut().enumerate() {
-                *x = scale * s.v[of][k];
-            }
-            for (k, x) in out[1].iter_mut().enumerate() {
-                *x = lever * sign(s.v[a][k] + r * s.v[b][k]);
-            }
-            for (k, x) in out[2].iter_mut().enumerate() {
-                *x = scale * s.a[of][k];
-            }
-        },
-    )
+    ..Law::linear(&ENTRY, &["viscous", "coulomb", "inertia"], |at, _, out| {
+        let (s, k, r) = (at.scene.stretch, at.k, at.shape[0]);
+        // whose motion the row gets, what turns the motor, and how the row sees the motor
+        let (of, [a, b], scale, lever) = match at.place {
+            Place::Pair { on, of } => (of, [on, of], 1.0, 1.0),
+            Place::Geared { motor, other } if at.joint == motor => (other, [motor, other], r, 1.0),
+            Place::Geared { motor, other } => (motor, [motor, other], r, r),
+            _ => return,
+        };
+        out[0] = scale * s.v[of][k];
+        out[1] = lever * sign(s.v[a][k] + r * s.v[b][k]);
+        out[2] = scale * s.a[of][k];
+    })
 };
 
 /// What it adds to generated code.
 fn written(to: &mut CodeSite) {
     let [viscous, coulomb, inertia, r] = [to.x(0), to.x(1), to.x(2), to.s(0)];
-    match to.place() {
+    match to.place {
         Place::Geared { motor, other } => {
-            let name = format!("shared_{}", to.number());
+            let name = format!("shared_{}", to.number);
             to.now(format!(
                 "let {name} = {coulomb} * $sign(v[{motor}] + {r} * v[{other}]);"
             ));

@@ -1,6 +1,6 @@
 //! What a set of logs covers: by this an effect is refused that the data cannot show.
 
-use super::place::Place;
+use super::Place;
 use crate::motion::{Stretch, alike};
 use crate::robot::{JointKind, Robot};
 
@@ -21,8 +21,6 @@ pub struct JointCover {
     pub ripple_orders: Vec<f64>,
     /// The same of the residual times the sign of the speed.
     pub friction_orders: Vec<f64>,
-    /// Full travel of the joint, where the robot's limits say it [m or rad].
-    pub full_range: Option<f64>,
     /// The joint is stationary in every log.
     pub stationary: bool,
     /// Gravity acts on it, as far as the robot's model knows.
@@ -58,12 +56,9 @@ impl Cover {
             let mut position = [f64::INFINITY, f64::NEG_INFINITY];
             let (mut square, mut acceleration, mut count) = (0.0, 0.0, 0usize);
             joint.stationary = stationary.iter().all(|s| s[j]);
-            let moving: Vec<&Stretch> = stretches
-                .iter()
-                .zip(&stationary)
-                .filter(|(_, s)| joint.stationary || !s[j])
-                .map(|(s, _)| s)
-                .collect();
+            let moving = stretches.iter().zip(&stationary);
+            let moving = moving.filter(|(_, s)| joint.stationary || !s[j]);
+            let moving: Vec<&Stretch> = moving.map(|(s, _)| s).collect();
             for s in &moving {
                 for (q, v) in s.q[j].iter().zip(&s.v[j]) {
                     position = [position[0].min(*q), position[1].max(*q)];
@@ -78,15 +73,12 @@ impl Cover {
             let least = TURN * (position[1] - position[0]);
             joint.reversals = moving.iter().map(|s| reversals(&s.q[j], least).len()).sum();
             joint.position = position;
-            joint.full_range = robot.transmission().full_travel(j);
         }
         for (joint, weight) in cover.joints.iter_mut().zip(weights(robot, stretches)) {
             joint.weight = weight;
         }
-        for s in stretches {
-            let end = s.began + s.dt * s.len() as f64;
-            cover.duration_s = cover.duration_s.max(end);
-        }
+        let ends = stretches.iter().map(|s| s.began + s.dt * s.len() as f64);
+        cover.duration_s = ends.fold(0.0, f64::max);
         cover
     }
 
@@ -95,17 +87,34 @@ impl Cover {
         &self.joints[place.joint().unwrap_or(0).min(self.joints.len() - 1)]
     }
 
-    /// Travel of a place's joint in revolutions or metres.
-    pub fn travel(&self, place: Place) -> f64 {
-        let joint = place.joint().unwrap_or(0);
-        self.in_order_units(joint, self.joints[joint].range())
+    /// What the joint of a place did where it reversed so often; else what the data lack.
+    pub(super) fn reversing(
+        &self,
+        place: Place,
+        times: usize,
+        lack: &str,
+    ) -> Result<&JointCover, String> {
+        let joint = self.at(place);
+        let reverses = joint.reversals >= times;
+        reverses.then_some(joint).ok_or_else(|| lack.to_owned())
     }
 
-    /// A distance of joint j in revolutions or metres.
-    pub(crate) fn in_order_units(&self, j: usize, distance: f64) -> f64 {
-        match self.kinds[j] {
-            JointKind::Revolute => distance / std::f64::consts::TAU,
-            JointKind::Prismatic => distance,
+    /// The same of a joint that moved both ways with speeds worth the name.
+    pub(super) fn both_ways(&self, place: Place) -> Result<&JointCover, String> {
+        let lack = "the joint moves in one direction only: move it both ways";
+        let joint = self.reversing(place, 1, lack)?;
+        let [back, forth] = joint.speed;
+        let moves = forth > 0.0 && back < 0.0;
+        moves.then_some(joint).ok_or_else(|| lack.to_owned())
+    }
+
+    /// Travel of a place's joint in revolutions or metres.
+    pub(super) fn travel(&self, place: Place) -> f64 {
+        let joint = place.joint().unwrap_or(0);
+        let range = self.joints[joint].range();
+        match self.kinds[joint] {
+            JointKind::Revolute => range / std::f64::consts::TAU,
+            JointKind::Prismatic => range,
         }
     }
 }
@@ -119,11 +128,6 @@ impl JointCover {
     /// Greatest speed of both directions.
     pub fn fastest(&self) -> f64 {
         self.speed[1].max(-self.speed[0])
-    }
-
-    /// Whether the joint moved both ways with speeds worth the name.
-    pub(crate) fn both_ways(&self) -> bool {
-        self.speed[1] > 0.0 && self.speed[0] < 0.0 && self.reversals > 0
     }
 }
 
@@ -161,36 +165,27 @@ fn slowest(stretches: &[Stretch]) -> f64 {
     })
 }
 
-/// Travel below which a joint counts as stationary, over its travel in all logs or its full range: what a
-/// controller gives way, which friction at rest hides.
+/// Travel below which a joint counts as stationary, over its travel in all logs or its range: a controller gives way.
 const STATIONARY_SHARE: f64 = 0.01;
 
 /// Whether each joint is stationary along each stretch, `[stretch][joint]`: one-joint logs are recognised
 /// by it. A torque at rest is anything up to static friction, and no law of v says which.
 pub fn stationary_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
-    let travel = |s: &Stretch, j: usize| {
-        let ends = s.q[j]
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |e, q| {
-                [e[0].min(*q), e[1].max(*q)]
-            });
-        (ends[1] - ends[0]).max(0.0)
+    let travel = |q: &Vec<f64>| {
+        let most = q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let least = q.iter().copied().fold(f64::INFINITY, f64::min);
+        (most - least).max(0.0)
     };
-    let n = robot.joints();
-    let travels: Vec<Vec<f64>> = stretches
-        .iter()
-        .map(|s| (0..n).map(|j| travel(s, j)).collect())
-        .collect();
+    let of = |s: &Stretch| s.q.iter().map(travel).collect();
+    let travels: Vec<Vec<f64>> = stretches.iter().map(of).collect();
     let widest = |j: usize| {
         let seen = travels.iter().map(|t| t[j]).fold(0.0, f64::max);
         seen.max(robot.transmission().full_travel(j).unwrap_or(0.0))
     };
-    let widest: Vec<f64> = (0..n).map(widest).collect();
+    let widest: Vec<f64> = (0..robot.joints()).map(widest).collect();
     let small = |t: &Vec<f64>| {
-        t.iter()
-            .zip(&widest)
-            .map(|(t, w)| *t < STATIONARY_SHARE * w)
-            .collect()
+        let each = t.iter().zip(&widest);
+        each.map(|(t, w)| *t < STATIONARY_SHARE * w).collect()
     };
     travels.iter().map(small).collect()
 }

@@ -1,10 +1,6 @@
 //! `delay`: the logged torque is late by d (early where d is negative), on one joint or on all.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::law::Law;
-use super::physics::{Limit, Number, Rule};
-use super::place::Places;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Law, Limit, Number, Places, Role, Rule, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -34,12 +30,11 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     code: Some(|to| to.late()),
-    ..Law::linear(&ENTRY, &["d"], |scene, _, _, joint, out| {
+    ..Law::linear(&ENTRY, &["d"], |at, _, out| {
         // tau(t - d) = tau - d dtau/dt + ..
-        let hat = &scene.hat[joint];
-        let step = scene.stretch.dt;
-        for k in 1..hat.len().saturating_sub(1) {
-            out[0][k] = -(hat[k + 1] - hat[k - 1]) / (2.0 * step);
+        let (hat, k) = (&at.scene.hat[at.joint], at.k);
+        if k > 0 && k + 1 < hat.len() {
+            out[0] = -(hat[k + 1] - hat[k - 1]) / (2.0 * at.scene.stretch.dt);
         }
     })
 };

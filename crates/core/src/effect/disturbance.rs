@@ -1,7 +1,6 @@
 //! `disturbance`: somebody pushes. The diagnosis finds such an episode and cuts it out; it has no parameter.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "disturbance",
@@ -9,7 +8,7 @@ pub static ENTRY: Entry = Entry {
     keys: &[
         Key::shape("at", Unit::Fixed("s")),
         Key::shape("seconds", Unit::Fixed("s")).above_zero("must be above 0 s"),
-        Key::size("c", Unit::Torque),
+        Key::torque("c"),
     ],
     role: Role::Fault,
     no_torque: Some("it is an episode of one log, and no law tells when the next one comes"),

@@ -1,8 +1,6 @@
 //! `drift`: a torque that grows with time, c t, in both directions.
 
-use super::entry::{Entry, Family, Key};
-use super::law::Law;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Law, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "drift",
@@ -22,10 +20,5 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     code: Some(|to| to.step(format!("{} * state.t", to.x(0)))),
-    ..Law::linear(&ENTRY, &["c"], |scene, _, _, _, out| {
-        let s = scene.stretch;
-        for (k, x) in out[0].iter_mut().enumerate() {
-            *x = s.began + s.dt * k as f64;
-        }
-    })
+    ..Law::linear(&ENTRY, &["c"], |at, _, out| out[0] = at.time())
 };

@@ -1,10 +1,6 @@
 //! `drive-efficiency`: a loss in proportion to the load while the motor drives it, k tau_l H(tau_l v).
 
-use super::entry::{Entry, Family, Key};
-use super::law::Law;
-use super::physics::{Limit, Number, Rule};
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{CurveSignal, Entry, Family, Key, Law, Limit, Number, Rule, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -39,23 +35,14 @@ pub static ENTRY: Entry = Entry {
 const LOSS: &str = "efficiencies lie between 0.63 and 1";
 
 pub static LAW: Law = Law {
-    starts: |cover, place| {
-        if cover.at(place).both_ways() {
-            Ok(vec![Vec::new()])
-        } else {
-            Err("the joint moves in one direction only: move it both ways".into())
-        }
-    },
+    starts: |cover, place| cover.both_ways(place).map(|_| vec![Vec::new()]),
     code: Some(|to| {
         let (v, load) = (to.v(), to.load());
         to.added(format!("{} * ({load} * $positive({load} * {v}))", to.x(0)));
     }),
-    ..Law::linear(&ENTRY, &["k"], |scene, place, _, _, out| {
-        let Some(j) = place.joint() else { return };
-        for (k, (v, load)) in scene.stretch.v[j].iter().zip(&scene.load[j]).enumerate() {
-            if load * v > 0.0 {
-                out[0][k] = *load;
-            }
+    ..Law::linear(&ENTRY, &["k"], |at, _, out| {
+        if at.load() * at.v() > 0.0 {
+            out[0] = at.load();
         }
     })
 };

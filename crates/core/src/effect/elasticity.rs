@@ -5,14 +5,12 @@
 //! the second derivative of the torque, -(inertia/w^2) d2(tau_l/M_jj)/dt2, the first term of the flexible
 //! joint's expansion (Spong 1987).
 
-use super::law_text::exact;
 use nalgebra::Matrix4;
 
-use super::entry::{Entry, Family, Key, Search};
-use super::law::{KeyValue, Law, Memory, Reparametrisation};
-use super::physics::{Limit, Number, Rule};
-use super::scene::Scene;
-use super::unit::Unit;
+use super::{
+    Entry, Family, Key, KeyValue, Law, Limit, Number, Reparametrisation, Rule, Scene, Search, Unit,
+    exact,
+};
 
 pub static ENTRY: Entry = Entry {
     name: "elasticity",
@@ -84,36 +82,12 @@ pub static LAW: Law = Law {
             ]
         },
     }),
-    // the inertia is that of the first sample: later ones are not known yet
-    memory: Some(Memory {
-        size: 4,
-        step: |scene, place, shape, _, kept, out| {
-            let Some(j) = place.joint() else { return };
-            let w = std::f64::consts::TAU * shape[0];
-            let begins = kept[0].is_nan();
-            if begins {
-                kept[0] = inertia(scene, j);
-            }
-            if kept[0] <= 0.0 {
-                return;
-            }
-            let pull = scene.load[j][0] / kept[0];
-            let z = match begins {
-                true => [pull / (w * w), 0.0],
-                false => Oscillator::new(w, shape[1], scene.stretch.dt).next(
-                    [kept[1], kept[2]],
-                    kept[3],
-                    pull,
-                ),
-            };
-            kept[1..].copy_from_slice(&[z[0], z[1], pull]);
-            out[0] = -(pull - 2.0 * shape[1] * w * z[1] - w * w * z[0]);
-        },
-    }),
+    // inertia, deflection, its rate, pull, and the eight shares of a step
+    memory: Some(12),
     code: Some(|to| {
         let (q, load) = (to.q(), to.load());
         let own = to.remember("elastic", Some(OF_CODE), "0.0", &q);
-        let rate = exact(std::f64::consts::TAU * to.shape()[0]);
+        let rate = exact(std::f64::consts::TAU * to.shape[0]);
         to.step(format!(
             "{} * $elastic({rate}, {}, dt, {load}, &{own})",
             to.x(0),
@@ -121,23 +95,28 @@ pub static LAW: Law = Law {
         ));
         to.elastic();
     }),
-    ..Law::linear(&ENTRY, &["inertia"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        let inertia = inertia(scene, j);
+    ..Law::linear(&ENTRY, &["inertia"], |at, kept, out| {
+        let (w, damping) = (std::f64::consts::TAU * at.shape[0], at.shape[1]);
+        let begins = kept[0].is_nan();
+        let (state, step) = kept.split_at_mut(4);
+        if begins {
+            state[0] = inertia(at.scene, at.joint);
+            step.copy_from_slice(step_of(w, damping, at.scene.stretch.dt).as_flattened());
+        }
+        let &mut [inertia, z, rate, before] = state else {
+            return;
+        };
         if inertia <= 0.0 {
             return;
         }
-        let w = std::f64::consts::TAU * shape[0];
-        let step = Oscillator::new(w, shape[1], scene.stretch.dt);
-        let pull = |k: usize| scene.load[j][k] / inertia;
-        // at rest on the spring
-        let mut z = [pull(0) / (w * w), 0.0];
-        for (k, column) in out[0].iter_mut().enumerate() {
-            if k > 0 {
-                z = step.next(z, pull(k - 1), pull(k));
-            }
-            *column = -(pull(k) - 2.0 * shape[1] * w * z[1] - w * w * z[0]);
-        }
+        let pull = at.load() / inertia;
+        let z = match begins {
+            // at rest on the spring
+            true => [pull / (w * w), 0.0],
+            false => next(step, [z, rate], before, pull),
+        };
+        state[1..].copy_from_slice(&[z[0], z[1], pull]);
+        out[0] = -(pull - 2.0 * damping * w * z[1] - w * w * z[0]);
     })
 };
 
@@ -149,60 +128,31 @@ fn highest(dt: f64) -> f64 {
     0.2 / dt
 }
 
-/// One step of z'' + 2 d w z' + w^2 z = u, exact for u that runs straight between samples.
-struct Oscillator {
-    /// Of z and z' on themselves.
-    own: [[f64; 2]; 2],
-    /// Of u before and after.
-    pull: [[f64; 2]; 2],
+/// Step of z'' + 2 d w z' + w^2 z = u for u that runs straight: shares of z, z', u before and after in z and in z'.
+fn step_of(w: f64, damping: f64, dt: f64) -> [[f64; 4]; 2] {
+    // states z, z', u, and du/dt of the step
+    let mut rates = Matrix4::zeros();
+    rates[(0, 1)] = 1.0;
+    (rates[(1, 0)], rates[(1, 1)], rates[(1, 2)]) = (-w * w, -2.0 * damping * w, 1.0);
+    rates[(2, 3)] = 1.0;
+    let small = rates * (dt / 8.0);
+    let (mut term, mut over) = (Matrix4::identity(), Matrix4::identity());
+    for n in 1..=14 {
+        term = term * small / f64::from(n);
+        over += term;
+    }
+    for _ in 0..3 {
+        over = over * over;
+    }
+    [0, 1].map(|i| {
+        let slope = over[(i, 3)] / dt;
+        [over[(i, 0)], over[(i, 1)], over[(i, 2)] - slope, slope]
+    })
 }
 
-impl Oscillator {
-    /// For a step of `dt` seconds; the series of the exponential at an eighth of the step, squared thrice.
-    fn new(w: f64, damping: f64, dt: f64) -> Self {
-        // states z, z', u, and du/dt of the step
-        let rates = Matrix4::new(
-            0.0,
-            1.0,
-            0.0,
-            0.0, //
-            -w * w,
-            -2.0 * damping * w,
-            1.0,
-            0.0, //
-            0.0,
-            0.0,
-            0.0,
-            1.0, //
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        );
-        let small = rates * (dt / 8.0);
-        let (mut term, mut sum) = (Matrix4::identity(), Matrix4::identity());
-        for n in 1..=14 {
-            term = term * small / f64::from(n);
-            sum += term;
-        }
-        let mut over = sum;
-        for _ in 0..3 {
-            over = over * over;
-        }
-        let own = [[over[(0, 0)], over[(0, 1)]], [over[(1, 0)], over[(1, 1)]]];
-        let pull = [0, 1].map(|i| {
-            let slope = over[(i, 3)] / dt;
-            [over[(i, 2)] - slope, slope]
-        });
-        Oscillator { own, pull }
-    }
-
-    fn next(&self, z: [f64; 2], before: f64, after: f64) -> [f64; 2] {
-        [0, 1].map(|i| {
-            let (own, pull) = (self.own[i], self.pull[i]);
-            own[0] * z[0] + own[1] * z[1] + pull[0] * before + pull[1] * after
-        })
-    }
+/// z and z' at the end of a step.
+fn next(step: &[f64], z: [f64; 2], before: f64, after: f64) -> [f64; 2] {
+    [0, 4].map(|i| step[i] * z[0] + step[i + 1] * z[1] + step[i + 2] * before + step[i + 3] * after)
 }
 
 /// M_jj in the middle of the stretch: the column of a unit acceleration less that of none.
@@ -225,22 +175,21 @@ fn inertia(scene: &Scene, j: usize) -> f64 {
     torque(&a) - rest
 }
 
-/// Length of its state in generated code: the step, its four and four factors, the inertia, deflection and its
-/// rate, the pull before, and whether it has begun.
+/// State in generated code: step, its eight factors, inertia, deflection, its rate, pull before, whether it has begun.
 const OF_CODE: usize = 14;
 
 #[cfg(test)]
 mod tests {
-    use super::Oscillator;
+    use super::{next, step_of};
 
     #[test]
     fn a_step_of_the_oscillator_is_that_of_its_closed_solution() {
         // pulled by a constant from rest: z = u/w^2 (1 - e^(-dwt) (cos pt + dw/p sin pt))
         let (w, d, dt, u) = (180.0, 0.07, 1e-3, 3.0);
-        let step = Oscillator::new(w, d, dt);
+        let step = step_of(w, d, dt);
         let mut z = [0.0, 0.0];
         for k in 1..=500 {
-            z = step.next(z, u, u);
+            z = next(step.as_flattened(), z, u, u);
             let t = f64::from(k) * dt;
             let p = w * (1.0f64 - d * d).sqrt();
             let swing = (p * t).cos() + d * w / p * (p * t).sin();

@@ -1,14 +1,10 @@
 //! `empirical`: a torque that the data show and that no named law gives with numbers that a machine can have: a
 //! natural cubic spline of one signal of one joint (de Boor 1978, ch. IV), described by its peak.
 
-use super::added::Added;
-use super::entry::{Entry, Family, Key, Role, Search};
-use super::law::{Law, Memory};
-use super::law_text::exact;
-use super::scene::Scene;
+use std::sync::LazyLock;
+
 use super::signal::{CurveSignal, SIGNALS};
-use super::site::CodeSite;
-use super::unit::Unit;
+use super::{Added, CodeSite, Entry, Family, Key, Law, Role, Scene, Search, Unit, exact};
 use crate::number;
 
 /// Knots of the spline.
@@ -16,10 +12,6 @@ const KNOTS: usize = 6;
 /// Way back that makes a reversal, over that between the ends of the curve.
 const TURN: f64 = 0.01;
 const VALUES: [&str; KNOTS] = ["m_1", "m_2", "m_3", "m_4", "m_5", "m_6"];
-
-const fn value(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque)
-}
 
 pub static ENTRY: Entry = Entry {
     name: "empirical",
@@ -38,12 +30,12 @@ pub static ENTRY: Entry = Entry {
         ),
         Key::shape("from", Unit::Signal),
         Key::shape("to", Unit::Signal),
-        value("m_1"),
-        value("m_2"),
-        value("m_3"),
-        value("m_4"),
-        value("m_5"),
-        value("m_6"),
+        Key::torque("m_1"),
+        Key::torque("m_2"),
+        Key::torque("m_3"),
+        Key::torque("m_4"),
+        Key::torque("m_5"),
+        Key::torque("m_6"),
     ],
     role: Role::StandIn,
     search: Search::Grid,
@@ -73,32 +65,21 @@ pub static LAW: Law = Law {
         let signal = CurveSignal::of(shape[0]);
         (signal.family(), signal == CurveSignal::Position)
     }),
-    memory: Some(Memory {
-        size: TURNING,
-        step: |scene, place, shape, _, kept, out| {
-            let Some(j) = place.joint() else { return };
-            let (signal, least) = (CurveSignal::of(shape[0]), TURN * (shape[2] - shape[1]));
-            let (mut x, sign) = signal.along(scene, j, least);
-            if signal == CurveSignal::Way {
-                x[0] = way(scene.stretch.q[j][0], least, kept);
-            }
-            let at = (x[0] - shape[1]) / (shape[2] - shape[1]).max(f64::MIN_POSITIVE);
-            for (out, b) in out.iter_mut().zip(Basis::new().at(at)) {
-                *out = sign[0] * b;
-            }
-        },
-    }),
+    memory: Some(TURNING),
     code: Some(written),
-    ..Law::linear(&ENTRY, &VALUES, |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        let signal = CurveSignal::of(shape[0]);
-        let (x, sign) = signal.along(scene, j, TURN * (shape[2] - shape[1]));
-        let spline = Basis::new();
-        for k in 0..scene.len() {
-            let at = (x[k] - shape[1]) / (shape[2] - shape[1]).max(f64::MIN_POSITIVE);
-            for (column, b) in out.iter_mut().zip(spline.at(at)) {
-                column[k] = sign[k] * b;
-            }
+    ..Law::linear(&ENTRY, &VALUES, |at, kept, out| {
+        let (signal, wide) = (CurveSignal::of(at.shape[0]), at.shape[2] - at.shape[1]);
+        let x = match signal {
+            CurveSignal::Way => way(at.q(), TURN * wide, kept),
+            signal => signal.value(at.scene, at.joint, at.k),
+        };
+        let sign = match signal {
+            CurveSignal::Position | CurveSignal::Speed => 1.0,
+            CurveSignal::Friction | CurveSignal::Load | CurveSignal::Way => at.direction(),
+        };
+        let values = splines((x - at.shape[1]) / wide.max(f64::MIN_POSITIVE));
+        for (out, b) in out.iter_mut().zip(values) {
+            *out = sign * b;
         }
     })
 };
@@ -123,16 +104,14 @@ impl CurveSignal {
         }
     }
 
-    /// The signal along a scene and the sign of the torque there; a reversal is a way back of `least`.
-    fn along(self, scene: &Scene, j: usize, least: f64) -> (Vec<f64>, Vec<f64>) {
-        let s = scene.stretch;
-        let friction = || (0..s.len()).map(|k| scene.direction(j, k)).collect();
+    /// The signal at sample k; the position where the way hangs on samples before.
+    fn value(self, scene: &Scene, j: usize, k: usize) -> f64 {
         match self {
-            CurveSignal::Position => (s.q[j].clone(), vec![1.0; s.len()]),
-            CurveSignal::Friction => (s.q[j].clone(), friction()),
-            CurveSignal::Speed => (s.v[j].clone(), vec![1.0; s.len()]),
-            CurveSignal::Load => (scene.load[j].clone(), friction()),
-            CurveSignal::Way => (ways(&s.q[j], least), friction()),
+            CurveSignal::Position | CurveSignal::Friction | CurveSignal::Way => {
+                scene.stretch.q[j][k]
+            }
+            CurveSignal::Speed => scene.stretch.v[j][k],
+            CurveSignal::Load => scene.load[j][k],
         }
     }
 
@@ -141,15 +120,13 @@ impl CurveSignal {
         if self == CurveSignal::Way {
             return [0.03, 0.1, 0.3].map(|share| [0.0, share * range]).to_vec();
         }
-        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
-        for x in scenes.iter().flat_map(|s| self.along(s, j, 0.0).0) {
-            ends = [ends[0].min(x), ends[1].max(x)];
-        }
-        if ends[0] < ends[1] {
-            vec![ends]
-        } else {
-            Vec::new()
-        }
+        let values = scenes
+            .iter()
+            .flat_map(|s| (0..s.len()).map(move |k| self.value(s, j, k)));
+        let ends = values.fold([f64::INFINITY, f64::NEG_INFINITY], |ends, x| {
+            [ends[0].min(x), ends[1].max(x)]
+        });
+        Vec::from_iter((ends[0] < ends[1]).then_some(ends))
     }
 }
 
@@ -181,31 +158,23 @@ fn way(q: f64, least: f64, kept: &mut [f64]) -> f64 {
     (q - *turn).abs()
 }
 
-/// The natural cubic splines that are one at a knot and zero at the others, over 0..1.
-struct Basis {
-    /// Second derivatives of each at the knots, per knot distance squared.
-    bends: [[f64; KNOTS]; KNOTS],
-}
+/// Bends of the natural cubic splines that are one at a knot and zero at the others.
+static BENDS: LazyLock<[[f64; KNOTS]; KNOTS]> = LazyLock::new(|| {
+    let unit = |i: usize| std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 });
+    std::array::from_fn(|i| bends(&unit(i)))
+});
 
-impl Basis {
-    fn new() -> Self {
-        let unit = |i: usize| std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 });
-        Basis {
-            bends: std::array::from_fn(|i| bends(&unit(i))),
-        }
-    }
-
-    /// Their values at x; constant beyond the ends.
-    fn at(&self, x: f64) -> [f64; KNOTS] {
-        let x = x.clamp(0.0, 1.0) * (KNOTS - 1) as f64;
-        let k = (x as usize).min(KNOTS - 2);
-        let (w, u) = ((k + 1) as f64 - x, x - k as f64);
-        let bend = |s: f64| (s * s * s - s) / 6.0;
-        std::array::from_fn(|i| {
-            let own = |at: usize, share: f64| if i == at { share } else { 0.0 };
-            own(k, w) + own(k + 1, u) + bend(w) * self.bends[i][k] + bend(u) * self.bends[i][k + 1]
-        })
-    }
+/// Values of those splines at x in 0..1; constant beyond the ends.
+fn splines(x: f64) -> [f64; KNOTS] {
+    let x = x.clamp(0.0, 1.0) * (KNOTS - 1) as f64;
+    let k = (x as usize).min(KNOTS - 2);
+    let (w, u) = ((k + 1) as f64 - x, x - k as f64);
+    let bend = |s: f64| (s * s * s - s) / 6.0;
+    let bends = &*BENDS;
+    std::array::from_fn(|i| {
+        let own = |at: usize, share: f64| if i == at { share } else { 0.0 };
+        own(k, w) + own(k + 1, u) + bend(w) * bends[i][k] + bend(u) * bends[i][k + 1]
+    })
 }
 
 /// Second derivatives of the natural cubic spline through values at unit distance, by elimination.
@@ -240,9 +209,10 @@ impl Added {
         if self.law.entry.role != Role::StandIn {
             return None;
         }
-        let spline = Basis::new();
-        let at = |k: i32| spline.at(f64::from(k) / 100.0);
-        let torque = |k: i32| -> f64 { at(k).iter().zip(&self.linear).map(|(b, c)| b * c).sum() };
+        let torque = |k: i32| {
+            let values = splines(f64::from(k) / 100.0);
+            values.iter().zip(&self.linear).map(|(b, c)| b * c).sum()
+        };
         let peak = (0..=100).map(torque).map(f64::abs).fold(0.0, f64::max);
         Some((CurveSignal::of(self.shape[0]), peak))
     }
@@ -250,30 +220,19 @@ impl Added {
 
 /// What it adds to generated code.
 fn written(to: &mut CodeSite) {
-    let signal = CurveSignal::of(to.shape()[0]);
-    match signal {
-        CurveSignal::Position | CurveSignal::Speed => {
-            let over = if signal == CurveSignal::Speed {
-                to.v()
-            } else {
-                to.q()
-            };
-            to.added(curve_text(to, &over));
-        }
-        CurveSignal::Friction | CurveSignal::Load => {
-            let over = if signal == CurveSignal::Load {
-                to.load()
-            } else {
-                to.q()
-            };
-            to.added(format!("{} * ({})", to.direction(), curve_text(to, &over)));
-        }
+    let by_direction =
+        |to: &CodeSite, over: &str| format!("{} * ({})", to.direction(), curve_text(to, over));
+    match CurveSignal::of(to.shape[0]) {
+        CurveSignal::Position => to.added(curve_text(to, &to.q())),
+        CurveSignal::Speed => to.added(curve_text(to, &to.v())),
+        CurveSignal::Friction => to.added(by_direction(to, &to.q())),
+        CurveSignal::Load => to.added(by_direction(to, &to.load())),
         CurveSignal::Way => {
-            let (q, least) = (to.q(), TURN * (to.shape()[2] - to.shape()[1]));
+            let (q, least) = (to.q(), TURN * (to.shape[2] - to.shape[1]));
             let own = to.remember("turned", Some(TURNING + 1), "0.0", &q);
-            let way = format!("way_{}", to.number());
+            let way = format!("way_{}", to.number);
             to.line(format!("let {way} = $way({q}, {}, &{own});", exact(least)));
-            to.step(format!("{} * ({})", to.direction(), curve_text(to, &way)));
+            to.step(by_direction(to, &way));
         }
     }
 }
@@ -281,8 +240,8 @@ fn written(to: &mut CodeSite) {
 /// The curve over a signal, as a sum of cubes that begin at its knots.
 fn curve_text(to: &CodeSite, signal: &str) -> String {
     let above = |x: &str| format!("0.5 * (({x}) + fabs({x}))");
-    let (from, wide) = (to.shape()[1], to.shape()[2] - to.shape()[1]);
-    let cubes = cubes(to.linear());
+    let (from, wide) = (to.shape[1], to.shape[2] - to.shape[1]);
+    let cubes = cubes(to.linear);
     let (steps, terms) = cubes.split_at(2);
     let per_step = terms.len() as f64 / wide;
     let x = above(&format!(
@@ -306,20 +265,18 @@ mod tests {
 
     #[test]
     fn the_spline_passes_its_knots_and_is_straight_where_they_are() {
-        let spline = Basis::new();
         for k in 0..KNOTS {
-            let at = spline.at(k as f64 / 5.0);
-            for (i, b) in at.into_iter().enumerate() {
+            for (i, b) in splines(k as f64 / 5.0).into_iter().enumerate() {
                 let wanted = if i == k { 1.0 } else { 0.0 };
                 assert!((b - wanted).abs() < 1e-12, "{k} {i}");
             }
         }
         // a straight line has no bend; splines are smooth at the knots
-        let line: f64 = (0..KNOTS).map(|i| spline.at(0.37)[i] * i as f64).sum();
+        let line: f64 = (0..KNOTS).map(|i| splines(0.37)[i] * i as f64).sum();
         assert!((line - 0.37 * 5.0).abs() < 1e-12);
-        let slope = |x: f64| (spline.at(x + 1e-6)[2] - spline.at(x)[2]) / 1e-6;
+        let slope = |x: f64| (splines(x + 1e-6)[2] - splines(x)[2]) / 1e-6;
         assert!((slope(0.4) - slope(0.4 - 1e-6)).abs() < 1e-3);
-        assert_eq!(spline.at(-3.0), spline.at(0.0));
+        assert_eq!(splines(-3.0), splines(0.0));
         // the same as cubes that begin at the knots
         let values = [1.0, -2.0, 0.5, 3.0, 1.0, -1.0];
         let terms = cubes(&values);
@@ -327,8 +284,11 @@ mod tests {
             let cube = |(k, c): (usize, &f64)| c * f64::max(x - k as f64, 0.0).powi(3);
             let sum: f64 = terms[2..].iter().enumerate().map(cube).sum();
             let shown = terms[0] + terms[1] * x + sum;
-            let at = spline.at(x / 5.0);
-            let wanted: f64 = at.iter().zip(&values).map(|(b, m)| b * m).sum();
+            let wanted: f64 = splines(x / 5.0)
+                .iter()
+                .zip(&values)
+                .map(|(b, m)| b * m)
+                .sum();
             assert!((shown - wanted).abs() < 1e-12, "{x}: {shown} {wanted}");
         }
     }

@@ -1,11 +1,7 @@
 //! What is known of an effect, whoever models it. The estimator and the simulator read the same entries and
 //! have laws of their own, so that each checks the other.
 
-use super::facts::Facts;
-use super::physics::Rule;
-use super::place::Places;
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{CurveSignal, Facts, Places, Rule, Unit};
 
 /// Families of effects that look alike: named first, the member only where the data separate it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -135,20 +131,23 @@ pub struct Range {
 impl Key {
     /// A size of the effect.
     pub const fn size(name: &'static str, unit: Unit) -> Self {
-        let size = true;
         Self {
             name,
             unit,
-            size,
+            size: true,
             range: None,
         }
     }
 
+    /// A size that is a torque.
+    pub(super) const fn torque(name: &'static str) -> Self {
+        Self::size(name, Unit::Torque)
+    }
+
     /// A number that shapes the effect.
     pub const fn shape(name: &'static str, unit: Unit) -> Self {
-        let size = false;
         Self {
-            size,
+            size: false,
             ..Self::size(name, unit)
         }
     }
@@ -179,10 +178,7 @@ impl Key {
 impl Range {
     /// Whether a number is one of them.
     pub fn holds(&self, value: f64) -> bool {
-        let low = match self.open {
-            true => value > self.least,
-            false => value >= self.least,
-        };
+        let low = value > self.least || (!self.open && value == self.least);
         low && value <= self.most
     }
 }

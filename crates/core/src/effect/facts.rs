@@ -1,6 +1,6 @@
 //! What an effect that was found is called by a person who knows machines: `ripple of q1, 2.5 mm pitch`.
 
-use super::signal::CurveSignal;
+use super::CurveSignal;
 use crate::number;
 use crate::robot::JointKind;
 
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wave_is_told_by_its_pitch_on_a_slide_and_by_its_number_on_a_turning_joint() {
+    fn a_wave_is_named_by_its_pitch_on_a_slide_and_by_its_number_on_a_turning_joint() {
         let number = |key: &str, value| (key.to_owned(), value, "N".to_owned());
         let mut facts = Facts {
             at: "q1".into(),

@@ -1,7 +1,6 @@
 //! `filter`: a logged torque or position that has passed a first-order lag.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "filter",

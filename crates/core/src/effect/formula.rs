@@ -1,9 +1,9 @@
 //! Effects of a user's own: torques linear in some coefficients, each of which has a formula in the motion.
 
+use std::collections::BTreeSet;
+
 use super::formula_state::FormulaState;
-use super::law_text::exact;
-use super::place::Place;
-use super::scene::Scene;
+use super::{Instant, Place, exact};
 use crate::explain::Explain;
 use crate::math::formula::{Formula, MOST_NAMES};
 use crate::robot::{FormulaSignal, Robot};
@@ -80,7 +80,7 @@ pub struct Formulas {
     /// Joints at which it may sit.
     joints: Vec<usize>,
     columns: Vec<Column>,
-    ranges: Vec<[f64; 2]>,
+    pub(super) ranges: Vec<[f64; 2]>,
 }
 
 struct Column {
@@ -115,6 +115,8 @@ impl Formulas {
             None => (0..names.len()).collect(),
             Some(joints) => joints.iter().map(place).collect::<Result<_, _>>()?,
         };
+        let shapes = definition.shapes.iter();
+        let shapes: String = shapes.map(|s| format!(", {}", s.name)).collect();
         let column = |[coefficient, _, formula]: &[String; 3]| {
             let syntax = |why: String| FormulaError::Syntax {
                 name: name.clone(),
@@ -129,11 +131,7 @@ impl Formulas {
                     coefficient: coefficient.clone(),
                     variable: variable.clone(),
                     joint: names.first().cloned().unwrap_or_default(),
-                    shapes: definition
-                        .shapes
-                        .iter()
-                        .map(|s| format!(", {}", s.name))
-                        .collect(),
+                    shapes: shapes.clone(),
                 })
             });
             let inputs: Vec<Input> = inputs.collect::<Result<_, _>>()?;
@@ -149,18 +147,13 @@ impl Formulas {
                     });
                 }
             }
-            Ok(Column {
-                formula: compiled,
-                inputs,
-            })
+            let formula = compiled;
+            Ok(Column { formula, inputs })
         };
+        let columns = definition.coefficients.iter().map(column);
         Ok(Formulas {
             joints,
-            columns: definition
-                .coefficients
-                .iter()
-                .map(column)
-                .collect::<Result<_, _>>()?,
+            columns: columns.collect::<Result<_, _>>()?,
             ranges: definition.shapes.iter().map(|s| s.range).collect(),
         })
     }
@@ -178,15 +171,11 @@ impl Formulas {
     /// Joints whose temperature it takes at a joint.
     pub fn temperatures(&self, joint: usize) -> Vec<usize> {
         let inputs = self.columns.iter().flat_map(|column| &column.inputs);
-        let mut of: Vec<usize> = inputs
-            .filter_map(|input| match input {
-                Input::Signal(FormulaSignal::Temperature, of) => Some(of.unwrap_or(joint)),
-                _ => None,
-            })
-            .collect();
-        of.sort_unstable();
-        of.dedup();
-        of
+        let temperatures = inputs.filter_map(|input| match input {
+            Input::Signal(FormulaSignal::Temperature, of) => Some(of.unwrap_or(joint)),
+            _ => None,
+        });
+        Vec::from_iter(temperatures.collect::<BTreeSet<usize>>())
     }
 
     /// Shapes to try: a few over the range of each, in equal ratios where the range is of one sign.
@@ -205,35 +194,14 @@ impl Formulas {
                     false => from + (to - from) * share,
                 }
             };
-            all = all
-                .iter()
-                .flat_map(|begun| {
-                    (0..steps)
-                        .map(|i| [begun.as_slice(), &[at(i)]].concat())
-                        .collect::<Vec<_>>()
-                })
-                .collect();
+            let longer = |begun: &Vec<f64>| -> Vec<Vec<f64>> {
+                (0..steps)
+                    .map(|i| [begun.as_slice(), &[at(i)]].concat())
+                    .collect()
+            };
+            all = all.iter().flat_map(longer).collect();
         }
         all
-    }
-
-    /// Range of each shape.
-    pub(super) fn limits(&self) -> Vec<[f64; 2]> {
-        self.ranges.clone()
-    }
-
-    /// Adds the columns of joint `joint` along a scene. What a formula does not give, as a root of what is negative,
-    /// is no number.
-    pub(super) fn fill(&self, scene: &Scene, shape: &[f64], joint: usize, out: &mut [Vec<f64>]) {
-        let mut kept = vec![f64::NAN; self.remembered()];
-        let mut row = vec![0.0; self.columns.len()];
-        for k in 0..scene.len() {
-            row.fill(0.0);
-            self.at((scene, k), (shape, joint), &mut kept, &mut row);
-            for (out, x) in out.iter_mut().zip(&row) {
-                out[k] += x;
-            }
-        }
     }
 
     /// How many numbers it keeps from sample to sample; NaN at the begin of a stretch.
@@ -243,14 +211,15 @@ impl Formulas {
         FormulaState::SIZE * own.count()
     }
 
-    /// Adds its columns at sample k of a scene to `out`.
-    pub(super) fn at(
-        &self,
-        (scene, k): (&Scene, usize),
-        (shape, joint): (&[f64], usize),
-        kept: &mut [f64],
-        out: &mut [f64],
-    ) {
+    /// Adds its columns at a sample to `out`; what a formula does not give, as a root of what is negative, is no number.
+    pub(super) fn at(&self, at: &Instant, kept: &mut [f64], out: &mut [f64]) {
+        let &Instant {
+            scene,
+            shape,
+            joint,
+            k,
+            ..
+        } = at;
         let mut values = [0.0; MOST_NAMES];
         let mut kept = kept.chunks_exact_mut(FormulaState::SIZE);
         for (column, out) in self.columns.iter().zip(out) {
@@ -269,11 +238,8 @@ impl Formulas {
             *out += column.formula.value(&values[..column.inputs.len()]);
         }
     }
-}
 
-impl Formulas {
-    /// The torque at joint `joint` as an expression of generated code, for the text of a signal; and whether it
-    /// hangs on the time.
+    /// The torque at joint `joint` as an expression of generated code, and whether it hangs on the time.
     pub(super) fn code(
         &self,
         joint: usize,

@@ -1,6 +1,6 @@
 //! Signals of formulas along a motion, and what those that remember keep from sample to sample.
 
-use super::scene::Scene;
+use super::Scene;
 use crate::robot::FormulaSignal;
 use crate::robot::friction::sign;
 

@@ -1,9 +1,7 @@
 //! `gain`: torque constant or gear off by a factor, k tau on one joint. A fit that was free while
 //! carrying it absorbs it: it is looked for only with the model kept.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::law::Law;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Law, Role, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -39,8 +37,7 @@ pub static LAW: Law = Law {
             to.offset()
         ));
     }),
-    ..Law::linear(&ENTRY, &["k"], |scene, place, _, _, out| {
-        let Some(j) = place.joint() else { return };
-        out[0].copy_from_slice(&scene.hat[j]);
+    ..Law::linear(&ENTRY, &["k"], |at, _, out| {
+        out[0] = at.scene.hat[at.joint][at.k]
     })
 };

@@ -2,16 +2,10 @@
 //! know: a base that stands askew. Two numbers explain it on all joints; the columns are those of
 //! [`Tilt`](crate::robot::undeclared::Tilt).
 
-use super::entry::{Entry, Family, Key};
-use super::law::Law;
-use super::law_text::exact;
-use super::place::{Place, Places};
-use super::scene::Scene;
-use super::site::CodeSite;
-use super::site::Property;
-use super::unit::Unit;
+use super::{CodeSite, Entry, Family, Instant, Key, Law, Places, Property, Unit, exact};
 use crate::number;
 use crate::robot::tree::MOST_JOINTS;
+use crate::robot::undeclared::Tilt;
 
 pub static ENTRY: Entry = Entry {
     name: "gravity-tilt",
@@ -42,54 +36,43 @@ pub static LAW: Law = Law {
     ..Law::linear(&ENTRY, &["gx", "gy"], columns)
 };
 
-fn columns(scene: &Scene, _: Place, _: &[f64], joint: usize, out: &mut [Vec<f64>]) {
-    if let Some(known) = scene.tilt {
-        let known = known.get_or_init(|| all_joints(scene));
-        for (out, known) in out.iter_mut().zip(known) {
-            out.copy_from_slice(&known[joint]);
-        }
+fn columns(at: &Instant, _: &mut [f64], out: &mut [f64]) {
+    let torques = |tilt: &Tilt, at: Instant| {
+        let ([q, ..], n) = (at.state::<MOST_JOINTS>(), at.scene.robot.joints());
+        let mut torques = [[0.0; 2]; MOST_JOINTS];
+        tilt.torques(&q[..n], &mut torques[..n]);
+        torques
+    };
+    let tilt = || at.scene.robot.tilt(at.scene.theta);
+    let Some(known) = at.scene.tilt else {
+        out.copy_from_slice(&torques(&tilt(), *at)[at.joint]);
         return;
-    }
-    along(scene, |k, torques| {
-        for (out, x) in out.iter_mut().zip(torques[joint]) {
-            out[k] = x;
-        }
-    });
-}
-
-/// Torques on all joints, `[direction][joint][sample]`: a walk over the links gives them together.
-fn all_joints(scene: &Scene) -> [Vec<Vec<f64>>; 2] {
-    let none = || vec![vec![0.0; scene.len()]; scene.robot.joints()];
-    let mut out = [none(), none()];
-    along(scene, |k, torques| {
-        for (direction, out) in out.iter_mut().enumerate() {
-            for (out, torque) in out.iter_mut().zip(torques) {
-                out[k] = torque[direction];
+    };
+    // a walk over the links gives those of all joints together
+    let known = known.get_or_init(|| {
+        let (n, tilt) = (at.scene.robot.joints(), tilt());
+        let mut all = [0, 1].map(|_| vec![Vec::with_capacity(at.scene.len()); n]);
+        for k in 0..at.scene.len() {
+            let torques = torques(&tilt, Instant { k, ..*at });
+            for (j, [x, y]) in torques.into_iter().enumerate().take(n) {
+                all[0][j].push(x);
+                all[1][j].push(y);
             }
         }
+        all
     });
-    out
-}
-
-/// Calls `take` with every sample and its torques, those of a joint by gravity along x and along y.
-fn along(scene: &Scene, mut take: impl FnMut(usize, &[[f64; 2]])) {
-    let (n, tilt) = (scene.robot.joints(), scene.robot.tilt(scene.theta));
-    let mut state = [[0.0; MOST_JOINTS]; 3];
-    let mut torques = [[0.0; 2]; MOST_JOINTS];
-    for k in 0..scene.len() {
-        let [q, v, a] = &mut state;
-        scene.stretch.at(k, &mut q[..n], &mut v[..n], &mut a[..n]);
-        tilt.torques(&q[..n], &mut torques[..n]);
-        take(k, &torques[..n]);
+    for (out, known) in out.iter_mut().zip(known) {
+        *out = known[at.joint][at.k];
     }
 }
 
 impl CodeSite<'_> {
     /// A base that stands askew: the recursion in another gravity, or the first moments of the closed form.
     fn tilted(&mut self) {
-        let &[gx, gy] = self.linear() else { return };
-        let Some(chain) = self.robot().coefficients(self.theta()) else {
-            self.in_gravity([gx, gy]);
+        let &[gx, gy] = self.linear else { return };
+        let Some(chain) = self.model.robot.coefficients(&self.model.theta) else {
+            let [x, y] = self.out.tilt.unwrap_or_default();
+            self.out.tilt = Some([x + gx, y + gy]);
             return;
         };
         let [a, b, c, e] = chain.h.map(exact);
@@ -98,7 +81,7 @@ impl CodeSite<'_> {
         let along = format!("({gx} * sin(q[1]) - {gy} * cos(q[1]))");
         let across = format!("({gx} * cos(q[1]) + {gy} * sin(q[1]))");
         let by_psi = format!("({b} * cos(q[2] + q[3]) - {e} * sin(q[2] + q[3]))");
-        self.at_rest([
+        self.out.askew.extend([
             format!("tau[0] += {mass} * {gy};"),
             format!(
                 "tau[1] += {side} * {along} + ({h0} + {a} * sin(q[2]) + {b} * sin(q[2] + q[3]) + \

@@ -1,27 +1,22 @@
 //! How the estimator sees an effect: columns of torque along a recorded motion, linear in some parameters and
 //! shaped by others.
 
-use super::cover::Cover;
-use super::entry::{Entry, Family};
 use super::formula::Formulas;
-use super::place::Place;
-use super::scene::Scene;
-use super::site::{Code, PropertyOf};
-use super::values::{EffectError, Values};
+use super::{CodeSite, Cover, EffectError, Entry, Family, Instant, Place, Property, Values};
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
 /// Shapes to begin the search from, or what the data lack for the effect.
 pub type Starts = Result<Vec<Vec<f64>>, String>;
 
-/// Fills the columns of one joint along a scene: place, shape, joint, columns.
-pub type Fill = fn(&Scene, Place, &[f64], usize, &mut [Vec<f64>]);
+/// Columns of a joint at one sample: what the law keeps from the one before, and a number for each coefficient, 0 before.
+pub(super) type Columns = fn(&Instant, &mut [f64], &mut [f64]);
 
 /// The estimator's law of an effect. What a formula may stand for is asked of its methods.
 pub struct Law {
     pub entry: &'static Entry,
     /// Whether it can sit at one of the entry's places on this robot.
-    pub fits: fn(&Robot, &[JointFriction], Place) -> bool,
+    pub(super) fits: fn(&Robot, &[JointFriction], Place) -> bool,
     /// Parameters that shape the columns, searched.
     pub shape: &'static [&'static str],
     /// Coefficients of the columns, one each.
@@ -30,10 +25,10 @@ pub struct Law {
     pub(super) starts: fn(&Cover, Place) -> Starts,
     /// Limits of each shape parameter that is refined, on these data.
     pub(super) limits: fn(&Cover, Place) -> Vec<[f64; 2]>,
-    /// Adds to `out` (one vector per linear coefficient, zero before) the columns of joint `joint`.
-    pub(super) columns: Fill,
-    /// One sample at a time, where a column depends on samples before it.
-    pub memory: Option<Memory>,
+    pub(super) columns: Columns,
+    /// How many numbers it keeps from sample to sample, NaN at the begin of a stretch, where a column depends on samples
+    /// before it.
+    pub memory: Option<usize>,
     /// Direction of the joint's friction at a speed, where the effect makes it smooth: shape, speed.
     pub direction: Option<fn(&[f64], f64) -> f64>,
     /// Family and whether it is the same torque at rest, where these hang on the shape.
@@ -41,29 +36,18 @@ pub struct Law {
     /// Formulas of a user's own, in place of the functions above.
     pub formula: Option<&'static Formulas>,
     /// What it adds to generated code; formulas write their own.
-    pub(super) code: Option<Code>,
+    pub(super) code: Option<fn(&mut CodeSite)>,
     /// The property of links, drives or the base that it is, where it is one: place, shape, coefficients.
-    pub property: PropertyOf,
+    pub(super) property: fn(Place, &[f64], &[f64]) -> Option<Property>,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
-    pub reparametrised: Option<Reparametrisation>,
-}
-
-/// A law that remembers: the same columns from a scene of one sample and numbers that it keeps.
-pub struct Memory {
-    /// How many numbers it keeps; NaN at the begin of a stretch.
-    pub size: usize,
-    /// Place, shape, joint, what it keeps, and one number for each linear coefficient, 0 before.
-    pub step: Step,
+    pub(super) reparametrised: Option<Reparametrisation>,
 }
 
 /// Family and whether it is the same torque at rest, by the shape.
 pub type Varied = fn(&[f64]) -> (Family, bool);
 
-/// One sample of a law that remembers, see [`Memory::step`].
-pub type Step = fn(&Scene, Place, &[f64], usize, &mut [f64], &mut [f64]);
-
 /// Two ways to say the numbers of one effect.
-pub struct Reparametrisation {
+pub(super) struct Reparametrisation {
     /// Shape and coefficients of the keys in a file.
     pub of_keys: fn(&Values) -> Result<[Vec<f64>; 2], EffectError>,
     /// The keys, in the order in which they are reported, of shape and coefficients.
@@ -81,10 +65,10 @@ pub struct KeyValue {
 
 impl Law {
     /// A law without shape, at every place of its entry, on any data.
-    pub const fn linear(
+    pub(super) const fn linear(
         entry: &'static Entry,
         linear: &'static [&'static str],
-        columns: Fill,
+        columns: Columns,
     ) -> Self {
         Law {
             entry,
@@ -116,7 +100,7 @@ impl Law {
     }
 
     /// Its numbers by the entry's keys.
-    pub fn keys(&self, shape: &[f64], linear: &[f64]) -> Vec<KeyValue> {
+    pub(crate) fn keys(&self, shape: &[f64], linear: &[f64]) -> Vec<KeyValue> {
         if let Some(with) = &self.reparametrised {
             return (with.to_keys)(shape, linear);
         }
@@ -129,13 +113,13 @@ impl Law {
     }
 
     /// Shape and coefficients of numbers in a file.
-    pub(crate) fn of_keys(&self, values: &Values) -> Result<[Vec<f64>; 2], EffectError> {
+    pub(super) fn of_keys(&self, values: &Values) -> Result<[Vec<f64>; 2], EffectError> {
         if let Some(with) = &self.reparametrised {
             return (with.of_keys)(values);
         }
-        let numbers =
-            |keys: &[&str]| -> Result<_, _> { keys.iter().map(|key| values.get(key)).collect() };
-        Ok([numbers(self.shape)?, numbers(self.linear)?])
+        let [shape, linear]: [Result<_, _>; 2] =
+            [self.shape, self.linear].map(|keys| keys.iter().map(|key| values.get(key)).collect());
+        Ok([shape?, linear?])
     }
 
     /// Names of its keys in files.
@@ -147,8 +131,7 @@ impl Law {
     }
 }
 
-/// Whether a joint's declared friction jumps at rest, or there is none: a law that is smooth has slopes and a fall at
-/// low speed of its own.
+/// Whether a joint's declared friction jumps at rest, or there is none: a smooth law has a fall at low speed of its own.
 pub(super) fn jumps_or_is_none(_: &Robot, laws: &[JointFriction], place: Place) -> bool {
     let law = place.joint().map(|j| laws[j]);
     !matches!(law, Some(JointFriction::DoubleTanh(_)))

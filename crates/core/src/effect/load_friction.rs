@@ -1,11 +1,7 @@
 //! `load-friction`: friction that grows with the load, (mu_c + mu_v |v|) |tau_l| tanh(w v)
 //! (Hamon, Gautier and Garrec 2010).
 
-use super::entry::{Entry, Family, Key, Search};
-use super::law::Law;
-use super::physics::Rule;
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{CurveSignal, Entry, Family, Key, Law, Rule, Search, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -41,15 +37,9 @@ const LOADED: &str = "teeth and bearings rub more under load";
 pub static LAW: Law = Law {
     shape: &["w"],
     starts: |cover, place| {
-        let joint = cover.at(place);
-        if joint.reversals < 2 {
-            return Err("fewer than two reversals: friction is not seen in both directions".into());
-        }
-        Ok(vec![
-            vec![10.0 / joint.fastest()],
-            vec![40.0 / joint.fastest()],
-            vec![200.0 / joint.fastest()],
-        ])
+        let lack = "fewer than two reversals: friction is not seen in both directions";
+        let top = cover.reversing(place, 2, lack)?.fastest();
+        Ok([10.0, 40.0, 200.0].map(|w| vec![w / top]).to_vec())
     },
     limits: |cover, place| {
         let top = cover.at(place).fastest();
@@ -64,12 +54,8 @@ pub static LAW: Law = Law {
             to.s(0)
         ));
     }),
-    ..Law::linear(&ENTRY, &["mu_c", "mu_v"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        for (k, (v, load)) in scene.stretch.v[j].iter().zip(&scene.load[j]).enumerate() {
-            let x = load.abs() * (shape[0] * v).tanh();
-            out[0][k] = x;
-            out[1][k] = v.abs() * x;
-        }
+    ..Law::linear(&ENTRY, &["mu_c", "mu_v"], |at, _, out| {
+        out[0] = at.load().abs() * (at.shape[0] * at.v()).tanh();
+        out[1] = at.v().abs() * out[0];
     })
 };

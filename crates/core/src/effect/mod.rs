@@ -45,6 +45,10 @@ pub use values::{EffectError, Values};
 
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
+use law::{KeyValue, Reparametrisation, jumps_or_is_none};
+use law_text::exact;
+use scene::Instant;
+use site::{CodeSite, Property};
 
 /// Files of effects, and what each has in a list.
 macro_rules! catalogue {
@@ -153,7 +157,9 @@ pub fn read_as(
         known: &law.key_names(),
         given,
     };
-    Added::of_values(law, robot, joint, &values)
+    let place = law.entry.places.named(robot, joint, &values)?;
+    let [shape, linear] = law.of_keys(&values)?;
+    Ok(Added::new(law, place, shape, linear))
 }
 
 #[cfg(test)]
@@ -162,7 +168,7 @@ mod tests {
     use crate::robot::JointKind;
 
     #[test]
-    fn every_effect_that_can_be_found_is_told_in_words_with_what_to_do_about_it() {
+    fn every_effect_that_can_be_found_has_words_and_a_remedy() {
         for law in LAWS {
             let entry = law.entry;
             let number = |key: &Key| (key.name.to_owned(), 0.5, "N".to_owned());

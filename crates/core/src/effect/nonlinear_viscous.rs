@@ -1,9 +1,6 @@
 //! `nonlinear-viscous`: friction that bends with speed, c sgn(v) |v|^p.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Search, Unit};
 use crate::number;
 use crate::robot::friction::sign;
 
@@ -39,9 +36,8 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     shape: &["p"],
     starts: |cover, place| {
-        if cover.at(place).reversals < 2 {
-            return Err("fewer than two reversals: friction is not seen in both directions".into());
-        }
+        let lack = "fewer than two reversals: friction is not seen in both directions";
+        cover.reversing(place, 2, lack)?;
         Ok([0.35, 0.5, 0.7, 1.6, 2.0, 2.5].map(|p| vec![p]).to_vec())
     },
     limits: |_, _| vec![[0.3, 3.0]],
@@ -53,10 +49,7 @@ pub static LAW: Law = Law {
             to.s(0)
         ));
     }),
-    ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {
-            *x = sign(*v) * v.abs().powf(shape[0]);
-        }
+    ..Law::linear(&ENTRY, &["c"], |at, _, out| {
+        out[0] = sign(at.v()) * at.v().abs().powf(at.shape[0]);
     })
 };

@@ -2,13 +2,9 @@
 
 use std::sync::Mutex;
 
-use super::cover::Cover;
-use super::entry::{Entry, Family, Key, Search};
 use super::formula::{Definition, FormulaError, Formulas};
 use super::law::{Law, Starts};
-use super::place::Place;
-use super::scene::Scene;
-use super::unit::Unit;
+use super::{Cover, Entry, Family, Instant, Key, Place, Search, Unit};
 use crate::robot::Robot;
 
 /// Laws that have been made: a definition is read for every command and every file, and is the same law.
@@ -54,11 +50,9 @@ fn leaked(definition: &Definition, formula: Formulas) -> &'static Law {
         Box::leak(names.into_boxed_slice())
     };
     let (shape, linear) = (names(shape), names(linear));
-    let formulas: Vec<String> = definition
-        .coefficients
-        .iter()
-        .map(|[name, _, formula]| format!("{name} ({formula})"))
-        .collect();
+    let formulas = definition.coefficients.iter();
+    let formulas = formulas.map(|[name, _, formula]| format!("{name} ({formula})"));
+    let formulas: Vec<String> = formulas.collect();
     let entry: &'static Entry = Box::leak(Box::new(Entry {
         name: text(&definition.name),
         families: &[Family::Own],
@@ -78,11 +72,10 @@ fn leaked(definition: &Definition, formula: Formulas) -> &'static Law {
         remedy: "look for the cause that its formula describes, or keep the refined model",
         ..Entry::USUAL
     }));
-    let nothing = |_: &Scene, _: Place, _: &[f64], _: usize, _: &mut [Vec<f64>]| {};
     Box::leak(Box::new(Law {
         shape,
         formula: Some(Box::leak(Box::new(formula))),
-        ..Law::linear(entry, linear, nothing)
+        ..Law::linear(entry, linear, |_, _, _| {})
     }))
 }
 
@@ -98,45 +91,24 @@ impl Law {
     /// Limits of each shape parameter that is refined, on these data.
     pub fn limits_on(&self, cover: &Cover, place: Place) -> Vec<[f64; 2]> {
         match &self.formula {
-            Some(formula) => formula.limits(),
+            Some(formula) => formula.ranges.clone(),
             None => (self.limits)(cover, place),
         }
     }
 
     /// How many numbers it keeps from sample to sample.
-    pub fn remembered(&self) -> usize {
-        match (&self.formula, &self.memory) {
-            (Some(formula), _) => formula.remembered(),
-            (None, memory) => memory.as_ref().map_or(0, |m| m.size),
-        }
-    }
-
-    /// Its columns at a scene of one sample, by what it keeps.
-    pub(super) fn step(
-        &self,
-        scene: &Scene,
-        place: Place,
-        (shape, joint): (&[f64], usize),
-        (kept, out): (&mut [f64], &mut [f64]),
-    ) {
-        match (&self.formula, &self.memory) {
-            (Some(formula), _) => formula.at((scene, 0), (shape, joint), kept, out),
-            (None, Some(memory)) => (memory.step)(scene, place, shape, joint, kept, out),
-            (None, None) => {}
-        }
-    }
-
-    /// Adds the columns of joint `joint`, one for each linear coefficient, zero before.
-    pub fn fill(
-        &self,
-        scene: &Scene,
-        place: Place,
-        (shape, joint): (&[f64], usize),
-        out: &mut [Vec<f64>],
-    ) {
+    pub(super) fn remembered(&self) -> usize {
         match &self.formula {
-            Some(formula) => formula.fill(scene, shape, joint, out),
-            None => (self.columns)(scene, place, shape, joint, out),
+            Some(formula) => formula.remembered(),
+            None => self.memory.unwrap_or(0),
+        }
+    }
+
+    /// Its columns at one sample, one number for each linear coefficient, zero before, by what it keeps.
+    pub(super) fn at(&self, at: &Instant, kept: &mut [f64], out: &mut [f64]) {
+        match &self.formula {
+            Some(formula) => formula.at(at, kept, out),
+            None => (self.columns)(at, kept, out),
         }
     }
 }
@@ -144,6 +116,7 @@ impl Law {
 #[cfg(test)]
 mod tests {
     use super::super::formula::Shape;
+    use super::super::{Added, Scene};
     use super::*;
     use crate::motion::Stretch;
     use crate::robot::JointKind;
@@ -193,9 +166,8 @@ mod tests {
             direction: &[Vec::new()],
             tilt: None,
         };
-        let mut out = vec![vec![0.0; 20]];
-        law.fill(&scene, Place::Joint(0), (&[3.0], 0), &mut out);
-        for (k, x) in out[0].iter().enumerate() {
+        let own = Added::new(law, Place::Joint(0), vec![3.0], vec![1.0]);
+        for (k, x) in own.columns(&scene, 0)[0].iter().enumerate() {
             let t = 0.1 * k as f64;
             let wanted = t.sin().cos() * (3.0 * t.cos()).tanh() + t.sin().powi(2) - t;
             assert!((x - wanted).abs() < 1e-12, "{k}: {x} {wanted}");
@@ -214,12 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_formula_of_this_robot_is_told() {
-        let shown = |formula: &str| {
-            law(&definition(formula), &robot())
-                .err()
-                .map(|e| e.to_string())
-        };
+    fn a_text_that_is_no_formula_of_this_robot_is_refused() {
         for (formula, says) in [
             ("cos(", "no formula"),
             ("2 q", "no formula"),
@@ -230,7 +197,7 @@ mod tests {
             ("", "no formula"),
             ("play * w", "`play` needs its scale"),
         ] {
-            let error = shown(formula).unwrap();
+            let error = law(&definition(formula), &robot()).unwrap_err().to_string();
             assert!(error.contains("own") && error.contains(says), "{error}");
         }
         let named = Definition {

@@ -2,12 +2,10 @@
 //! second moment about the vertical axis of the link's frame, about which alone a tool that stays level
 //! turns. A fit whose logs carried it absorbs it: it is looked for only with the model kept.
 
-use super::entry::{Entry, Family, Key, Role, Search};
-use super::law::{KeyValue, Law, Reparametrisation};
-use super::physics::Rule;
-use super::place::Places;
-use super::unit::Unit;
-use super::values::{EffectError, Values};
+use super::{
+    EffectError, Entry, Family, Key, KeyValue, Law, Places, Reparametrisation, Role, Rule, Search,
+    Unit, Values,
+};
 use crate::robot::tree::MOST_JOINTS;
 
 pub static ENTRY: Entry = Entry {
@@ -70,24 +68,17 @@ pub static LAW: Law = Law {
         },
     }),
     code: Some(|to| {
-        if let &[mass, mx, my, mz, second] = to.linear() {
-            to.bodies(to.robot().level_tool_links([mass, mx, my, mz, second]));
+        if let &[mass, mx, my, mz, second] = to.linear {
+            to.bodies(to.model.robot.level_tool_links([mass, mx, my, mz, second]));
         }
     }),
     ..Law::linear(
         &ENTRY,
         &["mass", "mx", "my", "mz", "second"],
-        |scene, _, _, joint, out| {
-            let (s, n) = (scene.stretch, scene.robot.joints());
-            let mut state = [[0.0; MOST_JOINTS]; 3];
-            for k in 0..s.len() {
-                let [q, v, a] = state.each_mut().map(|x| &mut x[..n]);
-                s.at(k, q, v, a);
-                let row = scene.robot.level_tool_row(joint, q, v, a);
-                for (column, x) in out.iter_mut().zip(row) {
-                    column[k] = x;
-                }
-            }
+        |at, _, out| {
+            let (robot, state) = (at.scene.robot, at.state::<MOST_JOINTS>());
+            let [q, v, a] = state.each_ref().map(|x| &x[..robot.joints()]);
+            out.copy_from_slice(&robot.level_tool_row(at.joint, q, v, a));
         },
     )
 };
@@ -98,10 +89,6 @@ pub(super) fn body(values: &Values) -> Result<[f64; 4], EffectError> {
     if mass == 0.0 {
         return Err(values.unusable("mass", mass));
     }
-    Ok([
-        mass,
-        values.get("mx")?,
-        values.get("my")?,
-        values.get("mz")?,
-    ])
+    let [mx, my, mz] = ["mx", "my", "mz"].map(|key| values.get(key));
+    Ok([mass, mx?, my?, mz?])
 }

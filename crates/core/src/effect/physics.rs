@@ -1,7 +1,7 @@
 //! What the numbers of an effect must satisfy to bear its name: limits of physics, as data of the catalogue.
 //! A fit that passes every test and breaks one of them has found something else.
 
-use super::cover::JointCover;
+use super::JointCover;
 use crate::robot::JointKind;
 use crate::robot::drive::JointDrive;
 use crate::robot::model::JointFriction;
@@ -101,16 +101,19 @@ impl Rule {
         let number = self.of.value(value, seen)?;
         let below = self.least.value(seen).filter(|least| number < *least);
         let above = self.most.value(seen).filter(|most| number > *most);
-        let words = self.of.words();
         let held = match (below, above) {
             (Some(least), _) => format!("is below {}", short(least)),
             (_, Some(most)) => format!("is above {}", short(most)),
             (None, None) => return None,
         };
-        Some(match self.of {
-            Number::Weight => self.why.to_owned(),
-            _ => format!("{words} = {} {held}: {}", short(number), self.why),
-        })
+        let name = match self.of {
+            Number::Key(name) => name.to_owned(),
+            Number::Size(name) => format!("|{name}|"),
+            Number::Ratio(a, b) => format!("{a}/{b}"),
+            Number::Amplitude(a, b) => format!("the amplitude of {a} and {b}"),
+            Number::Weight => return Some(self.why.to_owned()),
+        };
+        Some(format!("{name} = {} {held}: {}", short(number), self.why))
     }
 
     /// The least that it allows.
@@ -142,16 +145,6 @@ impl Number {
             Number::Weight => Some(f64::from(u8::from(seen.weight))),
         }
     }
-
-    fn words(self) -> String {
-        match self {
-            Number::Key(name) => name.to_owned(),
-            Number::Size(name) => format!("|{name}|"),
-            Number::Ratio(a, b) => format!("{a}/{b}"),
-            Number::Amplitude(a, b) => format!("the amplitude of {a} and {b}"),
-            Number::Weight => String::new(),
-        }
-    }
 }
 
 impl Limit {
@@ -168,9 +161,8 @@ impl Limit {
                 level.map(|level| share * level)
             }
             Limit::MotionSquared(share) => {
-                let cover = seen.cover;
-                let still = cover.speed_rms <= 0.0;
-                (!still).then(|| share * (cover.acceleration_rms / cover.speed_rms).powi(2))
+                let frequency = seen.cover.acceleration_rms / seen.cover.speed_rms;
+                (seen.cover.speed_rms > 0.0).then(|| share * frequency.powi(2))
             }
             Limit::Backlash => Some(seen.drive.backlash(seen.kind)),
             Limit::Presliding => Some(seen.drive.presliding(seen.kind)),
@@ -196,8 +188,8 @@ mod tests {
     use crate::robot::drive::DriveKind;
     use crate::robot::friction::ViscousCoulomb;
 
-    /// What a joint that turns at up to 2 rad/s for 60 s says of an effect's keys, its drive declared so.
-    fn said(name: &str, keys: &[(&str, f64)], drive: &JointDrive) -> Option<String> {
+    /// What a joint that turns at up to 2 rad/s for 60 s says of an effect and its keys, its drive declared so.
+    fn said(effect: &str, drive: &JointDrive) -> Option<String> {
         let cover = JointCover {
             speed: [-2.0, 2.0],
             speed_rms: 1.0,
@@ -216,96 +208,61 @@ mod tests {
             drive,
             weight: false,
         };
-        let value = |key: &str| keys.iter().find(|k| k.0 == key).map(|k| k.1);
-        let entry = entry(name).unwrap();
-        entry
-            .must
-            .iter()
-            .find_map(|rule| rule.broken(&value, &seen))
+        let mut words = effect.split(' ');
+        let mut rules = entry(words.next()?).unwrap().must.iter();
+        let keys: Vec<(&str, &str)> = words.filter_map(|word| word.split_once('=')).collect();
+        let value = |key: &str| {
+            let found = keys.iter().find(|k| k.0 == key);
+            found.map(|k| k.1.parse().unwrap())
+        };
+        rules.find_map(|rule| rule.broken(&value, &seen))
     }
 
     #[test]
     fn numbers_that_no_machine_has_are_not_the_effect_and_those_that_it_has_are() {
-        type Case<'a> = (&'a str, &'a [(&'a str, f64)], bool);
-        let cases: &[Case] = &[
-            ("stribeck", &[("c", -9.5), ("vs", 0.1)], false),
-            ("stribeck", &[("c", 2.0), ("vs", 0.1)], true),
-            ("stribeck", &[("c", 2.0), ("vs", 0.7)], false),
-            ("smooth-coulomb", &[("vs", 0.1), ("fc", 9.0)], true),
-            ("smooth-coulomb", &[("vs", 0.1), ("fc", -9.0)], false),
-            ("smooth-coulomb", &[("vs", 1.2), ("fc", 9.0)], false),
-            (
-                "load-friction",
-                &[("mu_c", -0.044), ("mu_v", 0.1), ("w", 50.0)],
-                false,
-            ),
-            (
-                "load-friction",
-                &[("mu_c", 0.05), ("mu_v", -0.01), ("w", 50.0)],
-                true,
-            ),
-            ("drive-efficiency", &[("k", 0.2)], true),
-            ("drive-efficiency", &[("k", 0.9)], false),
-            ("drive-efficiency", &[("k", -0.1)], false),
-            (
-                "presliding",
-                &[("sigma0", 900.0), ("sigma1", 1.0), ("fc", 9.0)],
-                true,
-            ),
-            (
-                "presliding",
-                &[("sigma0", 90.0), ("sigma1", 1.0), ("fc", 9.0)],
-                false,
-            ),
-            (
-                "presliding",
-                &[("sigma0", 900.0), ("sigma1", -1.0), ("fc", 9.0)],
-                false,
-            ),
-            ("backlash", &[("gap", 0.45), ("c", 5.0)], false),
-            ("backlash", &[("gap", 0.01), ("c", 5.0)], true),
-            (
-                "elasticity",
-                &[("stiffness", 28.0), ("inertia", 0.1), ("damping", 1.0)],
-                false,
-            ),
-            (
-                "elasticity",
-                &[("stiffness", 9e3), ("inertia", 0.1), ("damping", 0.05)],
-                true,
-            ),
+        let cases = [
+            ("stribeck c=-9.5 vs=0.1", false),
+            ("stribeck c=2.0 vs=0.1", true),
+            ("stribeck c=2.0 vs=0.7", false),
+            ("smooth-coulomb vs=0.1 fc=9.0", true),
+            ("smooth-coulomb vs=0.1 fc=-9.0", false),
+            ("smooth-coulomb vs=1.2 fc=9.0", false),
+            ("load-friction mu_c=-0.044 mu_v=0.1 w=50.0", false),
+            ("load-friction mu_c=0.05 mu_v=-0.01 w=50.0", true),
+            ("drive-efficiency k=0.2", true),
+            ("drive-efficiency k=0.9", false),
+            ("drive-efficiency k=-0.1", false),
+            ("presliding sigma0=900.0 sigma1=1.0 fc=9.0", true),
+            ("presliding sigma0=90.0 sigma1=1.0 fc=9.0", false),
+            ("presliding sigma0=900.0 sigma1=-1.0 fc=9.0", false),
+            ("backlash gap=0.45 c=5.0", false),
+            ("backlash gap=0.01 c=5.0", true),
+            ("elasticity stiffness=28.0 inertia=0.1 damping=1.0", false),
+            ("elasticity stiffness=9e3 inertia=0.1 damping=0.05", true),
             // within the motion's own band
-            (
-                "elasticity",
-                &[("stiffness", 4.0), ("inertia", 0.1), ("damping", 0.05)],
-                false,
-            ),
-            ("delay", &[("d", 0.026)], true),
-            ("delay", &[("d", -0.2)], false),
-            ("warm-up", &[("k", -0.15), ("T", 0.42)], false),
-            ("warm-up", &[("k", -0.15), ("T", 15.0)], true),
-            ("warm-up", &[("k", -0.15), ("T", 400.0)], false),
-            ("position-friction", &[("sin", 3.0), ("cos", 4.0)], true),
-            ("position-friction", &[("sin", 9.0), ("cos", 9.0)], false),
-            ("counterbalance", &[("m_1", 3.0)], false),
-            (
-                "coupling",
-                &[("viscous", 0.1), ("coulomb", 0.1), ("inertia", -2.0)],
-                false,
-            ),
-            ("rotor-inertia", &[("J", -0.1)], false),
-            ("payload", &[("mass", -0.1)], false),
+            ("elasticity stiffness=4.0 inertia=0.1 damping=0.05", false),
+            ("delay d=0.026", true),
+            ("delay d=-0.2", false),
+            ("warm-up k=-0.15 T=0.42", false),
+            ("warm-up k=-0.15 T=15.0", true),
+            ("warm-up k=-0.15 T=400.0", false),
+            ("position-friction sin=3.0 cos=4.0", true),
+            ("position-friction sin=9.0 cos=9.0", false),
+            ("counterbalance m_1=3.0", false),
+            ("coupling viscous=0.1 coulomb=0.1 inertia=-2.0", false),
+            ("rotor-inertia J=-0.1", false),
+            ("payload mass=-0.1", false),
         ];
-        for (name, keys, holds) in cases {
-            let shown = said(name, keys, &JointDrive::default());
-            assert_eq!(shown.is_none(), *holds, "{name} {keys:?}: {shown:?}");
-            assert!(shown.is_none_or(|why| why.len() > 20), "{name}");
+        for (effect, holds) in cases {
+            let shown = said(effect, &JointDrive::default());
+            assert_eq!(shown.is_none(), holds, "{effect}: {shown:?}");
+            assert!(shown.is_none_or(|why| why.len() > 20), "{effect}");
         }
     }
 
     #[test]
     fn a_declared_drive_widens_and_narrows_what_a_joint_can_have() {
-        let gap = |drive: JointDrive, gap: f64| said("backlash", &[("gap", gap)], &drive);
+        let gap = |drive: JointDrive, gap: f64| said(&format!("backlash gap={gap}"), &drive);
         let of = |kind| JointDrive {
             kind: Some(kind),
             ..JointDrive::default()
@@ -319,13 +276,13 @@ mod tests {
         };
         assert!(gap(declared(0.02), 0.01).is_none());
         assert!(gap(declared(0.001), 0.01).is_some());
-        let keys = [("sigma0", 90.0), ("sigma1", 0.0), ("fc", 9.0)];
+        let presliding = "presliding sigma0=90 sigma1=0 fc=9";
         let wide = JointDrive {
             presliding_max: Some(0.2),
             ..JointDrive::default()
         };
-        assert!(said("presliding", &keys, &JointDrive::default()).is_some());
-        assert!(said("presliding", &keys, &wide).is_none());
+        assert!(said(presliding, &JointDrive::default()).is_some());
+        assert!(said(presliding, &wide).is_none());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Where effects sit: at joints, at the actuators of the CFT robot, between two joints, on the whole robot.
 
-use super::values::{EffectError, Values, list};
+use super::{EffectError, Values};
 use crate::robot::{JointKind, Robot};
 
 /// What an effect acts on.
@@ -49,7 +49,7 @@ impl Place {
         match self {
             Place::Pair { of, .. } => Some(of),
             Place::Geared { other, .. } => Some(other),
-            Place::Joint(_) | Place::Actuator(_) | Place::All => None,
+            _ => None,
         }
     }
 
@@ -144,14 +144,12 @@ impl Places {
         let on = on.ok_or_else(|| EffectError::Joint {
             name: values.effect.to_owned(),
             joint: joint.escape_debug().to_string(),
-            known: list(names.iter().map(String::as_str)),
+            known: names.join(", "),
         })?;
         match self {
-            Places::Joints | Places::JointsOrAll | Places::JointsAndActuators => {
-                Ok(Place::Joint(on))
-            }
             Places::Pairs => pair(on, names.len(), values),
             Places::Actuators | Places::Whole => Err(nowhere()),
+            _ => Ok(Place::Joint(on)),
         }
     }
 }

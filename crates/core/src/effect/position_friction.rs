@@ -2,21 +2,16 @@
 //! it flips with the direction, a ripple does not (Remark 1 of the report). Where the joint's law is smooth at
 //! rest, so is the sign.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::law_text::exact;
-use super::order::{order_limits, orders, wavenumber};
-use super::physics::{Limit, Number, Rule};
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::order::{order_limits, orders};
+use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "position-friction",
     families: &[Family::Position],
     keys: &[
         Key::shape("order", Unit::Order),
-        Key::size("sin", Unit::Torque),
-        Key::size("cos", Unit::Torque),
+        Key::torque("sin"),
+        Key::torque("cos"),
     ],
     search: Search::Orders,
     must: &[Rule::at_most(
@@ -46,26 +41,15 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     shape: &["order"],
     starts: |cover, place| {
-        if !cover.at(place).both_ways() {
-            return Err("the joint moves in one direction only: move it both ways".into());
-        }
-        orders(cover, place, &cover.at(place).friction_orders)
+        let joint = cover.both_ways(place)?;
+        orders(cover, place, &joint.friction_orders)
     },
     limits: order_limits,
     code: Some(|to| {
-        let wave = wavenumber(to.robot(), to.joint(), to.shape()[0]);
-        let angle = format!("{} * {}", exact(wave), to.q());
-        let sum = format!("{} * sin({angle}) + {} * cos({angle})", to.x(0), to.x(1));
-        to.added(format!("{} * ({sum})", to.direction()));
+        to.added(format!("{} * ({})", to.direction(), to.wave()));
     }),
-    ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        let per_unit = wavenumber(scene.robot, j, shape[0]);
-        for (k, q) in scene.stretch.q[j].iter().enumerate() {
-            let (s, c) = (per_unit * q).sin_cos();
-            let direction = scene.direction(j, k);
-            out[0][k] = direction * s;
-            out[1][k] = direction * c;
-        }
+    ..Law::linear(&ENTRY, &["sin", "cos"], |at, _, out| {
+        let wave = at.wave();
+        (out[0], out[1]) = (at.direction() * wave.0, at.direction() * wave.1);
     })
 };

@@ -3,11 +3,10 @@
 //! dh/dt = rate (v - |v| h) and h in -1..1, and its rate of change damps: sigma1 dh/dt / rate.
 //! sigma0 = fc rate.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::{KeyValue, Law, Memory, Reparametrisation};
-use super::physics::{Limit, Number, Rule};
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{
+    CurveSignal, Entry, Family, Key, KeyValue, Ladder, Law, Limit, Number, Reparametrisation, Rule,
+    Search, Unit,
+};
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
 
@@ -57,10 +56,7 @@ const BRISTLES: &str = "bristles push back, and their damping takes power";
 pub static LAW: Law = Law {
     shape: &["rate"],
     starts: |cover, place| {
-        let joint = cover.at(place);
-        if joint.reversals < 4 {
-            return Err("fewer than four reversals".into());
-        }
+        let joint = cover.reversing(place, 4, "fewer than four reversals")?;
         let shares = [0.001, 0.003, 0.01, 0.02, 0.05, 0.1];
         Ok(shares.map(|s| vec![1.0 / (s * joint.range())]).to_vec())
     },
@@ -92,20 +88,10 @@ pub static LAW: Law = Law {
             ]
         },
     }),
-    memory: Some(Memory {
-        size: 1,
-        step: |scene, place, shape, _, kept, out| {
-            let Some(j) = place.joint() else { return };
-            let v = scene.stretch.v[j][0];
-            if kept[0].is_nan() {
-                kept[0] = 0.0;
-            }
-            [out[0], out[1]] = yielded(shape[0], scene.stretch.dt, v, &mut kept[0]);
-            out[0] -= saturating(&scene.laws[j], v);
-        },
-    }),
+    // h
+    memory: Some(1),
     code: Some(|to| {
-        let (v, i) = (to.v(), to.number());
+        let (v, i) = (to.v(), to.number);
         let own = to.remember("bristle", None, "0.0", &v);
         let (next, ends) = (format!("next_{i}"), to.saturating());
         to.line(format!(
@@ -120,30 +106,16 @@ pub static LAW: Law = Law {
         ));
         to.line(format!("{own} = {next};"));
     }),
-    ..Law::linear(&ENTRY, &["fc", "sigma1"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        let s = scene.stretch;
-        let mut h = 0.0;
-        let [friction, damping] = out else { return };
-        for (k, (friction, damping)) in friction.iter_mut().zip(damping).enumerate() {
-            let v = s.v[j][k];
-            [*friction, *damping] = yielded(shape[0], s.dt, v, &mut h);
-            *friction -= saturating(&scene.laws[j], v);
-        }
+    ..Law::linear(&ENTRY, &["fc", "sigma1"], |at, kept, out| {
+        let (v, rate, dt) = (at.v(), at.shape[0], at.scene.stretch.dt);
+        let h = if kept[0].is_nan() { 0.0 } else { kept[0] };
+        // over one step of constant speed, exactly: h -> sgn(v) with exp(-rate |v| dt)
+        let next = sign(v) + (h - sign(v)) * (-rate * v.abs() * dt).exp();
+        out[0] = 0.5 * (h + next) - saturating(&at.scene.laws[at.joint], v);
+        out[1] = (next - h) / (dt * rate);
+        kept[0] = next;
     })
 };
-
-/// Yields the spring h over one step of constant speed, exactly: h -> sgn(v) with exp(-rate |v| dt). Its value in
-/// the middle, and its rate of change over the rate.
-fn yielded(rate: f64, dt: f64, v: f64, h: &mut f64) -> [f64; 2] {
-    let target = sign(v);
-    let decay = (-rate * v.abs() * dt).exp();
-    let next = target + (*h - target) * decay;
-    let middle = 0.5 * (*h + next);
-    let change = (next - *h) / (dt * rate);
-    *h = next;
-    [middle, change]
-}
 
 /// Saturating part of a law over its height, -1..1.
 fn saturating(law: &JointFriction, v: f64) -> f64 {

@@ -1,12 +1,11 @@
 //! `quantisation`: a logged torque of few digits.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role};
 
 pub static ENTRY: Entry = Entry {
     name: "quantisation",
     families: &[Family::Data],
-    keys: &[Key::size("step", Unit::Torque).above_zero("must be above 0")],
+    keys: &[Key::torque("step").above_zero("must be above 0")],
     role: Role::Fault,
     no_torque: Some("it is the grain of a logged channel"),
     separate_by: "log the raw current",

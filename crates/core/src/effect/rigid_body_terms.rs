@@ -1,10 +1,7 @@
 //! `rigid-body-terms`: the base parameters of the full chain that the declared structure drops: for
 //! the CFT robot with 12 parameters the other ten of its 22.
 
-use super::entry::{Entry, Family, Key};
-use super::law::Law;
-use super::place::Places;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Law, Places, Unit};
 use crate::robot::cft::UNPRINTED;
 
 /// The parameters of the full chain that the report does not print.
@@ -34,17 +31,9 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     fits: |robot, _, _| !robot.dropped_parameters().is_empty(),
-    code: Some(|to| to.bodies(to.robot().dropped_links(to.linear()))),
-    ..Law::linear(&ENTRY, &UNPRINTED, |scene, _, _, joint, out| {
-        let s = scene.stretch;
-        let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-        let mut row = [0.0; UNPRINTED.len()];
-        for k in 0..s.len() {
-            s.at(k, &mut q, &mut v, &mut a);
-            scene.robot.dropped_row(joint, &q, &v, &a, &mut row);
-            for (column, x) in out.iter_mut().zip(&row) {
-                column[k] = *x;
-            }
-        }
+    code: Some(|to| to.bodies(to.model.robot.dropped_links(to.linear))),
+    ..Law::linear(&ENTRY, &UNPRINTED, |at, _, out| {
+        let [q, v, a] = at.state::<4>();
+        at.scene.robot.dropped_row(at.joint, &q, &v, &a, out);
     })
 };

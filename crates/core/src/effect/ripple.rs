@@ -1,28 +1,20 @@
 //! `ripple`: torque that repeats with position and does not flip with direction. Each harmonic is an
 //! effect of its own order.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::law_text::exact;
-use super::order::{order_limits, orders, wavenumber};
-use super::unit::Unit;
-
-/// The sine or cosine part of a harmonic.
-const fn amplitude(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque)
-}
+use super::order::{order_limits, orders};
+use super::{Entry, Family, Key, Ladder, Law, Search, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "ripple",
     families: &[Family::Position],
     keys: &[
         Key::shape("order", Unit::Order),
-        amplitude("sin"),
-        amplitude("cos"),
-        amplitude("sin2"),
-        amplitude("cos2"),
-        amplitude("sin3"),
-        amplitude("cos3"),
+        Key::torque("sin"),
+        Key::torque("cos"),
+        Key::torque("sin2"),
+        Key::torque("cos2"),
+        Key::torque("sin3"),
+        Key::torque("cos3"),
     ],
     search: Search::Orders,
     ladder: Some(Ladder::USUAL),
@@ -41,19 +33,8 @@ pub static LAW: Law = Law {
     shape: &["order"],
     starts: |cover, place| orders(cover, place, &cover.at(place).ripple_orders),
     limits: order_limits,
-    code: Some(|to| {
-        let wave = wavenumber(to.robot(), to.joint(), to.shape()[0]);
-        let angle = format!("{} * {}", exact(wave), to.q());
-        let sum = format!("{} * sin({angle}) + {} * cos({angle})", to.x(0), to.x(1));
-        to.added(sum);
-    }),
-    ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        let per_unit = wavenumber(scene.robot, j, shape[0]);
-        for (k, q) in scene.stretch.q[j].iter().enumerate() {
-            let (s, c) = (per_unit * q).sin_cos();
-            out[0][k] = s;
-            out[1][k] = c;
-        }
+    code: Some(|to| to.added(to.wave())),
+    ..Law::linear(&ENTRY, &["sin", "cos"], |at, _, out| {
+        (out[0], out[1]) = at.wave()
     })
 };

@@ -2,12 +2,7 @@
 //! actuator coordinates x_r and y_r the screws move with the pantograph's Jacobian:
 //! tau = J' m (J a + Jdot v).
 
-use super::entry::{Entry, Family, Key, Ladder};
-use super::law::Law;
-use super::physics::Rule;
-use super::place::{Place, Places};
-use super::site::Property;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law, Place, Places, Property, Rule, Unit};
 use crate::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
 
 pub static ENTRY: Entry = Entry {
@@ -27,7 +22,7 @@ pub static ENTRY: Entry = Entry {
 };
 
 pub static LAW: Law = Law {
-    code: Some(|to| match to.place() {
+    code: Some(|to| match to.place {
         Place::Actuator(_) => {
             let inertia = to.x(0);
             to.of_screw(|_, acceleration| format!("{inertia} * {acceleration}"));
@@ -39,20 +34,16 @@ pub static LAW: Law = Law {
         let of = |joint| Property::Drive { joint, inertia };
         place.joint().map(of)
     },
-    ..Law::linear(&ENTRY, &["J"], |scene, place, _, joint, out| match place {
-        Place::Joint(j) => out[0].copy_from_slice(&scene.stretch.a[j]),
+    ..Law::linear(&ENTRY, &["J"], |at, _, out| match at.place {
+        Place::Joint(_) => out[0] = at.a(),
         Place::Actuator(r) => {
-            let s = scene.stretch;
-            let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-            for (k, out) in out[0].iter_mut().enumerate() {
-                s.at(k, &mut q, &mut v, &mut a);
-                let (jacobian, rate) = (reference_jacobian(&q), reference_jacobian_rate(&q, &v));
-                let acceleration = jacobian[r][0] * a[2]
-                    + jacobian[r][1] * a[3]
-                    + rate[r][0] * v[2]
-                    + rate[r][1] * v[3];
-                *out = jacobian[r][joint - 2] * acceleration;
-            }
+            let [q, v, a] = at.state();
+            let (jacobian, rate) = (reference_jacobian(&q), reference_jacobian_rate(&q, &v));
+            let acceleration = jacobian[r][0] * a[2]
+                + jacobian[r][1] * a[3]
+                + rate[r][0] * v[2]
+                + rate[r][1] * v[3];
+            out[0] = jacobian[r][at.joint - 2] * acceleration;
         }
         _ => {}
     })

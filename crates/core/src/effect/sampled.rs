@@ -1,8 +1,6 @@
 //! A model with effects one sample after the other, as rows arrive.
 
-use super::augmented_model::AugmentedModel;
-use super::entry::Role;
-use super::scene::Scene;
+use super::{AugmentedModel, Role, Scene};
 use crate::motion::Stretch;
 
 /// A model, and what its effects keep from sample to sample.
@@ -15,7 +13,6 @@ pub struct Sampled {
     load: Vec<Vec<f64>>,
     direction: Vec<Vec<f64>>,
     plain: Vec<f64>,
-    columns: Vec<Vec<Vec<f64>>>,
     /// Of each effect, joint after joint.
     kept: Vec<Vec<f64>>,
     out: Vec<f64>,
@@ -26,14 +23,9 @@ impl Sampled {
     pub fn new(model: AugmentedModel, dt: f64) -> Self {
         let n = model.model.robot.joints();
         let one = || vec![vec![0.0]; n];
-        let effects = model.effects.iter();
-        let columns = effects
-            .clone()
-            .map(|e| vec![vec![0.0]; e.law.linear.len()])
-            .collect();
-        let kept = effects
-            .map(|e| vec![f64::NAN; n * e.law.remembered()])
-            .collect();
+        let kept = model.effects.iter();
+        let kept = kept.map(|e| vec![f64::NAN; n * e.law.remembered()]);
+        let kept = kept.collect();
         let most = model.effects.iter().map(|e| e.law.linear.len()).max();
         Self {
             stretch: Stretch {
@@ -50,7 +42,6 @@ impl Sampled {
             load: one(),
             direction: vec![Vec::new(); n],
             plain: vec![0.0; n],
-            columns,
             kept,
             out: vec![0.0; most.unwrap_or(0)],
             model,
@@ -112,23 +103,11 @@ impl Sampled {
                 }
                 let out = &mut self.out[..effect.linear.len()];
                 out.fill(0.0);
-                let (law, size) = (effect.law, effect.law.remembered());
-                if size > 0 {
-                    let kept = &mut self.kept[i][j * size..(j + 1) * size];
-                    law.step(&scene, effect.place, (&effect.shape, j), (kept, out));
-                } else {
-                    let columns = &mut self.columns[i];
-                    columns.iter_mut().for_each(|column| column[0] = 0.0);
-                    law.fill(&scene, effect.place, (&effect.shape, j), columns);
-                    for (x, column) in out.iter_mut().zip(columns) {
-                        *x = column[0];
-                    }
-                }
-                *tau += out
-                    .iter()
-                    .zip(&effect.linear)
-                    .map(|(x, c)| c * x)
-                    .sum::<f64>();
+                let size = self.kept[i].len() / n;
+                let kept = &mut self.kept[i][j * size..(j + 1) * size];
+                effect.at(&scene, (j, 0), kept, out);
+                let terms = out.iter().zip(&effect.linear);
+                *tau += terms.map(|(x, c)| c * x).sum::<f64>();
             }
         }
     }
@@ -143,7 +122,6 @@ mod tests {
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
     use crate::robot::{JointKind, Robot};
-    use std::collections::BTreeMap;
 
     /// A formula of the user's own in all that hangs on the way before.
     fn remembers(robot: &Robot) -> Added {
@@ -163,12 +141,8 @@ mod tests {
             ..Definition::default()
         };
         let law = effect::own::law(&definition, robot).unwrap();
-        Added::new(
-            law,
-            effect::Place::Joint(0),
-            vec![0.05, 0.1],
-            vec![0.3, 0.2],
-        )
+        let place = effect::Place::Joint(0);
+        Added::new(law, place, vec![0.05, 0.1], vec![0.3, 0.2])
     }
 
     #[test]
@@ -178,10 +152,12 @@ mod tests {
             viscous: 0.4,
             coulomb: 1.3,
         };
-        let add = |name: &str, values: &[(&str, f64)]| {
-            let values = values.iter().map(|(k, x)| ((*k).to_owned(), *x));
-            let values: BTreeMap<String, f64> = values.collect();
-            effect::read(&robot, name, Some("q1"), &values).unwrap()
+        let add = |text: &str| {
+            let mut words = text.split(' ');
+            let name = words.next().unwrap();
+            let keys = words.filter_map(|word| word.split_once('='));
+            let keys = keys.map(|(key, x)| (key.to_owned(), x.parse().unwrap()));
+            effect::read(&robot, name, Some("q1"), &keys.collect()).unwrap()
         };
         let model = AugmentedModel {
             model: Model {
@@ -191,18 +167,13 @@ mod tests {
                 offset: vec![0.1],
             },
             effects: vec![
-                add(
-                    "presliding",
-                    &[("sigma0", 300.0), ("sigma1", 0.2), ("fc", 1.1)],
-                ),
-                add("backlash", &[("gap", 0.02), ("c", 0.3)]),
-                add("warm-up", &[("k", -0.2), ("T", 3.0)]),
-                add("ripple", &[("order", 6.0), ("sin", 0.2), ("cos", -0.1)]),
-                add(
-                    "load-friction",
-                    &[("mu_c", 0.1), ("mu_v", 0.02), ("w", 50.0)],
-                ),
-                add("gain", &[("k", 0.05)]),
+                add("presliding sigma0=300 sigma1=0.2 fc=1.1"),
+                add("backlash gap=0.02 c=0.3"),
+                add("warm-up k=-0.2 T=3"),
+                add("ripple order=6 sin=0.2 cos=-0.1"),
+                add("load-friction mu_c=0.1 mu_v=0.02 w=50"),
+                add("gain k=0.05"),
+                add("empirical signal=5 from=0 to=0.4 m_1=0 m_2=0.1 m_3=0.2 m_4=0.2 m_5=0.1 m_6=0"),
                 remembers(&robot),
             ],
         };

@@ -1,12 +1,11 @@
 //! `saturation`: a logged torque with flat tops.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role};
 
 pub static ENTRY: Entry = Entry {
     name: "saturation",
     families: &[Family::Data],
-    keys: &[Key::size("limit", Unit::Torque).above_zero("must be above 0")],
+    keys: &[Key::torque("limit").above_zero("must be above 0")],
     role: Role::Fault,
     no_torque: Some("it is the end of the range of a torque channel"),
     separate_by: "move slower",

@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use super::Place;
 use crate::motion::Stretch;
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
@@ -44,5 +45,52 @@ impl Scene<'_> {
     pub fn direction(&self, j: usize, k: usize) -> f64 {
         let known = self.direction.get(j).and_then(|d| d.get(k)).copied();
         known.unwrap_or_else(|| self.laws[j].direction(self.stretch.v[j][k]))
+    }
+}
+
+/// One sample of a scene, as the law of an effect at a place sees it.
+#[derive(Clone, Copy)]
+pub(super) struct Instant<'a> {
+    pub scene: &'a Scene<'a>,
+    pub place: Place,
+    pub shape: &'a [f64],
+    /// The joint whose row is filled; that of the place where it is one joint.
+    pub joint: usize,
+    pub k: usize,
+}
+
+impl Instant<'_> {
+    pub fn q(&self) -> f64 {
+        self.scene.stretch.q[self.joint][self.k]
+    }
+
+    pub fn v(&self) -> f64 {
+        self.scene.stretch.v[self.joint][self.k]
+    }
+
+    pub fn a(&self) -> f64 {
+        self.scene.stretch.a[self.joint][self.k]
+    }
+
+    pub fn load(&self) -> f64 {
+        self.scene.load[self.joint][self.k]
+    }
+
+    pub fn direction(&self) -> f64 {
+        self.scene.direction(self.joint, self.k)
+    }
+
+    /// Since the begin of the log [s].
+    pub fn time(&self) -> f64 {
+        let s = self.scene.stretch;
+        s.began + s.dt * self.k as f64
+    }
+
+    /// Position, speed and acceleration of all joints, of which there are at most N.
+    pub fn state<const N: usize>(&self) -> [[f64; N]; 3] {
+        let mut state = [[0.0; N]; 3];
+        let [q, v, a] = &mut state;
+        self.scene.stretch.at(self.k, q, v, a);
+        state
     }
 }

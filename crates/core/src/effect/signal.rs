@@ -15,7 +15,7 @@ pub enum CurveSignal {
     Way,
 }
 
-/// In the order of their numbers in files, from 1.
+/// In the order of their numbers in files, from 1, as they are declared.
 const ALL: [CurveSignal; 5] = [
     CurveSignal::Position,
     CurveSignal::Friction,
@@ -31,11 +31,6 @@ impl CurveSignal {
     pub(super) fn of(number: f64) -> CurveSignal {
         let index = (number.round() as usize).clamp(1, ALL.len());
         ALL[index - 1]
-    }
-
-    pub(super) fn number(self) -> f64 {
-        let index = ALL.iter().position(|s| *s == self);
-        index.map_or(1.0, |i| (i + 1) as f64)
     }
 
     /// What it is and what to look at: `torque that depends on its position`, `a cable, a hose or the sensor`.
@@ -66,6 +61,6 @@ impl CurveSignal {
 
     /// The shape of the law over it.
     pub fn shape(self, [from, to]: [f64; 2]) -> Vec<f64> {
-        vec![self.number(), from, to]
+        vec![f64::from(self as u8 + 1), from, to]
     }
 }

@@ -1,8 +1,7 @@
 //! Where an effect writes itself into generated code: its numbers as text, and the lists that take its statements.
 
+use super::Place;
 use super::law_text::{exact, law};
-use super::place::Place;
-use crate::robot::Robot;
 use crate::robot::cft::geometry::L4;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::standard::{Body, STANDARD};
@@ -45,12 +44,6 @@ pub struct EffectsCode {
     pub titles: Vec<String>,
 }
 
-/// What writes the code of an effect.
-pub type Code = fn(&mut CodeSite);
-
-/// The property that an effect is: place, shape, coefficients.
-pub type PropertyOf = fn(Place, &[f64], &[f64]) -> Option<Property>;
-
 /// An effect that is a property of links, drives or the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Property {
@@ -63,7 +56,7 @@ pub enum Property {
 }
 
 /// An effect of a model as it writes itself into code: its numbers as text, and where its statements go.
-pub struct CodeSite<'a> {
+pub(super) struct CodeSite<'a> {
     pub(super) out: &'a mut EffectsCode,
     /// The place of the effect among those of the model: its own names end with it.
     pub(super) number: usize,
@@ -77,32 +70,7 @@ pub struct CodeSite<'a> {
     pub(super) directions: &'a [String],
 }
 
-impl<'a> CodeSite<'a> {
-    pub fn place(&self) -> Place {
-        self.place
-    }
-
-    pub fn number(&self) -> usize {
-        self.number
-    }
-
-    pub fn shape(&self) -> &'a [f64] {
-        self.shape
-    }
-
-    pub fn linear(&self) -> &'a [f64] {
-        self.linear
-    }
-
-    pub fn robot(&self) -> &'a Robot {
-        &self.model.robot
-    }
-
-    /// Inertial parameters of the model.
-    pub fn theta(&self) -> &'a [f64] {
-        &self.model.theta
-    }
-
+impl CodeSite<'_> {
     /// Its joint.
     pub fn joint(&self) -> usize {
         self.place.joint().unwrap_or_default()
@@ -110,12 +78,12 @@ impl<'a> CodeSite<'a> {
 
     /// Coefficient k.
     pub fn x(&self, k: usize) -> String {
-        self.linear().get(k).copied().map(exact).unwrap_or_default()
+        self.linear.get(k).copied().map(exact).unwrap_or_default()
     }
 
     /// Parameter k of the shape.
     pub fn s(&self, k: usize) -> String {
-        self.shape().get(k).copied().map(exact).unwrap_or_default()
+        self.shape.get(k).copied().map(exact).unwrap_or_default()
     }
 
     pub fn q(&self) -> String {
@@ -147,10 +115,7 @@ impl<'a> CodeSite<'a> {
 
     /// Direction of its joint's friction, -1..1.
     pub fn direction(&self) -> String {
-        self.directions
-            .get(self.joint())
-            .cloned()
-            .unwrap_or_default()
+        self.directions[self.joint()].clone()
     }
 
     /// Saturating part of its joint's law over its height, -1..1.
@@ -224,66 +189,46 @@ impl<'a> CodeSite<'a> {
 
     /// Bodies beside those of the model.
     pub fn bodies(&mut self, bodies: Vec<[f64; STANDARD]>) {
-        match &mut self.out.extra {
-            None => self.out.extra = Some(bodies),
-            Some(all) => {
-                for (sum, x) in all.iter_mut().flatten().zip(bodies.iter().flatten()) {
-                    *sum += x;
-                }
-            }
+        let Some(all) = &mut self.out.extra else {
+            self.out.extra = Some(bodies);
+            return;
+        };
+        for (sum, x) in all.iter_mut().flatten().zip(bodies.iter().flatten()) {
+            *sum += x;
         }
-    }
-
-    /// Gravity along the base's x and y beside that of the model \[m/s^2\].
-    pub fn in_gravity(&mut self, [gx, gy]: [f64; 2]) {
-        let [x, y] = self.out.tilt.unwrap_or_default();
-        self.out.tilt = Some([x + gx, y + gy]);
-    }
-
-    /// Statements for the pose alone.
-    pub fn at_rest(&mut self, statements: [String; 4]) {
-        self.out.askew.extend(statements);
     }
 
     /// Statements of a force in a screw of the CFT robot's pantograph, by its speed and acceleration:
     /// its row of d(x_r, y_r)/d(q4, q5) carries it to the joints.
     pub fn of_screw(&mut self, force: impl Fn(&str, &str) -> String) {
-        let Place::Actuator(row) = self.place() else {
+        let Place::Actuator(row) = self.place else {
             return;
         };
-        let i = self.number;
         let l = exact(L4);
-        let (near, far) = (format!("near_{i}"), format!("far_{i}"));
-        let (speed, pull) = (format!("speed_{i}"), format!("pull_{i}"));
+        let [near, far, speed, pull, name] =
+            ["near", "far", "speed", "pull", "force"].map(|name| format!("{name}_{}", self.number));
         let w = "(v[2] + v[3])";
-        let (of, rates) = match row {
-            0 => ("cos", ["sin", ""]),
-            _ => ("sin", ["cos", "-"]),
+        let [of, rate, sign] = match row {
+            0 => ["cos", "sin", ""],
+            _ => ["sin", "cos", "-"],
         };
-        let [rate, sign] = rates;
         let turned = format!("{sign}{l} * {rate}(q[2] + q[3]) * {w}");
-        self.out.added.extend([
-            format!("let {far} = -{l} * {of}(q[2] + q[3]);"),
-            format!("let {near} = {far} - {l} * {of}(q[2]);"),
-        ]);
         let text = force(&speed, &pull);
+        let added = &mut self.out.added;
+        added.push(format!("let {far} = -{l} * {of}(q[2] + q[3]);"));
+        added.push(format!("let {near} = {far} - {l} * {of}(q[2]);"));
         if text.contains(&speed) {
-            self.out
-                .added
-                .push(format!("let {speed} = {near} * v[2] + {far} * v[3];"));
+            added.push(format!("let {speed} = {near} * v[2] + {far} * v[3];"));
         }
         if text.contains(&pull) {
-            self.out.added.push(format!(
+            added.push(format!(
                 "let {pull} = {near} * a[2] + {far} * a[3] + ({turned} + {sign}{l} * {rate}(q[2]) * v[2]) * v[2] \
                  + {turned} * v[3];"
             ));
         }
-        let name = format!("force_{i}");
-        self.out.added.extend([
-            format!("let {name} = {text};"),
-            format!("tau[2] += {near} * {name};"),
-            format!("tau[3] += {far} * {name};"),
-        ]);
+        added.push(format!("let {name} = {text};"));
+        added.push(format!("tau[2] += {near} * {name};"));
+        added.push(format!("tau[3] += {far} * {name};"));
     }
 }
 

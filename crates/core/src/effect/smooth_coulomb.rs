@@ -1,11 +1,10 @@
 //! `smooth-coulomb`: friction that does not jump at rest. In place of the declared fc sgn(v) stands
 //! fc tanh(v/vs) (Andersson, Soderberg and Bjorklund 2007, eq. 2).
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::{self, Law};
-use super::physics::{Limit, Number, Rule};
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit,
+    jumps_or_is_none,
+};
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
@@ -13,7 +12,7 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Velocity],
     keys: &[
         Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
-        Key::size("fc", Unit::Torque),
+        Key::torque("fc"),
     ],
     search: Search::Refined,
     friction: true,
@@ -45,14 +44,12 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     shape: &["vs"],
-    fits: law::jumps_or_is_none,
+    fits: jumps_or_is_none,
     starts: |cover, place| {
-        let joint = cover.at(place);
-        if joint.reversals < 2 {
-            return Err("fewer than two reversals: low speeds are passed too rarely".into());
-        }
+        let lack = "fewer than two reversals: low speeds are passed too rarely";
+        let top = cover.reversing(place, 2, lack)?.fastest();
         let shares = [0.2, 0.1, 0.05, 0.02, 0.01, 0.005];
-        Ok(shares.map(|s| vec![s * joint.fastest()]).to_vec())
+        Ok(shares.map(|s| vec![s * top]).to_vec())
     },
     limits: |cover, place| {
         let top = cover.at(place).fastest();
@@ -67,10 +64,7 @@ pub static LAW: Law = Law {
             to.s(0)
         ));
     }),
-    ..Law::linear(&ENTRY, &["fc"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {
-            *x = (v / shape[0]).tanh() - sign(*v);
-        }
+    ..Law::linear(&ENTRY, &["fc"], |at, _, out| {
+        out[0] = (at.v() / at.shape[0]).tanh() - sign(at.v());
     })
 };

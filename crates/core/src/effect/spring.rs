@@ -1,9 +1,6 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::physics::Rule;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law, Rule, Search, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "spring",
@@ -33,11 +30,8 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     shape: &["q0"],
     starts: |cover, place| {
-        let joint = cover.at(place);
-        if joint.reversals < 2 {
-            return Err("fewer than two reversals: a slope over position is not seen".into());
-        }
-        let [low, high] = joint.position;
+        let lack = "fewer than two reversals: a slope over position is not seen";
+        let [low, high] = cover.reversing(place, 2, lack)?.position;
         let step = 0.25 * (high - low);
         Ok((-1..=5).map(|i| vec![low + f64::from(i) * step]).collect())
     },
@@ -55,12 +49,8 @@ pub static LAW: Law = Law {
             to.x(1)
         ));
     }),
-    ..Law::linear(&ENTRY, &["k", "k3"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        for (k, q) in scene.stretch.q[j].iter().enumerate() {
-            let x = q - shape[0];
-            out[0][k] = x;
-            out[1][k] = x * x * x;
-        }
+    ..Law::linear(&ENTRY, &["k", "k3"], |at, _, out| {
+        let x = at.q() - at.shape[0];
+        (out[0], out[1]) = (x, x * x * x);
     })
 };

@@ -1,18 +1,17 @@
 //! `stribeck`: friction that falls at low speed, c sgn(v) exp(-(v/vs)^2) (Armstrong-Helouvry,
 //! Dupont and Canudas de Wit 1994), where the declared law has no such term.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::{self, Law};
-use super::physics::{Limit, Number, Rule};
-use super::signal::CurveSignal;
-use super::unit::Unit;
+use super::{
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit,
+    jumps_or_is_none,
+};
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
     name: "stribeck",
     families: &[Family::Velocity],
     keys: &[
-        Key::size("c", Unit::Torque),
+        Key::torque("c"),
         Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
     ],
     search: Search::Refined,
@@ -48,15 +47,13 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     shape: &["vs"],
-    fits: law::jumps_or_is_none,
+    fits: jumps_or_is_none,
     starts: |cover, place| {
-        let joint = cover.at(place);
-        if joint.reversals < 2 {
-            return Err("fewer than two reversals: low speeds are passed too rarely".into());
-        }
+        let lack = "fewer than two reversals: low speeds are passed too rarely";
+        let top = cover.reversing(place, 2, lack)?.fastest();
         // from half of the top speed down to a hundredth, seven steps
         let shares = [0.5, 0.3, 0.2, 0.13, 0.08, 0.04, 0.02, 0.01];
-        Ok(shares.map(|s| vec![s * joint.fastest()]).to_vec())
+        Ok(shares.map(|s| vec![s * top]).to_vec())
     },
     limits: |cover, place| {
         let top = cover.at(place).fastest();
@@ -70,10 +67,7 @@ pub static LAW: Law = Law {
             to.x(0)
         ));
     }),
-    ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {
-            *x = sign(*v) * (-(v / shape[0]).powi(2)).exp();
-        }
+    ..Law::linear(&ENTRY, &["c"], |at, _, out| {
+        out[0] = sign(at.v()) * (-(at.v() / at.shape[0]).powi(2)).exp();
     })
 };

@@ -1,7 +1,6 @@
 //! `stuck-channel`: a channel that repeats its last value.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "stuck-channel",

@@ -1,13 +1,11 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::entry::{Entry, Family, Key, Ladder};
-use super::law::Law;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law};
 
 pub static ENTRY: Entry = Entry {
     name: "torque-offset",
     families: &[Family::Offset],
-    keys: &[Key::size("c", Unit::Torque)],
+    keys: &[Key::torque("c")],
     ladder: Some(Ladder::USUAL),
     separate_by: "hold the joint still at several poses under brake-free control, then move it \
                   both ways at three or more constant speeds",
@@ -21,5 +19,5 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     code: Some(|to| to.added(to.x(0))),
-    ..Law::linear(&ENTRY, &["c"], |_, _, _, _, out| out[0].fill(1.0))
+    ..Law::linear(&ENTRY, &["c"], |_, _, out| out[0] = 1.0)
 };

@@ -51,7 +51,7 @@ impl Values<'_> {
         let value = *self.given.get(key).ok_or_else(|| EffectError::Key {
             name: self.effect.to_owned(),
             key: key.to_owned(),
-            known: list(self.known.iter().copied()),
+            known: self.known.join(", "),
         })?;
         match value.is_finite() {
             true => Ok(value),
@@ -75,9 +75,4 @@ impl Values<'_> {
             value,
         }
     }
-}
-
-/// Names in one line.
-pub fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    names.collect::<Vec<_>>().join(", ")
 }

@@ -1,9 +1,6 @@
 //! `warm-up`: friction times 1 + k (1 - exp(-t/T)), t since the begin of the log.
 
-use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
-use super::physics::{Limit, Number, Rule};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -57,12 +54,10 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     shape: &["T"],
     starts: |cover, place| {
-        if cover.at(place).reversals < 4 {
-            return Err("fewer than four reversals: friction is not seen early and late".into());
-        }
-        Ok([0.1, 0.3, 1.0, 3.0]
-            .map(|s| vec![s * cover.duration_s])
-            .to_vec())
+        let lack = "fewer than four reversals: friction is not seen early and late";
+        cover.reversing(place, 4, lack)?;
+        let shares = [0.1, 0.3, 1.0, 3.0];
+        Ok(shares.map(|s| vec![s * cover.duration_s]).to_vec())
     },
     limits: |cover, _| vec![[0.03 * cover.duration_s, 10.0 * cover.duration_s]],
     code: Some(|to| {
@@ -73,12 +68,8 @@ pub static LAW: Law = Law {
             to.s(0)
         ))
     }),
-    ..Law::linear(&ENTRY, &["k"], |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        let s = scene.stretch;
-        for (k, v) in s.v[j].iter().enumerate() {
-            let t = s.began + s.dt * k as f64;
-            out[0][k] = scene.laws[j].torque(*v) * -(-t / shape[0]).exp_m1();
-        }
+    ..Law::linear(&ENTRY, &["k"], |at, _, out| {
+        let friction = at.scene.laws[at.joint].torque(at.v());
+        out[0] = friction * -(-at.time() / at.shape[0]).exp_m1();
     })
 };

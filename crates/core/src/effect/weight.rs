@@ -1,17 +1,12 @@
 //! `weight`: the moment of a weight that the declared model has no column for, as on a hinge declared without gravity.
 
-use super::entry::{Entry, Family, Key, Ladder};
-use super::law::Law;
-use super::unit::Unit;
+use super::{Entry, Family, Key, Ladder, Law};
 use crate::robot::JointKind;
 
 pub static ENTRY: Entry = Entry {
     name: "weight",
     families: &[Family::Position],
-    keys: &[
-        Key::size("sin", Unit::Torque),
-        Key::size("cos", Unit::Torque),
-    ],
+    keys: &[Key::torque("sin"), Key::torque("cos")],
     ladder: Some(Ladder::USUAL),
     separate_by: "log a slow sweep over the whole travel with two payloads (a weight grows with them, a spring does not)",
     formula: "sin * sin(q) + cos * cos(q)",
@@ -29,10 +24,7 @@ pub static LAW: Law = Law {
         let q = to.q();
         to.added(format!("{} * sin({q}) + {} * cos({q})", to.x(0), to.x(1)));
     }),
-    ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, _, _, out| {
-        let Some(j) = place.joint() else { return };
-        for (k, q) in scene.stretch.q[j].iter().enumerate() {
-            (out[0][k], out[1][k]) = q.sin_cos();
-        }
+    ..Law::linear(&ENTRY, &["sin", "cos"], |at, _, out| {
+        (out[0], out[1]) = at.q().sin_cos()
     })
 };

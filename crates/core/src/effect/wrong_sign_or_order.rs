@@ -1,7 +1,6 @@
 //! `wrong-sign-or-order`: the torque of a joint has the other sign, or is that of another joint.
 
-use super::entry::{Entry, Family, Key, Role};
-use super::unit::Unit;
+use super::{Entry, Family, Key, Role, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "wrong-sign-or-order",

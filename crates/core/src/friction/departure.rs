@@ -1,6 +1,8 @@
 //! How far the torque at each speed departs from the law: the part that innovations of a filter, which follow a slow
 //! error, leave unseen.
 
+use std::collections::BTreeMap;
+
 use super::plateau::net_torques;
 use super::prepare::Prepared;
 
@@ -29,18 +31,16 @@ struct Class {
 
 /// Mean square of the mean departure from `law` in classes of speed, beyond what their passes differ by [N^2 or (Nm)^2].
 pub(super) fn departure(prepared: &Prepared, p: &[f64], law: &dyn Fn(f64) -> f64) -> f64 {
-    let mut classes: std::collections::BTreeMap<i64, Class> = std::collections::BTreeMap::new();
+    let mut classes: BTreeMap<i64, Class> = BTreeMap::new();
     let class_of = |v: f64| {
         let octaves = (v.abs() / (LIMITS.lowest * prepared.problem.velocity_scale)).log2();
         let class = 1 + (LIMITS.per_octave * octaves) as i64;
         (octaves >= 0.0).then_some(if v < 0.0 { -class } else { class })
     };
     for (v, net) in net_torques(prepared, p) {
-        let rows: Vec<(Option<i64>, f64)> = v
-            .iter()
-            .zip(&net)
-            .map(|(v, net)| (class_of(*v), net - law(*v)))
-            .collect();
+        let rows = v.iter().zip(&net);
+        let rows = rows.map(|(v, net)| (class_of(*v), net - law(*v)));
+        let rows: Vec<(Option<i64>, f64)> = rows.collect();
         for pass in rows.chunk_by(|a, b| a.0 == b.0) {
             if let Some(key) = pass[0].0 {
                 let class = classes.entry(key).or_default();

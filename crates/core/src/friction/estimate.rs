@@ -1,6 +1,6 @@
 //! The estimate of one joint: parameters with verdicts, curve, consistency.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::departure::departure;
 use super::excitation::{FrictionError, Speeds, speeds};
@@ -69,20 +69,16 @@ pub fn estimate(
     if let Some(law) = &options.start {
         let mut p = vec![0.0; problem.parameters()];
         problem.coordinates(law, &mut p);
-        match (options.start_inertia, starts.first()) {
-            (Some(inertia), _) => {
-                p[FRICTION..].copy_from_slice(&constant_inertia(prepared, inertia))
-            }
-            (None, Some(log)) => p[FRICTION..].copy_from_slice(&log.parameters[FRICTION..]),
-            (None, None) => {}
+        if let Some(inertia) = options.start_inertia {
+            p[FRICTION..].copy_from_slice(&constant_inertia(prepared, inertia));
+        } else if let Some(log) = starts.first() {
+            p[FRICTION..].copy_from_slice(&log.parameters[FRICTION..]);
         }
-        starts.insert(
-            0,
-            FilterStart {
-                parameters: p,
-                residual: f64::INFINITY,
-            },
-        );
+        let given = FilterStart {
+            parameters: p,
+            residual: f64::INFINITY,
+        };
+        starts.insert(0, given);
     }
     let no_estimate = || FrictionError::NoEstimate {
         joint: joint.to_owned(),
@@ -171,13 +167,11 @@ fn steeper_first(mut maximum: Maximum) -> Maximum {
     if maximum.one_term() {
         maximum.parameters[4] = maximum.parameters[3];
     } else if maximum.parameters[3] < maximum.parameters[4] {
-        let mut order: Vec<usize> = (0..maximum.parameters.len()).collect();
-        order.swap(1, 2);
-        order.swap(3, 4);
-        maximum.parameters.swap(1, 2);
-        maximum.parameters.swap(3, 4);
-        let c = &maximum.covariance;
-        maximum.covariance = c.select_rows(&order).select_columns(&order);
+        for (a, b) in [(1, 2), (3, 4)] {
+            maximum.parameters.swap(a, b);
+            maximum.covariance.swap_rows(a, b);
+            maximum.covariance.swap_columns(a, b);
+        }
         maximum.at_limit.swap(0, 1);
     }
     maximum
@@ -202,18 +196,15 @@ fn value(
     let si = law.parameters();
     let std = |i: usize| covariance[i][i].max(0.0).sqrt();
     let verdict = verdict_of(si[i], std(i));
-    let plain = EstimatedValue {
-        value: si[i],
-        std: std(i),
+    let of = |value: f64, std: f64, verdict: Verdict| EstimatedValue {
+        value,
+        std,
         verdict,
     };
     if maximum.fixed.contains(&i) {
-        return EstimatedValue {
-            std: f64::NAN,
-            verdict: Verdict::NotIdentifiable,
-            ..plain
-        };
+        return of(si[i], f64::NAN, Verdict::NotIdentifiable);
     }
+    let plain = of(si[i], std(i), verdict);
     if i < 3 {
         return plain;
     }
@@ -230,15 +221,8 @@ fn value(
     // where its own term is there
     let term = i == 3 || height != Verdict::NotIdentifiable;
     match profile_slope(problem, maximum, i).filter(|_| term) {
-        Some(bound) => EstimatedValue {
-            value: bound,
-            std: f64::NAN,
-            verdict: Verdict::LowerBound,
-        },
-        None => EstimatedValue {
-            verdict: Verdict::NotIdentifiable,
-            ..plain
-        },
+        Some(bound) => of(bound, f64::NAN, Verdict::LowerBound),
+        None => of(si[i], std(i), Verdict::NotIdentifiable),
     }
 }
 
@@ -250,16 +234,14 @@ fn curve(
     steps: usize,
 ) -> Vec<FrictionCurvePoint> {
     let step = |i: usize| from + (to - from) * i as f64 / (steps - 1) as f64;
-    (0..steps)
-        .rev()
-        .map(|i| -step(i))
-        .chain((0..steps).map(step))
-        .map(|v| FrictionCurvePoint {
-            v,
-            torque: law.torque(v),
-            std: curve_std(law, covariance, v),
-        })
-        .collect()
+    let point = |v: f64| FrictionCurvePoint {
+        v,
+        torque: law.torque(v),
+        std: curve_std(law, covariance, v),
+    };
+    let backward = (0..steps).rev().map(|i| -step(i));
+    let speeds = backward.chain((0..steps).map(step));
+    speeds.map(point).collect()
 }
 
 /// Standard deviation of F(v).
@@ -285,12 +267,8 @@ fn residual(prepared: &Prepared, p: &[f64], law: &DoubleTanh) -> (f64, f64) {
             let mean = |x: &[f64]| 0.5 * (x[first + k] + x[first + k + 1]);
             let (v, a) = (mean(&prepared.velocity), mean(&prepared.acceleration));
             let row = k * e..(k + 1) * e;
-            let known: f64 = record.m[row.clone()]
-                .iter()
-                .zip(&record.h[row])
-                .zip(eta)
-                .map(|((m, h), x)| (m * a + h) * x)
-                .sum();
+            let known = record.m[row.clone()].iter().zip(&record.h[row]).zip(eta);
+            let known: f64 = known.map(|((m, h), x)| (m * a + h) * x).sum();
             let d = record.tau[k] - known - law.torque(v);
             square += d * d;
             torque += record.tau[k] * record.tau[k];
@@ -306,13 +284,9 @@ fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nui
     let problem = &prepared.problem;
     let e = problem.nuisance;
     let eta = DVector::from_column_slice(&maximum.parameters[FRICTION..]);
-    let cov: DMatrix<f64> = maximum
-        .covariance
-        .view((FRICTION, FRICTION), (e, e))
-        .into_owned();
-    let of = |g: &DVector<f64>| (g.dot(&eta), (g.dot(&(&cov * g))).max(0.0).sqrt());
-    let mut mean = DVector::zeros(e);
-    let mut count = 0.0;
+    let cov = maximum.covariance.view((FRICTION, FRICTION), (e, e));
+    let of = |g: &DVector<f64>| (g.dot(&eta), (g.dot(&(cov * g))).max(0.0).sqrt());
+    let (mut mean, mut count) = (DVector::zeros(e), 0.0);
     for m in problem.records.iter().flat_map(|r| r.m.chunks_exact(e)) {
         mean += DVector::from_column_slice(m);
         count += 1.0;
@@ -320,40 +294,34 @@ fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nui
     mean /= count;
     let (inertia, inertia_std) = of(&mean);
     let offset_row = prepared.back.row(prepared.back.nrows() - 1).transpose();
-    let (offset, offset_std) = of(&offset_row.into_owned());
+    let (offset, offset_std) = of(&offset_row);
+    let nuisance = |name: String, value: f64, std: f64, unit: &str| Nuisance {
+        name,
+        value,
+        std,
+        unit: unit.to_owned(),
+    };
     let mut out = vec![
-        Nuisance {
-            name: "mean inertia".into(),
-            value: inertia,
-            std: inertia_std,
-            unit: "torque/acceleration".into(),
-        },
-        Nuisance {
-            name: "offset".into(),
-            value: offset,
-            std: offset_std,
-            unit: "torque".into(),
-        },
+        nuisance(
+            "mean inertia".into(),
+            inertia,
+            inertia_std,
+            "torque/acceleration",
+        ),
+        nuisance("offset".into(), offset, offset_std, "torque"),
     ];
     for k in 0..e {
         let column = prepared.back.column(k);
         let mut terms: Vec<usize> = (0..column.len()).collect();
         terms.sort_by(|a, b| column[*b].abs().total_cmp(&column[*a].abs()));
-        let words: Vec<String> = terms
-            .iter()
-            .take(3)
-            .filter(|i| column[**i] != 0.0)
-            .map(|i| {
-                let name = names.get(*i).map_or("offset", String::as_str);
-                format!("{:+.2} {name}", column[*i])
-            })
-            .collect();
-        out.push(Nuisance {
-            name: format!("direction {} ({} ...)", k + 1, words.join(" ")),
-            value: eta[k],
-            std: cov[(k, k)].max(0.0).sqrt(),
-            unit: "1".into(),
-        });
+        let word = |i: &usize| {
+            let name = names.get(*i).map_or("offset", String::as_str);
+            format!("{:+.2} {name}", column[*i])
+        };
+        let words = terms.iter().take(3).filter(|i| column[**i] != 0.0);
+        let words: Vec<String> = words.map(word).collect();
+        let name = format!("direction {} ({} ...)", k + 1, words.join(" "));
+        out.push(nuisance(name, eta[k], cov[(k, k)].max(0.0).sqrt(), "1"));
     }
     out
 }

@@ -66,18 +66,17 @@ pub fn moving_joint(
     range: &[f64],
 ) -> Result<usize, FrictionError> {
     let n = names.len();
-    let share: Vec<f64> = (0..n)
-        .map(|j| {
-            let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-            // as measured: smoothing leaves rounding errors in what stands still
-            let measured = motions.iter().flat_map(|m| m.measured.iter());
-            for q in measured.skip(j).step_by(n) {
-                lo = lo.min(*q);
-                hi = hi.max(*q);
-            }
-            if hi > lo { (hi - lo) / range[j] } else { 0.0 }
-        })
-        .collect();
+    let share = |j: usize| {
+        // as measured: smoothing leaves rounding errors in what stands still
+        let measured = motions.iter().flat_map(|m| m.measured.iter());
+        let q = measured.skip(j).step_by(n).copied();
+        let (lo, hi) = (
+            q.clone().fold(f64::INFINITY, f64::min),
+            q.fold(f64::NEG_INFINITY, f64::max),
+        );
+        if hi > lo { (hi - lo) / range[j] } else { 0.0 }
+    };
+    let share: Vec<f64> = (0..n).map(share).collect();
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| share[*b].total_cmp(&share[*a]));
     let first = order[0];
@@ -120,12 +119,11 @@ pub fn speeds(joint: &str, velocity: &[f64], unknowns: usize) -> Result<Speeds, 
         });
     }
     let direction = |positive: bool| {
-        let mut v: Vec<f64> = velocity
+        let own = velocity
             .iter()
             .filter(moving)
-            .filter(|v| (**v > 0.0) == positive)
-            .map(|v| v.abs())
-            .collect();
+            .filter(|v| (**v > 0.0) == positive);
+        let mut v: Vec<f64> = own.map(|v| v.abs()).collect();
         v.sort_by(f64::total_cmp);
         v
     };

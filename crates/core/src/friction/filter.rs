@@ -13,8 +13,6 @@ use super::propagate::{SampleInterval, ScaledLaw, Transition, with_sensitivities
 pub struct FilterPass {
     /// Parameters in the filter's coordinates.
     pub parameters: Vec<f64>,
-    /// Their covariance, row-major.
-    pub covariance: Vec<f64>,
     /// Gaussian log-likelihood of the innovations (less the constant).
     pub log_likelihood: f64,
 }
@@ -65,12 +63,8 @@ impl ExtendedKalmanFilter {
         }
         let mut log_likelihood = 0.0;
         for record in &problem.records {
-            self.begin(
-                problem,
-                record.y[0],
-                record.v0,
-                record.r[0] * noise.position_factor,
-            );
+            let r = record.r[0] * noise.position_factor;
+            self.begin(problem, record.y[0], record.v0, r);
             for k in 0..record.tau.len() {
                 let interval = SampleInterval::of(record, k, problem.nuisance);
                 self.predict(problem, &interval, noise);
@@ -80,14 +74,8 @@ impl ExtendedKalmanFilter {
                 log_likelihood -= 0.5 * (innovation * innovation / s + s.ln());
             }
         }
-        let mut covariance = vec![0.0; np * np];
-        for i in 0..np {
-            let row = (2 + i) * self.n + 2;
-            covariance[i * np..(i + 1) * np].copy_from_slice(&self.p[row..row + np]);
-        }
         FilterPass {
             parameters: self.x[2..].to_vec(),
-            covariance,
             log_likelihood,
         }
     }
@@ -148,14 +136,10 @@ impl ExtendedKalmanFilter {
         }
         for i in 0..n - 2 {
             let row = &pp[i * n + 2..i * n + n];
-            let (bq, bv) = (t.b_q[i], t.b_v[i]);
-            for ((c, rq), rv) in row
-                .iter()
-                .zip(&mut self.row_q[2..n])
-                .zip(&mut self.row_v[2..n])
-            {
-                *rq += bq * c;
-                *rv += bv * c;
+            let rows = self.row_q[2..].iter_mut().zip(&mut self.row_v[2..]);
+            for (c, (row_q, row_v)) in row.iter().zip(rows) {
+                *row_q += t.b_q[i] * c;
+                *row_v += t.b_v[i] * c;
             }
         }
         for j in 2..n {
@@ -168,10 +152,7 @@ impl ExtendedKalmanFilter {
         xx[0] += s2 * t.n_q * t.n_q;
         xx[1] += s2 * t.n_q * t.n_v;
         xx[2] += s2 * t.n_v * t.n_v;
-        pq[0] = xx[0];
-        pq[1] = xx[1];
-        pv[0] = xx[1];
-        pv[1] = xx[2];
+        (pq[0], pq[1], pv[0], pv[1]) = (xx[0], xx[1], xx[1], xx[2]);
         for j in 2..n {
             pq[j] = self.row_q[j];
             pv[j] = self.row_v[j];
@@ -205,16 +186,17 @@ impl ExtendedKalmanFilter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::passes::{GivenNoise, first_noise, spread};
+    use super::super::passes::{GivenNoise, first_noise, maximise, spread};
     use super::super::score::score;
+    use super::super::start::{constant_inertia, from_log};
     use super::super::trial::FrictionTrial;
     use super::*;
     use nalgebra::DMatrix;
 
-    fn start(trial: &FrictionTrial, problem: &FrictionProblem) -> Vec<f64> {
-        let mut p = vec![0.0; problem.parameters()];
-        problem.coordinates(&trial.law, &mut p);
-        p
+    /// Covariance of the parameters after a pass.
+    fn covariance(filter: &ExtendedKalmanFilter) -> DMatrix<f64> {
+        let whole = DMatrix::from_row_slice(filter.n, filter.n, &filter.p);
+        whole.remove_rows(0, 2).remove_columns(0, 2)
     }
 
     #[test]
@@ -223,12 +205,12 @@ mod tests {
         let prepared = trial.prepared(1);
         let problem = &prepared.problem;
         let noise = first_noise(problem, &GivenNoise::default());
-        let mut p = start(&trial, problem);
-        p[FRICTION..].copy_from_slice(&super::super::start::constant_inertia(&prepared, 12.0));
+        let mut p = vec![0.0; problem.parameters()];
+        problem.coordinates(&trial.law, &mut p);
+        p[FRICTION..].copy_from_slice(&constant_inertia(&prepared, 12.0));
         let mut filter = ExtendedKalmanFilter::new(problem);
         let pass = filter.pass(problem, &p, &spread(problem), noise);
-        let n = problem.parameters();
-        let c = DMatrix::from_row_slice(n, n, &pass.covariance);
+        let c = covariance(&filter);
         assert_eq!(c, c.transpose());
         assert!(c.cholesky().is_some());
         assert!(pass.parameters.iter().all(|x| x.is_finite()));
@@ -239,26 +221,23 @@ mod tests {
         let trial = FrictionTrial::usual();
         let prepared = trial.prepared(2);
         let problem = &prepared.problem;
-        let starts = super::super::start::from_log(&prepared, 2);
-        let top =
-            super::super::passes::maximise(&prepared, &starts, &GivenNoise::default()).unwrap();
-        let spread = spread(problem);
+        let starts = from_log(&prepared, 2);
+        let top = maximise(&prepared, &starts, &GivenNoise::default()).unwrap();
         // a filter that begins at the maximum, sure to within a few standard deviations, moves
         // little and so linearises there
         let tight: Vec<f64> = (0..problem.parameters())
             .map(|i| 3.0 * top.covariance[(i, i)].sqrt())
             .collect();
-        let pass =
-            ExtendedKalmanFilter::new(problem).pass(problem, &top.parameters, &tight, top.noise);
+        let mut filter = ExtendedKalmanFilter::new(problem);
+        filter.pass(problem, &top.parameters, &tight, top.noise);
+        let found = covariance(&filter);
         let mut h = score(problem, &top.parameters, top.noise, 100).information;
         for (i, s) in tight.iter().enumerate() {
             h[(i, i)] += 1.0 / (s * s);
         }
         let c = h.cholesky().unwrap().inverse();
-        assert_eq!(spread.len(), tight.len());
         for i in 0..FRICTION {
-            let found = pass.covariance[i * problem.parameters() + i].sqrt();
-            let ratio = found / c[(i, i)].sqrt();
+            let ratio = (found[(i, i)] / c[(i, i)]).sqrt();
             assert!((0.9..1.1).contains(&ratio), "parameter {i}: {ratio}");
         }
     }

@@ -103,8 +103,7 @@ pub struct JointEstimate {
     /// The same relative to the torque.
     pub relative_error: f64,
     pub samples: usize,
-    /// Cut-offs of the other joints' accelerations [Hz], one per joint; infinite where they came in
-    /// as the position filter leaves them.
+    /// Cut-offs of the other joints' accelerations [Hz], one per joint; infinite where only the position filter acts.
     #[serde(skip)]
     pub cutoffs: Vec<f64>,
 }

@@ -18,15 +18,13 @@ use super::start::FilterStart;
 use crate::math::descent::{Ending, StepControl, Trial, descend};
 use crate::math::minimise;
 
-/// Factors on both noises in the annealed passes from a start that may be far off, and from one
-/// that a linear fit to the log gave.
+/// Factors on both noises in the annealed passes from a start that may be far off, and from one of a linear fit.
 const ANNEALING: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
 const ANNEALING_FROM_LOG: [f64; 1] = [10.0];
 /// Ends that are refined, and steps until the best of them is chosen.
 const REFINED: usize = 3;
 const FIRST_STEPS: usize = 6;
-/// Prior standard deviations in the filter's coordinates: friction terms and nuisance of the size
-/// of the whole torque, slopes within a factor of five.
+/// Prior standard deviations: friction terms and nuisance of the size of the torque, slopes within a factor of five.
 const SPREAD_LINEAR: f64 = 2.0;
 const SPREAD_SLOPE: f64 = 1.6;
 /// Samples per block of the score's outer product, in seconds.
@@ -94,14 +92,11 @@ pub fn spread(problem: &FrictionProblem) -> Vec<f64> {
     s
 }
 
-/// Noise levels to begin with, from the log alone: a tenth of the torque's second differences
-/// (a controller's own reaction is in them) and the encoder's resolution.
+/// Noise levels to begin with, from the log alone: the torque's second differences and the encoder's resolution.
 pub(super) fn first_noise(problem: &FrictionProblem, given: &GivenNoise) -> NoiseLevels {
-    let mut d: Vec<f64> = problem
-        .records
-        .iter()
-        .flat_map(|r| r.tau.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
-        .collect();
+    let second = |w: &[f64]| (w[0] - 2.0 * w[1] + w[2]).abs();
+    let records = problem.records.iter();
+    let mut d: Vec<f64> = records.flat_map(|r| r.tau.windows(3).map(second)).collect();
     d.sort_by(f64::total_cmp);
     let median = d.get(d.len() / 2).copied().unwrap_or(0.0);
     // median of |N(0, 6 s^2)| is 0.6745 sqrt(6) s
@@ -153,7 +148,7 @@ pub(super) fn maximise(
     ends.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut best: Option<RefinedParameters> = None;
     for (p, _) in ends.into_iter().take(REFINED) {
-        let refined = refine(problem, p, noise, &spread, FIRST_STEPS);
+        let refined = refine(problem, p, noise, FIRST_STEPS, &[]);
         let likelihood = refined.score.log_likelihood;
         if (best.as_ref()).is_none_or(|b| likelihood > b.score.log_likelihood) {
             best = Some(refined);
@@ -169,15 +164,9 @@ pub(super) fn settle_on(
     given: &GivenNoise,
 ) -> Option<Maximum> {
     let (p, noise) = (maximum.parameters.clone(), maximum.noise);
-    let refined = refine(problem, p, noise, &spread(problem), FIRST_STEPS);
-    settle(
-        problem,
-        refined,
-        noise,
-        given,
-        maximum.fixed,
-        maximum.starts,
-    )
+    let refined = refine(problem, p, noise, FIRST_STEPS, &[]);
+    let (fixed, starts) = (maximum.fixed, maximum.starts);
+    settle(problem, refined, noise, given, fixed, starts)
 }
 
 /// Noise levels and parameters in turn: each is little moved by the other.
@@ -189,23 +178,14 @@ pub(super) fn settle(
     fixed: &'static [usize],
     starts: usize,
 ) -> Option<Maximum> {
-    let spread = spread(problem);
     for _ in 0..2 {
         noise = tune(problem, &refined.parameters, noise, given);
-        refined = refine_others(
-            problem,
-            refined.parameters,
-            noise,
-            &spread,
-            MOST_STEPS,
-            fixed,
-        );
+        refined = refine(problem, refined.parameters, noise, MOST_STEPS, fixed);
     }
-    finish(problem, refined, noise, &spread, fixed, starts)
+    finish(problem, refined, noise, fixed, starts)
 }
 
-/// The maximum with one Coulomb term, where the log is as likely without a second. Two terms whose
-/// slopes are hardly apart cancel, and what they leave is a number only in their sum.
+/// The maximum with one Coulomb term, where the log is as likely without a second.
 pub(super) fn fewer_terms(
     problem: &FrictionProblem,
     maximum: &Maximum,
@@ -214,7 +194,6 @@ pub(super) fn fewer_terms(
     if maximum.one_term() || second_is_known(maximum) {
         return None;
     }
-    let spread = spread(problem);
     let p = &maximum.parameters;
     let sum = p[1] + p[2];
     let starts = [(sum, p[3]), (sum, p[4]), (sum, 0.5 * (p[3] + p[4]))];
@@ -222,20 +201,11 @@ pub(super) fn fewer_terms(
         let mut start = p.clone();
         (start[1], start[2]) = (height, 0.0);
         (start[3], start[4]) = (slope, slope);
-        refine_others(
-            problem,
-            start,
-            maximum.noise,
-            &spread,
-            ONE_TERM_STEPS,
-            &ONE_TERM,
-        )
+        refine(problem, start, maximum.noise, ONE_TERM_STEPS, &ONE_TERM)
     });
     let likelihood = |r: &RefinedParameters| r.score.log_likelihood;
-    let best = refined
-        .into_iter()
-        .filter(|r| likelihood(r).is_finite())
-        .max_by(|a, b| likelihood(a).total_cmp(&likelihood(b)))?;
+    let refined = refined.into_iter().filter(|r| likelihood(r).is_finite());
+    let best = refined.max_by(|a, b| likelihood(a).total_cmp(&likelihood(b)))?;
     // coloured innovations count for less, as in the covariance
     let gain = (maximum.score.log_likelihood - likelihood(&best)) / maximum.widening;
     if gain >= SECOND_TERM {
@@ -245,8 +215,7 @@ pub(super) fn fewer_terms(
     settle(problem, best, noise, given, &ONE_TERM, starts)
 }
 
-/// Whether height and slope of both terms are known to a tenth, and the slopes are well apart: then
-/// nobody need ask whether one term does.
+/// Whether height and slope of both terms are known to a tenth, and the slopes are well apart.
 fn second_is_known(maximum: &Maximum) -> bool {
     let (p, c) = (&maximum.parameters, &maximum.covariance);
     let height = |i: usize| c[(i, i)] < (0.1 * p[i]).powi(2);
@@ -269,8 +238,7 @@ fn block(problem: &FrictionProblem) -> usize {
     ((BLOCK_SECONDS / step).round() as usize).max(1)
 }
 
-/// Penalised information and its right side: prior around zero for the linear part would bias, so
-/// the prior only limits the step.
+/// The step, which the prior only limits: about zero it would bias the linear part.
 fn damped(
     score: &LikelihoodScore,
     spread: &[f64],
@@ -298,36 +266,24 @@ fn hold(information: &mut DMatrix<f64>, fixed: &[usize]) {
     }
 }
 
-/// Gauss-Newton with step control on the innovation likelihood.
-fn refine(
+/// Gauss-Newton with step control on the innovation likelihood, some parameters fixed.
+pub(super) fn refine(
     problem: &FrictionProblem,
     start: FilterParameters,
     noise: NoiseLevels,
-    spread: &[f64],
-    most: usize,
-) -> RefinedParameters {
-    refine_others(problem, start, noise, spread, most, &[])
-}
-
-/// The same with some parameters fixed.
-pub(super) fn refine_others(
-    problem: &FrictionProblem,
-    start: FilterParameters,
-    noise: NoiseLevels,
-    spread: &[f64],
     most: usize,
     fixed: &[usize],
 ) -> RefinedParameters {
-    let block = block(problem);
+    let (block, spread) = (block(problem), spread(problem));
     let score = |p: &[f64]| score(problem, p, noise, block);
     let first = score(&start);
     let Ok(((parameters, score), ending, _)) =
         descend((start, first), &DAMPING, most, &mut |(p, at), damping| {
-            let Some(step) = damped(at, spread, damping, fixed) else {
+            let Some(step) = damped(at, &spread, damping, fixed) else {
                 return Ok::<_, Infallible>(Trial::NoStep);
             };
             // no step longer than the prior: the Gauss-Newton model is local
-            let parts = step.iter().zip(spread).map(|(d, s)| d.abs() / s);
+            let parts = step.iter().zip(&spread).map(|(d, s)| d.abs() / s);
             let shorten = 0.5 / parts.fold(0.5, f64::max);
             let mut trial: FilterParameters =
                 p.iter().zip(&step).map(|(x, d)| x + shorten * d).collect();
@@ -360,36 +316,30 @@ fn tune(
     if !free.0 && !free.1 {
         return noise;
     }
-    let at = |x: &[f64]| NoiseLevels {
-        torque: if free.0 {
-            x[0].clamp(-30.0, 30.0).exp()
-        } else {
-            noise.torque
-        },
+    let at = |x: &[f64]| {
+        let [torque, beyond] = [x[0], x[1]].map(|x| x.clamp(-30.0, 30.0).exp());
         // 1 + exp keeps the floor without a kink that a simplex could hang on
-        position_factor: if free.1 {
-            1.0 + x[1].clamp(-30.0, 30.0).exp()
-        } else {
-            noise.position_factor
-        },
+        let position_factor = 1.0 + beyond;
+        NoiseLevels {
+            torque: if free.0 { torque } else { noise.torque },
+            position_factor: if free.1 {
+                position_factor
+            } else {
+                noise.position_factor
+            },
+        }
     };
-    let start: [f64; 2] = [
-        noise.torque.ln(),
-        (noise.position_factor - 1.0).max(0.1).ln(),
-    ];
+    let beyond = (noise.position_factor - 1.0).max(0.1);
     let found = minimise::nelder_mead(
         &mut |x: &[f64]| -log_likelihood(problem, p, at(x)),
-        &start,
+        &[noise.torque.ln(), beyond.ln()],
         &[0.7, 1.5],
         TUNE_TOLERANCE,
         TUNE_EVALUATIONS,
     );
     let best = at(&found.x);
-    if log_likelihood(problem, p, best) > log_likelihood(problem, p, noise) {
-        best
-    } else {
-        noise
-    }
+    let likelier = log_likelihood(problem, p, best) > log_likelihood(problem, p, noise);
+    if likelier { best } else { noise }
 }
 
 /// Covariance at the maximum.
@@ -397,13 +347,11 @@ fn finish(
     problem: &FrictionProblem,
     refined: RefinedParameters,
     noise: NoiseLevels,
-    spread: &[f64],
     fixed: &'static [usize],
     starts: usize,
 ) -> Option<Maximum> {
-    let np = problem.parameters();
     let mut h = refined.score.information.clone();
-    for (j, s) in spread.iter().enumerate() {
+    for (j, s) in spread(problem).iter().enumerate() {
         h[(j, j)] += 1.0 / (s * s);
     }
     hold(&mut h, fixed);
@@ -414,15 +362,12 @@ fn finish(
     // white innovations give outer = information; the mean ratio over the friction directions says
     // by how much colour widens
     let spread_of_score = &covariance * &refined.score.outer * &covariance;
-    let free = || (0..FRICTION).filter(|j| !fixed.contains(j));
-    let ratio: f64 = free()
-        .map(|j| spread_of_score[(j, j)] / covariance[(j, j)])
-        .sum::<f64>()
-        / free().count() as f64;
-    let widening = if refined.score.blocks > 2 * np {
-        ratio.max(1.0)
-    } else {
-        1.0
+    let free = (0..FRICTION).filter(|j| !fixed.contains(j));
+    let ratios = free.map(|j| spread_of_score[(j, j)] / covariance[(j, j)]);
+    let ratios: Vec<f64> = ratios.collect();
+    let widening = match refined.score.blocks > 2 * problem.parameters() {
+        true => (ratios.iter().sum::<f64>() / ratios.len() as f64).max(1.0),
+        false => 1.0,
     };
     let (lo, hi) = problem.slope_range;
     let at_limit = [3, 4].map(|j| {

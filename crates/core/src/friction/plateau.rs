@@ -50,24 +50,20 @@ pub fn missed(plateaus: &[Plateau], curve: &dyn Fn(f64) -> f64) -> Vec<Missed> {
     let mut sorted: Vec<&Plateau> = plateaus.iter().collect();
     sorted.sort_by(|a, b| a.v.total_cmp(&b.v));
     let alike = |a: &&Plateau, b: &&Plateau| (b.v - a.v).abs() <= ONE_SPEED * a.v.abs();
-    let mut out: Vec<Missed> = sorted
-        .chunk_by(alike)
-        .filter_map(|group| {
-            let n = group.len() as f64;
-            let mean = |of: &dyn Fn(&Plateau) -> f64| group.iter().map(|p| of(p)).sum::<f64>() / n;
-            let off = |p: &Plateau| p.torque - curve(p.v);
-            let (v, torque, difference) = (mean(&|p| p.v), mean(&|p| p.torque), mean(&off));
-            // what each says of itself, and what they say of one another
-            let within = mean(&|p| p.std * p.std) / n;
-            let between = mean(&|p| (off(p) - difference).powi(2)) / n;
-            let sure = difference.abs() > SIGNIFICANT_ERRORS * within.max(between).sqrt();
-            (sure && difference.abs() > FOLLOWS * torque.abs()).then_some(Missed {
-                v,
-                torque,
-                curve: torque - difference,
-            })
-        })
-        .collect();
+    let misses = |group: &[&Plateau]| {
+        let n = group.len() as f64;
+        let mean = |of: &dyn Fn(&Plateau) -> f64| group.iter().map(|p| of(p)).sum::<f64>() / n;
+        let off = |p: &Plateau| p.torque - curve(p.v);
+        let (v, torque, difference) = (mean(&|p| p.v), mean(&|p| p.torque), mean(&off));
+        // by the standard error of each, and by how they differ from one another
+        let within = mean(&|p| p.std * p.std) / n;
+        let between = mean(&|p| (off(p) - difference).powi(2)) / n;
+        let sure = difference.abs() > SIGNIFICANT_ERRORS * within.max(between).sqrt();
+        let curve = torque - difference;
+        let missed = Missed { v, torque, curve };
+        (sure && difference.abs() > FOLLOWS * torque.abs()).then_some(missed)
+    };
+    let mut out: Vec<Missed> = sorted.chunk_by(alike).filter_map(misses).collect();
     let share = |m: &Missed| (m.curve / m.torque - 1.0).abs();
     out.sort_by(|a, b| share(b).total_cmp(&share(a)));
     out
@@ -86,10 +82,8 @@ pub(super) fn net_torques<'a>(
         let v = &prepared.velocity[first..first + record.t.len()];
         let a = &prepared.acceleration[first..first + record.t.len()];
         first += record.t.len();
-        let of = |x: &[f64], k: usize| -> f64 {
-            let row = &x[k * e..(k + 1) * e];
-            row.iter().zip(eta).map(|(x, y)| x * y).sum()
-        };
+        let of =
+            |x: &[f64], k: usize| -> f64 { x[k * e..].iter().zip(eta).map(|(x, y)| x * y).sum() };
         let net = |k: usize| {
             record.tau[k] - of(&record.m, k) * 0.5 * (a[k] + a[k + 1]) - of(&record.h, k)
         };
@@ -118,13 +112,12 @@ pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
                 let mean = (k..end).map(net).sum::<f64>() / count;
                 let parts = 10usize.min(end - k);
                 let part = (end - k) / parts;
-                let spread = (0..parts)
-                    .map(|i| {
-                        let from = k + i * part;
-                        let m = (from..from + part).map(net).sum::<f64>() / part as f64;
-                        (m - mean) * (m - mean)
-                    })
-                    .sum::<f64>();
+                let square = |i: usize| {
+                    let from = k + i * part;
+                    let m = (from..from + part).map(net).sum::<f64>() / part as f64;
+                    (m - mean) * (m - mean)
+                };
+                let spread = (0..parts).map(square).sum::<f64>();
                 out.push(Plateau {
                     v: v[k..end].iter().sum::<f64>() / count,
                     torque: mean,

@@ -30,12 +30,10 @@ pub struct SmoothedMotion {
     pub tau: Vec<f64>,
 }
 
-/// Directions whose singular value is below this share of the largest are not carried: what they
-/// could add to the torque is below this share of it.
+/// Directions of a singular value below this share of the largest are not carried: they add that share to the torque.
 const DIRECTION_TOLERANCE: f64 = 2e-3;
 
-/// Samples of the longest record. A longer stretch is cut: a cut costs the knowledge of one state,
-/// and the filter runs over records in parallel.
+/// Samples of the longest record; a longer stretch is cut, for the filter runs over records in parallel.
 const LONGEST_RECORD: usize = 40_000;
 
 /// The problem of one joint with the map from its nuisance states back to the robot's parameters.
@@ -60,12 +58,8 @@ pub struct SensorModel<'a> {
 
 /// Root mean square; zero for nothing.
 pub(super) fn rms(x: impl Iterator<Item = f64>) -> f64 {
-    let (mut s, mut n) = (0.0, 0usize);
-    for x in x {
-        s += x * x;
-        n += 1;
-    }
-    if n == 0 { 0.0 } else { (s / n as f64).sqrt() }
+    let (sum, n) = x.fold((0.0, 0usize), |(sum, n), x| (sum + x * x, n + 1));
+    if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
 /// Builds the problem of `joint` from its logs' motions. `None` where the joint has no torque or
@@ -131,8 +125,7 @@ fn regressor_rows(
     }
 }
 
-/// Combinations of the robot's parameters (and the offset, last) that the motion excites, one a column, each scaled
-/// to the torque: singular directions of the scaled regressor.
+/// Combinations of the robot's parameters (and the offset, last) that the motion excites, one a column.
 fn excited_directions(
     robot: &Robot,
     joint: usize,
@@ -162,16 +155,14 @@ fn excited_directions(
         factor.fold(&scaled);
     });
     let svd = rank::svd(&factor.r()).ok()?;
-    let kept: Vec<usize> = (0..columns)
-        .filter(|&j| svd.s[j] > DIRECTION_TOLERANCE * svd.s[0])
-        .collect();
+    let shown = |j: &usize| svd.s[*j] > DIRECTION_TOLERANCE * svd.s[0];
+    let kept: Vec<usize> = (0..columns).filter(shown).collect();
     Some(DMatrix::from_fn(columns, kept.len(), |i, j| {
         scale[i] * svd.v[(i, kept[j])]
     }))
 }
 
-/// The same problem, its known inputs from motions that were smoothed otherwise: unknowns and
-/// scales stay, so that estimates can be compared.
+/// The same problem, unknowns and scales as they are, its known inputs from motions that were smoothed otherwise.
 pub(super) fn prepare_again(
     robot: &Robot,
     joint: usize,
@@ -187,6 +178,7 @@ pub(super) fn prepare_again(
 }
 
 /// Records of all motions, with velocity and acceleration of the moving joint.
+#[derive(Default)]
 struct BuiltRecords {
     records: Vec<Record>,
     velocity: Vec<f64>,
@@ -201,19 +193,14 @@ fn build(
     back: &DMatrix<f64>,
 ) -> Option<BuiltRecords> {
     let n = robot.joints();
-    let long = motions.iter().filter(|m| m.t.len() >= 3);
-    let of_joint =
-        |x: &Vec<f64>| -> Vec<f64> { x.iter().skip(joint).step_by(n).copied().collect() };
-    let pieces = long
-        .clone()
-        .flat_map(|m| pieces(m.t.len()).map(move |piece| (m, piece)));
-    let built = BuiltRecords {
-        records: pieces
-            .map(|(m, piece)| record(robot, joint, m, piece, sensors, back))
-            .collect(),
-        velocity: long.clone().flat_map(|m| of_joint(&m.v)).collect(),
-        acceleration: long.flat_map(|m| of_joint(&m.a)).collect(),
-    };
+    let mut built = BuiltRecords::default();
+    for motion in motions.iter().filter(|m| m.t.len() >= 3) {
+        let record = |piece| record(robot, joint, motion, piece, sensors, back);
+        built.records.extend(pieces(motion.t.len()).map(record));
+        let own = |all: &mut Vec<f64>, x: &[f64]| all.extend(x.iter().skip(joint).step_by(n));
+        own(&mut built.velocity, &motion.v);
+        own(&mut built.acceleration, &motion.a);
+    }
     (!built.records.is_empty()).then_some(built)
 }
 
@@ -248,14 +235,13 @@ fn record(
     let mut torque = vec![0.0; n];
     // intervals: mean of their ends; the torque as it is timed
     for k in piece.start..piece.end - 1 {
-        let row = |x: &'_ [f64], k: usize| -> Vec<f64> { x[k * n..(k + 1) * n].to_vec() };
         record.tau.push(if sensors.zero_order_hold {
             // the motor's force is constant; as a joint torque it is that of the middle pose
-            let (here, next) = (row(&motion.q, k), row(&motion.q, k + 1));
-            let middle: Vec<f64> = here.iter().zip(&next).map(|(a, b)| 0.5 * (a + b)).collect();
-            robot
-                .transmission()
-                .carry_torque(&here, &middle, &row(&motion.tau, k), &mut torque);
+            let (here, next) = motion.q[k * n..(k + 2) * n].split_at(n);
+            let middle: Vec<f64> = here.iter().zip(next).map(|(a, b)| 0.5 * (a + b)).collect();
+            let logged = &motion.tau[k * n..(k + 1) * n];
+            let transmission = robot.transmission();
+            transmission.carry_torque(here, &middle, logged, &mut torque);
             torque[joint]
         } else {
             0.5 * (motion.tau[k * n + joint] + motion.tau[(k + 1) * n + joint])
@@ -269,8 +255,7 @@ fn record(
     record
 }
 
-/// Coefficients of the nuisance at every sample, row-major: of the joint's own acceleration, and of what acts
-/// beside it.
+/// Coefficients of the nuisance at every sample, row-major: of the joint's own acceleration, and of all else.
 fn coefficients(
     robot: &Robot,
     joint: usize,
@@ -308,22 +293,19 @@ fn coefficients(
 }
 
 fn median_step(records: &[Record]) -> f64 {
+    let records = records.iter();
     let mut steps: Vec<f64> = records
-        .iter()
         .flat_map(|r| r.t.windows(2).map(|w| w[1] - w[0]))
         .collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(1e-3)
 }
 
-/// Slopes that a log can show: from a transition ten times as wide as the fastest speed down to
-/// one that the joint crosses within a tenth of a sample.
+/// Slopes that a log can show: transitions from ten times the fastest speed to a tenth of a sample wide.
 fn slope_range(velocity: &[f64], acceleration: f64, step: f64) -> (f64, f64) {
     let fastest = velocity.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    (
-        0.1 / fastest,
-        (10.0 / (acceleration * step)).max(10.0 / fastest),
-    )
+    let steepest = (10.0 / (acceleration * step)).max(10.0 / fastest);
+    (0.1 / fastest, steepest)
 }
 
 /// Step of a position channel: the smallest change between neighbouring samples; where positions

@@ -13,7 +13,7 @@ const STEP_LIMIT: f64 = 0.8;
 const MOST_STEPS: usize = 64;
 
 /// What one interval does to the state and to small changes of state and parameters.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Transition {
     /// dq/dv and dv/dv at the end; dq/dq = 1 and dv/dq = 0.
     pub q_v: f64,
@@ -29,12 +29,9 @@ pub struct Transition {
 impl Transition {
     pub fn new(parameters: usize) -> Self {
         Transition {
-            q_v: 0.0,
-            v_v: 0.0,
             b_q: vec![0.0; parameters],
             b_v: vec![0.0; parameters],
-            n_q: 0.0,
-            n_v: 0.0,
+            ..Transition::default()
         }
     }
 }
@@ -109,8 +106,7 @@ impl ScaledLaw {
         self.at(v).slope
     }
 
-    /// Sub-steps for an interval from v with acceleration a: the steepest slope that the
-    /// interval can meet decides.
+    /// Sub-steps for an interval from v with acceleration a, by the steepest slope that it can meet.
     #[inline(always)]
     fn steps(&self, v: f64, a: f64, minv: f64, dt: f64) -> usize {
         let bound = self.viscous.abs()
@@ -120,22 +116,29 @@ impl ScaledLaw {
             return 1;
         }
         let end = v + a * dt;
-        let least = if v * end <= 0.0 {
-            0.0
-        } else {
-            v.abs().min(end.abs())
-        };
+        let turns = v * end <= 0.0;
+        let least = if turns { 0.0 } else { v.abs().min(end.abs()) };
         let t = [tanh(self.slope[0] * least), tanh(self.slope[1] * least)];
         let local = self.viscous.abs()
             + (self.coulomb[0] * self.slope[0]).abs() * (1.0 - t[0] * t[0])
             + (self.coulomb[1] * self.slope[1]).abs() * (1.0 - t[1] * t[1]);
         // a NaN makes the comparison false and ends as one step
-        let n = (local * minv * dt / STEP_LIMIT).ceil();
-        if n > 1.0 {
-            n.min(MOST_STEPS as f64) as usize
-        } else {
-            1
+        match (local * minv * dt / STEP_LIMIT).ceil() {
+            n if n > 1.0 => n.min(MOST_STEPS as f64) as usize,
+            _ => 1,
         }
+    }
+
+    /// dF/d(filter coordinate) for the five friction parameters.
+    #[inline(always)]
+    fn gradient(&self, x: &FrictionAt) -> [f64; FRICTION] {
+        [
+            self.viscous_scale * x.v,
+            self.torque_scale * x.tanh[0],
+            self.torque_scale * x.tanh[1],
+            self.coulomb[0] * self.slope[0] * x.v * x.sech2[0],
+            self.coulomb[1] * self.slope[1] * x.v * x.sech2[1],
+        ]
     }
 }
 
@@ -164,7 +167,7 @@ impl<'a> SampleInterval<'a> {
 
 /// Inverse inertia and net known torque of one interval under the nuisance `eta`.
 #[inline(always)]
-fn known(interval: &SampleInterval, eta: &[f64], least_inertia: f64) -> (f64, f64) {
+pub(super) fn known(interval: &SampleInterval, eta: &[f64], least_inertia: f64) -> (f64, f64) {
     let mut inertia = 0.0;
     let mut load = 0.0;
     for ((m, h), e) in interval.m.iter().zip(interval.h).zip(eta) {
@@ -200,8 +203,7 @@ pub fn state(
     (q, v)
 }
 
-/// Integrates state and sensitivities over one interval; returns (q, v) at its end and fills
-/// `out`. `p` are the parameters that `law` was made from.
+/// State at the end of an interval, and its sensitivities into `out`; `law` was made from `p`.
 #[inline]
 pub(crate) fn with_sensitivities(
     law: &ScaledLaw,
@@ -218,10 +220,7 @@ pub(crate) fn with_sensitivities(
     let first = law.at(v);
     let n = law.steps(v, (net - first.force) * minv, minv, interval.dt);
     let dt = interval.dt / n as f64;
-    out.q_v = 0.0;
-    out.v_v = 1.0;
-    out.n_q = 0.0;
-    out.n_v = 0.0;
+    (out.q_v, out.v_v) = (0.0, 1.0);
     let mut b_q = [0.0; FRICTION];
     let mut b_v = [0.0; FRICTION];
     // sums for the nuisance: sensitivity = -(h_j W + m_j A) / m, with W = integral of the decay
@@ -248,9 +247,7 @@ pub(crate) fn with_sensitivities(
         let w = [dt / 6.0 * whole, dt * 4.0 / 6.0 * late, dt / 6.0];
         let s = [dt / 6.0 * s_whole, dt * 4.0 / 6.0 * s_late];
 
-        let g1 = law.gradient(&x1);
-        let gm = law.gradient(&xm);
-        let g2 = law.gradient(&x2);
+        let [g1, gm, g2] = [&x1, &xm, &x2].map(|x| law.gradient(x));
         for j in 0..FRICTION {
             b_q[j] += s_whole * b_v[j] - minv * (s[0] * g1[j] + s[1] * gm[j]);
             b_v[j] = whole * b_v[j] - minv * (w[0] * g1[j] + w[1] * gm[j] + w[2] * g2[j]);
@@ -274,20 +271,6 @@ pub(crate) fn with_sensitivities(
     (q, v)
 }
 
-impl ScaledLaw {
-    /// dF/d(filter coordinate) for the five friction parameters.
-    #[inline(always)]
-    fn gradient(&self, x: &FrictionAt) -> [f64; FRICTION] {
-        [
-            self.viscous_scale * x.v,
-            self.torque_scale * x.tanh[0],
-            self.torque_scale * x.tanh[1],
-            self.coulomb[0] * self.slope[0] * x.v * x.sech2[0],
-            self.coulomb[1] * self.slope[1] * x.v * x.sech2[1],
-        ]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,20 +289,15 @@ mod tests {
     /// Bv, Bf1, Bf2, ln w1, ln w2 in the filter's coordinates, then an inertia and a constant.
     const P: [f64; 7] = [0.2, 0.8, -0.3, 3.2, 0.9, 0.7, 1.1];
 
-    fn interval<'a>(m: &'a [f64; 2], h: &'a [f64; 2]) -> SampleInterval<'a> {
-        SampleInterval {
-            dt: 2e-3,
-            tau: 3.0,
-            m,
-            h,
-        }
-    }
-
     #[test]
     fn sensitivities_are_the_differences_of_the_integrated_state() {
         let problem = problem();
-        let (m, h) = ([1.0, 0.0], [0.4, 1.0]);
-        let interval = interval(&m, &h);
+        let interval = SampleInterval {
+            dt: 2e-3,
+            tau: 3.0,
+            m: &[1.0, 0.0],
+            h: &[0.4, 1.0],
+        };
         let end = |p: &[f64], v: f64, tau: f64| {
             let law = ScaledLaw::new(&problem, p);
             let interval = SampleInterval { tau, ..interval };
@@ -362,12 +340,11 @@ mod tests {
         let mut p = P;
         p[3] = 6.0;
         let law = ScaledLaw::new(&problem, &p);
-        let (m, h) = ([1.0, 0.0], [0.0, 0.0]);
         let whole = SampleInterval {
             dt: 4e-3,
             tau: 0.3,
-            m: &m,
-            h: &h,
+            m: &[1.0, 0.0],
+            h: &[0.0, 0.0],
         };
         let one = state(&law, &p[FRICTION..], &whole, 1e-6, 0.0, 0.05);
         let mut many = (0.0, 0.05);

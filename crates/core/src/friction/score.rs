@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Record};
-use super::propagate::{SampleInterval, ScaledLaw, Transition, state, with_sensitivities};
+use super::propagate::{SampleInterval, ScaledLaw, Transition, known, state, with_sensitivities};
 
 /// Result of a pass at fixed parameters.
 #[derive(Debug, Clone)]
@@ -27,7 +27,6 @@ pub struct LikelihoodScore {
     pub outer: DMatrix<f64>,
     /// Number of blocks in `outer`.
     pub blocks: usize,
-    pub innovations: usize,
     pub mean_nis: f64,
     /// Share of innovations inside their 95 % bound.
     pub share_inside: f64,
@@ -36,44 +35,19 @@ pub struct LikelihoodScore {
     pub windows: usize,
 }
 
-impl LikelihoodScore {
-    fn none(parameters: usize) -> Self {
-        LikelihoodScore {
-            log_likelihood: 0.0,
-            gradient: DVector::zeros(parameters),
-            information: DMatrix::zeros(parameters, parameters),
-            outer: DMatrix::zeros(parameters, parameters),
-            blocks: 0,
-            innovations: 0,
-            mean_nis: 0.0,
-            share_inside: 0.0,
-            window_nis: f64::NAN,
-            windows: 0,
-        }
-    }
-
-    /// Takes the gradient of a block, and leaves none.
-    fn close_block(&mut self, part: &mut DVector<f64>) {
-        self.outer.ger(1.0, part, part, 1.0);
-        self.gradient += &*part;
-        self.blocks += 1;
-        part.fill(0.0);
-    }
-}
-
 /// Two-state covariance (qq, qv, vv) at the first sample of a record.
 fn first_covariance(problem: &FrictionProblem, record: &Record, noise: NoiseLevels) -> [f64; 3] {
     let speed = 0.1 * problem.velocity_scale;
     [record.r[0] * noise.position_factor, 0.0, speed.powi(2)]
 }
 
-/// Two-state covariance (qq, qv, vv), predicted over one interval.
+/// Two-state covariance (qq, qv, vv), predicted over one interval by dq/dv, dv/dv, dq/dtau and dv/dtau.
 #[inline(always)]
-fn predict(p: [f64; 3], t: &Transition, s2: f64) -> [f64; 3] {
+fn predict(p: [f64; 3], [q_v, v_v, n_q, n_v]: [f64; 4], s2: f64) -> [f64; 3] {
     [
-        p[0] + 2.0 * t.q_v * p[1] + t.q_v * t.q_v * p[2] + s2 * t.n_q * t.n_q,
-        t.v_v * (p[1] + t.q_v * p[2]) + s2 * t.n_q * t.n_v,
-        t.v_v * t.v_v * p[2] + s2 * t.n_v * t.n_v,
+        p[0] + 2.0 * q_v * p[1] + q_v * q_v * p[2] + s2 * n_q * n_q,
+        v_v * (p[1] + q_v * p[2]) + s2 * n_q * n_v,
+        v_v * v_v * p[2] + s2 * n_v * n_v,
     ]
 }
 
@@ -97,11 +71,10 @@ const WINDOW: usize = 50;
 /// Fewest windows at speed that stand for a log.
 const FEWEST: usize = 30;
 
-/// Normalised innovations summed over windows. White ones of unit variance sum to a variance of
-/// their number; a model that lacks something leaves innovations that are alike for many samples,
-/// and that the noise levels, being estimated, cannot absorb. Where the joint moves by less than an
-/// encoder step per sample the rounding error is alike too: such windows count only in a log that
-/// has no others.
+/// Normalised innovations summed over windows.
+// White ones of unit variance sum to a variance of their number; a model that lacks something leaves innovations that
+// are alike for many samples, and that the noise levels, being estimated, cannot absorb. Where the joint moves by less
+// than an encoder step per sample the rounding error is alike too: such windows count only in a log that has no others.
 #[derive(Debug, Clone, Copy, Default)]
 struct InnovationWindows {
     sum: f64,
@@ -113,11 +86,6 @@ struct InnovationWindows {
 }
 
 impl InnovationWindows {
-    /// The next window begins.
-    fn cut(&mut self) {
-        (self.sum, self.length, self.slow) = (0.0, 0, false);
-    }
-
     #[inline(always)]
     fn add(&mut self, normalised: f64, travel: f64, variance: f64) {
         self.sum += normalised;
@@ -130,7 +98,7 @@ impl InnovationWindows {
             if !self.slow {
                 self.fast = (self.fast.0 + square, self.fast.1 + 1);
             }
-            self.cut();
+            (self.sum, self.length, self.slow) = (0.0, 0, false);
         }
     }
 
@@ -141,11 +109,8 @@ impl InnovationWindows {
     }
 
     fn mean(&self) -> (f64, usize) {
-        let (sum, count) = if self.fast.1 >= FEWEST {
-            self.fast
-        } else {
-            self.all
-        };
+        let fast = self.fast.1 >= FEWEST;
+        let (sum, count) = if fast { self.fast } else { self.all };
         (sum / count as f64, count)
     }
 }
@@ -200,7 +165,11 @@ pub fn score(
 
 /// Sums over one record or several.
 struct RecordScore {
-    sums: LikelihoodScore,
+    log_likelihood: f64,
+    gradient: DVector<f64>,
+    outer: DMatrix<f64>,
+    blocks: usize,
+    innovations: usize,
     windows: InnovationWindows,
     /// Lower triangle of the information, row-major.
     information: Vec<f64>,
@@ -211,7 +180,11 @@ struct RecordScore {
 impl RecordScore {
     fn none(parameters: usize) -> Self {
         RecordScore {
-            sums: LikelihoodScore::none(parameters),
+            log_likelihood: 0.0,
+            gradient: DVector::zeros(parameters),
+            outer: DMatrix::zeros(parameters, parameters),
+            blocks: 0,
+            innovations: 0,
             windows: InnovationWindows::default(),
             information: vec![0.0; parameters * parameters],
             nis: 0.0,
@@ -220,12 +193,11 @@ impl RecordScore {
     }
 
     fn add(&mut self, other: &Self) {
-        let (sum, part) = (&mut self.sums, &other.sums);
-        sum.log_likelihood += part.log_likelihood;
-        sum.gradient += &part.gradient;
-        sum.outer += &part.outer;
-        sum.blocks += part.blocks;
-        sum.innovations += part.innovations;
+        self.log_likelihood += other.log_likelihood;
+        self.gradient += &other.gradient;
+        self.outer += &other.outer;
+        self.blocks += other.blocks;
+        self.innovations += other.innovations;
         for (a, b) in self.information.iter_mut().zip(&other.information) {
             *a += b;
         }
@@ -234,16 +206,30 @@ impl RecordScore {
         self.inside += other.inside;
     }
 
+    /// Takes the gradient of a block, and leaves none.
+    fn close_block(&mut self, part: &mut DVector<f64>) {
+        self.outer.ger(1.0, part, part, 1.0);
+        self.gradient += &*part;
+        self.blocks += 1;
+        part.fill(0.0);
+    }
+
     fn whole(self) -> LikelihoodScore {
-        let mut out = self.sums;
-        let np = out.gradient.len();
+        let np = self.gradient.len();
         let at = |i: usize, j: usize| self.information[i.max(j) * np + i.min(j)];
-        out.information = DMatrix::from_fn(np, np, at);
-        let n = out.innovations.max(1) as f64;
-        out.mean_nis = self.nis / n;
-        (out.window_nis, out.windows) = self.windows.mean();
-        out.share_inside = self.inside as f64 / n;
-        out
+        let n = self.innovations.max(1) as f64;
+        let (window_nis, windows) = self.windows.mean();
+        LikelihoodScore {
+            log_likelihood: self.log_likelihood,
+            gradient: self.gradient,
+            information: DMatrix::from_fn(np, np, at),
+            outer: self.outer,
+            blocks: self.blocks,
+            mean_nis: self.nis / n,
+            share_inside: self.inside as f64 / n,
+            window_nis,
+            windows,
+        }
     }
 }
 
@@ -270,7 +256,7 @@ fn of_record(
         let interval = SampleInterval::of(record, k, problem.nuisance);
         let least = problem.least_inertia;
         (q, v) = with_sensitivities(law, parameters, &interval, least, q, v, &mut t);
-        p = predict(p, &t, s2);
+        p = predict(p, [t.q_v, t.v_v, t.n_q, t.n_v], s2);
         w.propagate(&t);
         let s = p[0] + record.r[k + 1] * noise.position_factor;
         let innovation = record.y[k + 1] - q;
@@ -278,13 +264,13 @@ fn of_record(
         q += kq * innovation;
         v += kv * innovation;
         let z = innovation * innovation / s;
-        out.sums.log_likelihood -= 0.5 * (z + s.ln());
+        out.log_likelihood -= 0.5 * (z + s.ln());
         out.nis += z;
         let travel = v.abs() * interval.dt;
         out.windows
             .add(innovation / s.sqrt(), travel, record.r[k + 1]);
         out.inside += usize::from(z < CHI2_95);
-        out.sums.innovations += 1;
+        out.innovations += 1;
         // d(innovation)/dp = -w; score = w nu / s, information = w w' / s
         let g = innovation / s;
         for i in 0..np {
@@ -297,11 +283,11 @@ fn of_record(
         }
         w.update(kq, kv);
         if (k + 1) % block.max(1) == 0 {
-            out.sums.close_block(&mut part);
+            out.close_block(&mut part);
         }
     }
     // the last, shorter block
-    out.sums.close_block(&mut part);
+    out.close_block(&mut part);
     out
 }
 
@@ -338,16 +324,11 @@ fn likelihood_of_record(
     for k in 0..record.tau.len() {
         let interval = SampleInterval::of(record, k, problem.nuisance);
         let (start_v, dt) = (v, interval.dt);
-        let minv = inverse_inertia(&interval, eta, problem.least_inertia);
+        let (minv, _) = known(&interval, eta, problem.least_inertia);
         (q, v) = state(law, eta, &interval, problem.least_inertia, q, v);
         // one mean decay over the interval serves the covariance
         let decay = 0.5 * (law.slope_at(start_v) + law.slope_at(v)) * minv * dt;
-        let t = decayed(decay, dt, minv);
-        p = [
-            p[0] + 2.0 * t[0] * p[1] + t[0] * t[0] * p[2] + s2 * t[2] * t[2],
-            t[1] * (p[1] + t[0] * p[2]) + s2 * t[2] * t[3],
-            t[1] * t[1] * p[2] + s2 * t[3] * t[3],
-        ];
+        p = predict(p, decayed(decay, dt, minv), s2);
         let s = p[0] + record.r[k + 1] * noise.position_factor;
         let innovation = record.y[k + 1] - q;
         let (kq, kv) = update(&mut p, s);
@@ -356,11 +337,6 @@ fn likelihood_of_record(
         sum -= 0.5 * (innovation * innovation / s + s.ln());
     }
     sum
-}
-
-fn inverse_inertia(interval: &SampleInterval, eta: &[f64], least: f64) -> f64 {
-    let inertia: f64 = interval.m.iter().zip(eta).map(|(m, e)| m * e).sum();
-    1.0 / inertia.max(least)
 }
 
 /// (dq/dv, dv/dv, dq/dtau, dv/dtau) of an interval with total decay `x`.

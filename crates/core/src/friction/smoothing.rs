@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::inputs::Inputs;
-use super::passes::{GivenNoise, Maximum, RefinedParameters, refine_others, settle, spread};
+use super::passes::{GivenNoise, Maximum, RefinedParameters, refine, settle};
 use super::prepare::Prepared;
 use super::problem::{FrictionProblem, NoiseLevels};
 use crate::math::descent::Ending;
@@ -17,30 +17,24 @@ const LIKELIER: f64 = 1.0;
 /// Steps to the maximum of a problem that differs only in a choice of the processing.
 const CHOICE_STEPS: usize = 6;
 
-/// Narrows the accelerations of the other joints one after the other as long as the innovations
-/// grow likelier by it. Returns the cut-offs [Hz], one per joint, with the problem and its maximum;
-/// `None` where the motions as they are do best.
+/// Cut-offs [Hz] of the other joints' accelerations by which the innovations grow likelier, the problem and its maximum.
 pub(super) fn bands(
     prepared: &Prepared,
     inputs: &Inputs,
     maximum: &Maximum,
     given: &GivenNoise,
 ) -> Option<(Vec<f64>, FrictionProblem, Maximum)> {
-    let spread = spread(&prepared.problem);
-    let fixed = maximum.fixed;
+    let (noise, fixed) = (maximum.noise, maximum.fixed);
     let mut cutoffs = vec![f64::INFINITY; inputs.robot.joints()];
     let mut best: Option<(FrictionProblem, RefinedParameters)> = None;
     let mut top = maximum.score.log_likelihood;
     for i in (0..cutoffs.len()).filter(|i| *i != inputs.joint) {
         for band in BANDS_HZ {
             let before = std::mem::replace(&mut cutoffs[i], band);
-            let start = best
-                .as_ref()
-                .map_or(&maximum.parameters, |b| &b.1.parameters);
+            let begun = best.as_ref().map(|(_, refined)| &refined.parameters);
+            let begun = begun.unwrap_or(&maximum.parameters);
             let found = inputs.problem(prepared, &cutoffs).map(|problem| {
-                let p = start.clone();
-                let noise = maximum.noise;
-                let refined = refine_others(&problem, p, noise, &spread, CHOICE_STEPS, fixed);
+                let refined = refine(&problem, begun.clone(), noise, CHOICE_STEPS, fixed);
                 (problem, refined)
             });
             match found {
@@ -56,28 +50,24 @@ pub(super) fn bands(
         }
     }
     let (problem, refined) = best?;
-    let (noise, starts) = (maximum.noise, maximum.starts);
-    let settled = settle(&problem, refined, noise, given, fixed, starts)?;
+    let settled = settle(&problem, refined, noise, given, fixed, maximum.starts)?;
     Some((cutoffs, problem, settled))
 }
 
-/// Adds to the covariance what another smoothing of the known inputs, and another weight of the
-/// encoder, change in the estimate: the innovations cannot show an error that is the same at every
-/// reversal.
+/// Adds to the covariance what another smoothing of the known inputs, and another weight of the encoder, change.
 pub(super) fn add_choices(
     problem: &FrictionProblem,
     again: &FrictionProblem,
     maximum: &mut Maximum,
 ) {
-    let spread = spread(again);
+    // innovations cannot show an error that is the same at every reversal
     let p = maximum.parameters.clone();
     let coarser = NoiseLevels {
         position_factor: COARSER * maximum.noise.position_factor,
         ..maximum.noise
     };
     for (problem, noise) in [(again, maximum.noise), (problem, coarser)] {
-        let from = p.clone();
-        let moved = refine_others(problem, from, noise, &spread, CHOICE_STEPS, maximum.fixed);
+        let moved = refine(problem, p.clone(), noise, CHOICE_STEPS, maximum.fixed);
         if moved.ending != Ending::Diverged {
             let change = DVector::from_fn(p.len(), |i, _| moved.parameters[i] - p[i]);
             maximum.covariance.ger(1.0, &change, &change, 1.0);

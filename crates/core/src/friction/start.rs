@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::prepare::Prepared;
-use super::problem::{FRICTION, FilterParameters};
+use super::problem::FilterParameters;
 
 /// Slopes of the ladder, geometric over the range.
 const LADDER: usize = 14;
@@ -81,23 +81,16 @@ impl WindowAverages {
 
     /// Averages of tanh(w v) over the windows.
     fn tanh(&self, slope: f64) -> Vec<f64> {
-        self.spans
-            .iter()
-            .map(|&(k, n)| {
-                let sum: f64 = self.velocity[k..k + n]
-                    .iter()
-                    .map(|v| (slope * v).tanh())
-                    .sum();
-                self.torque_scale * sum
-            })
-            .collect()
+        let of = |&(k, n): &(usize, usize)| {
+            let each = self.velocity[k..k + n].iter().map(|v| (slope * v).tanh());
+            self.torque_scale * each.sum::<f64>()
+        };
+        self.spans.iter().map(of).collect()
     }
 
-    /// Linear part for a pair of tanh columns: [nuisance, viscous, coulomb_1, coulomb_2] and the
-    /// squared residual. A ridge of 1e-9 stands against directions that the pair leaves open.
+    /// Linear part for a pair of tanh columns, [nuisance, viscous, coulomb_1, coulomb_2], and the squared residual.
     fn solve(&self, one: &[f64], two: &[f64]) -> Option<(DVector<f64>, f64)> {
-        let e = self.nuisance;
-        let n = e + 3;
+        let (e, n) = (self.nuisance, self.nuisance + 3);
         let mut gram = vec![0.0; (n + 1) * (n + 1)];
         let mut row = vec![0.0; n + 1];
         for (i, given) in self.rows.chunks_exact(e + 2).enumerate() {
@@ -113,6 +106,7 @@ impl WindowAverages {
         }
         let at = |i: usize, j: usize| gram[i.max(j) * (n + 1) + i.min(j)];
         let mut normal = DMatrix::from_fn(n, n, at);
+        // against directions that the pair leaves open
         let ridge = 1e-9 * normal.diagonal().max();
         for i in 0..n {
             normal[(i, i)] += ridge;
@@ -129,15 +123,14 @@ impl WindowAverages {
 }
 
 /// The best `most` pairs of slopes with their linear fits, pairs apart from one another.
-pub(crate) fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
+pub(super) fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
     let problem = &prepared.problem;
     let windows = WindowAverages::new(prepared);
     let (lo, hi) = problem.slope_range;
     // far beyond the inverse speed a slope is a sign function to averages over windows
     let hi = hi.min(300.0 / problem.velocity_scale).max(10.0 * lo);
-    let ladder: Vec<f64> = (0..LADDER)
-        .map(|i| lo * (hi / lo).powf(i as f64 / (LADDER - 1) as f64))
-        .collect();
+    let rung = |i: usize| lo * (hi / lo).powf(i as f64 / (LADDER - 1) as f64);
+    let ladder: Vec<f64> = (0..LADDER).map(rung).collect();
     let columns: Vec<Vec<f64>> = ladder.iter().map(|w| windows.tanh(*w)).collect();
     let mut pairs: Vec<(usize, usize, f64)> = (0..LADDER)
         .flat_map(|i| (0..i).map(move |j| (i, j)))
@@ -151,9 +144,8 @@ pub(crate) fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
             kept.push((i, j));
         }
     }
-    kept.into_iter()
-        .filter_map(|(i, j)| polish(prepared, &windows, [ladder[i], ladder[j]]))
-        .collect()
+    let polished = |(i, j)| polish(prepared, &windows, [ladder[i], ladder[j]]);
+    kept.into_iter().filter_map(polished).collect()
 }
 
 /// Pattern search over the logarithms of the slopes.
@@ -182,23 +174,16 @@ fn polish(prepared: &Prepared, windows: &WindowAverages, slopes: [f64; 2]) -> Op
         }
     }
     let e = problem.nuisance;
-    let x = best.0;
-    let mut p = vec![0.0; FRICTION + e];
-    p[0] = x[e];
-    p[1] = x[e + 1];
-    p[2] = x[e + 2];
-    p[3] = (at[0] * problem.velocity_scale).ln();
-    p[4] = (at[1] * problem.velocity_scale).ln();
-    p[FRICTION..].copy_from_slice(&x.as_slice()[..e]);
+    let (eta, linear) = best.0.as_slice().split_at(e);
+    let slopes = at.map(|slope| (slope * problem.velocity_scale).ln());
     Some(FilterStart {
-        parameters: p,
+        parameters: [linear, &slopes, eta].concat(),
         residual: best.1,
     })
 }
 
-/// Nuisance that gives the constant inertia `inertia` as nearly as this motion's columns can, and
-/// no gravity: the start of a user who knows no more.
-pub(crate) fn constant_inertia(prepared: &Prepared, inertia: f64) -> Vec<f64> {
+/// Nuisance that gives a constant inertia as nearly as this motion's columns can, and no gravity.
+pub(super) fn constant_inertia(prepared: &Prepared, inertia: f64) -> Vec<f64> {
     let e = prepared.problem.nuisance;
     let mut normal = DMatrix::<f64>::zeros(e, e);
     let mut right = DVector::<f64>::zeros(e);

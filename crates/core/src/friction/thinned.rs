@@ -9,9 +9,7 @@ use super::problem::{FrictionProblem, Record};
 /// Samples of one piece.
 const PIECE: usize = 1000;
 
-/// At most about `most` samples of the log in pieces, half of them from pieces in which the joint
-/// turns round, which the slopes are seen in, half from the others, both spread evenly over the log.
-/// `None` where the log has no more than that.
+/// At most about `most` samples in pieces, half of them with a turn of the joint; `None` where the log has no more.
 pub(super) fn thinned(prepared: &Prepared, most: usize) -> Option<Prepared> {
     let records = &prepared.problem.records;
     if prepared.problem.samples() <= most {

@@ -74,12 +74,17 @@ impl FrictionTrial {
 
     /// The one-joint problem of that motion.
     pub fn prepared(&self, seed: u64) -> Prepared {
+        self.prepared_of(self.motion(seed))
+    }
+
+    /// That of another motion.
+    pub fn prepared_of(&self, motion: SmoothedMotion) -> Prepared {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let variance = self.step * self.step / 12.0;
         let sensors = SensorModel {
             variance: &|_| variance,
             zero_order_hold: true,
         };
-        prepare(&robot, 0, &[self.motion(seed)], &sensors).expect("it moves")
+        prepare(&robot, 0, &[motion], &sensors).expect("it moves")
     }
 }

@@ -5,7 +5,7 @@
 //! are too many, neighbours merge and the block length doubles. What is kept of a log for a linear fit is
 //! smaller (`condense`).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use serde::{Deserialize, Serialize};
 
 use super::by_speed::BySpeed;
@@ -42,7 +42,7 @@ pub struct Accumulator {
     open_span: [f64; 2],
     now: f64,
     stretch: usize,
-    /// Length of a block now [s], and in rows once the first is there.
+    /// Length of a block [s], and in rows once the first is there.
     block_seconds: f64,
     block_rows: Option<u64>,
     blocks: Vec<BlockFactor>,
@@ -73,23 +73,23 @@ impl JointRows {
         self.count += other.count;
         self.torque_square += other.torque_square;
     }
+
+    /// Root mean square of the torque.
+    pub(super) fn torque_rms(&self) -> f64 {
+        (self.torque_square / self.count.max(1) as f64).sqrt()
+    }
 }
 
 impl Accumulator {
     /// `block_seconds` is the length of a block to begin with [s].
     pub fn new(columns: RegressorColumns, block_seconds: f64) -> Self {
-        let open = (0..columns.joints)
-            .map(|j| RFactor::new(columns.row_width(j)))
-            .collect();
-        let resting = (0..columns.joints)
-            .map(|j| (JointRows::default(), RFactor::new(columns.row_width(j))))
-            .collect();
+        let none = || (0..columns.joints).map(|j| RFactor::new(columns.row_width(j)));
         Accumulator {
             moving: vec![JointRows::default(); columns.joints],
-            resting,
+            resting: none().map(|r| (JointRows::default(), r)).collect(),
             by_speed: vec![BySpeed::default(); columns.joints],
+            open: none().collect(),
             columns,
-            open,
             open_rows: 0,
             open_span: [0.0; 2],
             now: 0.0,
@@ -127,18 +127,15 @@ impl Accumulator {
         let mut at = 0;
         for (j, open) in self.open.iter_mut().enumerate() {
             let c = self.columns.row_width(j);
-            match self.columns.rests(channels, j) {
-                false => {
-                    open.fold(&channels[at..at + c]);
-                    self.by_speed[j].add(&self.columns, j, &channels[at..at + c]);
-                    self.moving[j].add(channels[torques + j]);
-                }
-                true => {
-                    let plain = &channels[self.columns.unweighted()..];
-                    let (rows, factor) = &mut self.resting[j];
-                    factor.fold(&plain[at..at + c]);
-                    rows.add(plain[torques + j]);
-                }
+            if self.columns.rests(channels, j) {
+                let plain = &channels[self.columns.unweighted()..];
+                let (rows, factor) = &mut self.resting[j];
+                factor.fold(&plain[at..at + c]);
+                rows.add(plain[torques + j]);
+            } else {
+                open.fold(&channels[at..at + c]);
+                self.by_speed[j].add(&self.columns, j, &channels[at..at + c]);
+                self.moving[j].add(channels[torques + j]);
             }
             at += c;
         }
@@ -169,12 +166,21 @@ impl Accumulator {
         }
     }
 
+    /// Merges neighbours of one stretch two by two.
     fn halve(&mut self) {
         self.block_rows = self.block_rows.map(|rows| 2 * rows);
         self.block_seconds *= 2.0;
-        merge_pairs(&mut self.blocks, &self.columns, |a, b| {
-            a.stretch == b.stretch
-        });
+        let mut old = std::mem::take(&mut self.blocks).into_iter().peekable();
+        while let Some(mut first) = old.next() {
+            if let Some(second) = old.next_if(|b| b.stretch == first.stretch) {
+                for (j, (a, b)) in first.r.iter_mut().zip(&second.r).enumerate() {
+                    *a = stacked([&*a, b], self.columns.row_width(j)).short();
+                }
+                first.rows += second.rows;
+                first.span[1] = second.span[1];
+            }
+            self.blocks.push(first);
+        }
     }
 
     /// Closes the last block and hands everything over.
@@ -194,36 +200,11 @@ impl Accumulator {
     }
 }
 
-/// Merges neighbours that belong together two by two.
-fn merge_pairs(
-    blocks: &mut Vec<BlockFactor>,
-    columns: &RegressorColumns,
-    belong: impl Fn(&BlockFactor, &BlockFactor) -> bool,
-) {
-    let mut old = std::mem::take(blocks).into_iter().peekable();
-    while let Some(mut first) = old.next() {
-        if let Some(second) = old.next_if(|b| belong(&first, b)) {
-            for (j, (a, b)) in first.r.iter_mut().zip(&second.r).enumerate() {
-                *a = stacked([&*a, b], columns.row_width(j)).short();
-            }
-            first.rows += second.rows;
-            first.span[1] = second.span[1];
-        }
-        blocks.push(first);
-    }
-}
-
 /// Several triangles, one under the other.
 fn stacked<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize) -> RFactor {
     let mut factor = RFactor::new(columns);
-    let mut row = vec![0.0; columns];
     for part in parts {
-        for i in 0..part.nrows() {
-            for (c, x) in row.iter_mut().enumerate() {
-                *x = part[(i, c)];
-            }
-            factor.fold(&row);
-        }
+        factor.fold(part.transpose().as_slice());
     }
     factor
 }
@@ -244,9 +225,8 @@ pub struct RelativeResidual {
 impl RelativeResidual {
     /// The same of a residual that is `factor` times as large.
     pub fn grow(&mut self, factor: f64) {
-        for x in [&mut self.all, &mut self.rms] {
-            *x *= factor;
-        }
+        self.all *= factor;
+        self.rms *= factor;
         for x in [&mut self.moving, &mut self.rest].into_iter().flatten() {
             *x *= factor;
         }
@@ -319,41 +299,36 @@ impl BlockFactors {
 
     /// The same rows with those of each joint's own terms alone that `keep` names by their place.
     pub(super) fn with_own(&self, keep: &[Vec<usize>]) -> BlockFactors {
-        let (n, p) = (self.columns.joints, self.columns.shared);
+        let p = self.columns.shared;
         let mut columns = self.columns.clone();
-        let mut places: Vec<Vec<usize>> = Vec::with_capacity(n);
-        for (j, keep) in keep.iter().enumerate().take(n) {
-            columns.own[j] = keep.iter().map(|k| self.columns.own[j][*k]).collect();
-            let rest = p + self.columns.own[j].len()..self.columns.row_width(j);
-            places.push(
-                (0..p)
-                    .chain(keep.iter().map(|k| p + k))
-                    .chain(rest)
-                    .collect(),
-            );
+        for (own, keep) in columns.own.iter_mut().zip(keep) {
+            *own = keep.iter().map(|k| own[*k]).collect();
         }
-        let chosen = |r: &DMatrix<f64>, j: usize| r.select_columns(&places[j]);
+        let places = |j: usize| -> Vec<usize> {
+            let rest = self.columns.unknowns_of(j)..self.columns.row_width(j);
+            (0..p)
+                .chain(keep[j].iter().map(|k| p + k))
+                .chain(rest)
+                .collect()
+        };
+        let places: Vec<Vec<usize>> = (0..columns.joints).map(places).collect();
+        let chosen = |of: &[DMatrix<f64>]| -> Vec<DMatrix<f64>> {
+            let each = of.iter().zip(&places);
+            each.map(|(r, places)| r.select_columns(places)).collect()
+        };
         let blocks = self.blocks.iter().map(|b| BlockFactor {
             stretch: b.stretch,
             span: b.span,
             rows: b.rows,
-            r: b.r.iter().enumerate().map(|(j, r)| chosen(r, j)).collect(),
+            r: chosen(&b.r),
             scores: None,
         });
         BlockFactors {
             blocks: blocks.collect(),
-            block_seconds: self.block_seconds,
-            at_rest: self
-                .at_rest
-                .iter()
-                .enumerate()
-                .map(|(j, r)| chosen(r, j))
-                .collect(),
+            at_rest: chosen(&self.at_rest),
             columns,
-            moving: self.moving.clone(),
-            resting: self.resting.clone(),
             by_speed: Vec::new(),
-            rows: self.rows,
+            ..self.without_blocks()
         }
     }
 
@@ -375,18 +350,12 @@ impl BlockFactors {
     pub fn in_one_block(&self) -> BlockFactors {
         let r = (0..self.columns.joints).map(|j| self.joint(j)).collect();
         BlockFactors {
-            columns: self.columns.clone(),
             blocks: vec![BlockFactor {
                 rows: self.rows,
                 r,
                 ..BlockFactor::default()
             }],
-            block_seconds: self.block_seconds,
-            moving: self.moving.clone(),
-            resting: self.resting.clone(),
-            at_rest: self.at_rest.clone(),
-            by_speed: self.by_speed.clone(),
-            rows: self.rows,
+            ..self.without_blocks()
         }
     }
 
@@ -406,8 +375,7 @@ impl BlockFactors {
         self.parts(&self.at_rest[j], j).residual_square(&own)
     }
 
-    /// The residual of joint j, whose squared norm is given for the rows in which it moves and for those in which it
-    /// rests, over the norm of its torque.
+    /// The residual of joint j over its torque, by its squares over the rows in which it moves and in which it rests.
     pub(super) fn relative_residual(&self, j: usize, squares: [f64; 2]) -> RelativeResidual {
         let rows = [self.moving[j], self.resting[j]];
         let ratio = |square: f64, torque: f64| match torque > 0.0 {
@@ -427,9 +395,8 @@ impl BlockFactors {
     /// Share of each joint's rows in which it rests.
     pub fn resting_shares(&self) -> Vec<f64> {
         let rows = self.moving.iter().zip(&self.resting);
-        let share =
-            |(m, r): (&JointRows, &JointRows)| r.count as f64 / (m.count + r.count).max(1) as f64;
-        rows.map(share).collect()
+        rows.map(|(m, r)| r.count as f64 / (m.count + r.count).max(1) as f64)
+            .collect()
     }
 
     /// Rows in which a joint moves, on average over the joints.
@@ -446,45 +413,64 @@ impl BlockFactors {
 
     /// Restriction of the global unknowns to those of joint j.
     pub(super) fn own_unknowns(&self, theta: &DVector<f64>, j: usize) -> DVector<f64> {
-        let own = |c, _| theta[self.columns.unknown(j, c)];
-        DVector::from_fn(self.columns.unknowns_of(j), own)
+        self.columns.own_unknowns(theta, j)
     }
 
     /// The columns of joint j's triangle `r` by what stands in them.
     pub(super) fn parts<'a>(&self, r: &'a DMatrix<f64>, j: usize) -> JointFactor<'a> {
+        let unknowns = self.columns.unknowns_of(j);
         JointFactor {
-            r,
-            unknowns: self.columns.unknowns_of(j),
-            gradient: self.columns.gradient(j),
+            x: r.columns(0, unknowns),
+            gradient: r.columns(unknowns, self.columns.gradient(j)),
+            t: r.column(r.ncols() - 1),
         }
     }
 }
 
-/// Normal quantities of one joint's triangle: X'X, X'G, X't, and |t - X theta|^2 by parts.
+/// One joint's triangle by its columns: X, G and t.
 pub(super) struct JointFactor<'a> {
-    pub r: &'a DMatrix<f64>,
-    pub unknowns: usize,
-    pub gradient: usize,
+    pub x: DMatrixView<'a, f64>,
+    gradient: DMatrixView<'a, f64>,
+    pub t: DVectorView<'a, f64>,
 }
 
 impl JointFactor<'_> {
     /// X' (t - X theta) for the joint's own unknowns.
     pub fn score(&self, theta: &DVector<f64>) -> DVector<f64> {
-        let c = self.unknowns;
-        let x = self.r.columns(0, c);
-        let t = self.r.column(self.r.ncols() - 1);
-        x.tr_mul(&(t - x * theta))
+        self.x.tr_mul(&(self.t - self.x * theta))
     }
 
     /// |t - X theta|^2.
-    pub(super) fn residual_square(&self, theta: &DVector<f64>) -> f64 {
-        let x = self.r.columns(0, self.unknowns);
-        (self.r.column(self.r.ncols() - 1) - x * theta).norm_squared()
+    pub fn residual_square(&self, theta: &DVector<f64>) -> f64 {
+        (self.t - self.x * theta).norm_squared()
     }
 
     /// X' G.
-    pub(super) fn with_gradient(&self) -> DMatrix<f64> {
-        let x = self.r.columns(0, self.unknowns);
-        x.tr_mul(&self.r.columns(self.unknowns, self.gradient))
+    pub fn with_gradient(&self) -> DMatrix<f64> {
+        self.x.tr_mul(&self.gradient)
+    }
+
+    /// X'X and X't.
+    pub fn products(&self) -> (DMatrix<f64>, DVector<f64>) {
+        (self.x.tr_mul(&self.x), self.x.tr_mul(&self.t))
+    }
+}
+
+#[cfg(test)]
+impl RegressorColumns {
+    /// Rows of a sliding joint 0.01 s apart, of which speed, acceleration and force are given, in blocks so long [s].
+    pub fn rows_of_one(
+        &self,
+        block_seconds: f64,
+        rows: impl IntoIterator<Item = [f64; 3]>,
+    ) -> BlockFactors {
+        let robot = crate::robot::Robot::single_joint("q1", crate::robot::JointKind::Prismatic);
+        let mut all = Accumulator::new(self.clone(), block_seconds);
+        let mut channels = vec![0.0; self.channels()];
+        for [v, a, tau] in rows {
+            self.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
+            all.add(0, 0.01, &channels);
+        }
+        all.finish()
     }
 }

@@ -89,26 +89,20 @@ impl BySpeed {
         for (a, b) in forward.iter().zip(backward) {
             if a.square > 0.0 && b.square > 0.0 {
                 let by_noise = noise * (1.0 / a.square + 1.0 / b.square);
-                constant_sum +=
-                    (a.square + b.square) * ((level(a) - level(b)).powi(2) - by_noise) / 4.0;
+                let square = (level(a) - level(b)).powi(2) - by_noise;
+                constant_sum += (a.square + b.square) * square / 4.0;
                 paired += a.square + b.square;
             }
         }
-        let mean = |sum: f64, rows: f64| {
-            if rows > 0.0 {
-                (sum / rows).max(0.0)
-            } else {
-                0.0
-            }
+        let mean = |sum: f64, rows: f64| match rows > 0.0 {
+            true => (sum / rows).max(0.0),
+            false => 0.0,
         };
+        let classes = rows * rows / squares;
         Departure {
             level: mean(level_sum, rows),
             constant: mean(constant_sum, paired),
-            classes: if rows > 0.0 {
-                rows * rows / squares
-            } else {
-                1.0
-            },
+            classes: if rows > 0.0 { classes } else { 1.0 },
         }
     }
 }

@@ -30,6 +30,9 @@ pub struct LoopGains {
     pub derivative: Vec<f64>,
 }
 
+/// A matrix of which a corner is used.
+type Square = [[f64; MOST_JOINTS]; MOST_JOINTS];
+
 /// A robot under the parameters of a fit.
 #[derive(Debug, Clone)]
 pub(super) struct ClosedLoop<'a> {
@@ -44,8 +47,7 @@ pub(super) struct ClosedLoop<'a> {
 }
 
 impl<'a> ClosedLoop<'a> {
-    /// A loop about pose `q`, for rows up to `cutoff_hz` sampled with step `h` [s]. `theta` as in
-    /// `columns`.
+    /// A loop about pose `q`, for rows up to `cutoff_hz` sampled with step `h` [s]; `theta` as in `columns`.
     pub fn new(
         robot: &'a Robot,
         columns: &'a RegressorColumns,
@@ -62,19 +64,15 @@ impl<'a> ClosedLoop<'a> {
             theta,
             gains: LoopGains {
                 frequency,
-                proportional: Vec::new(),
-                derivative: Vec::new(),
+                ..LoopGains::default()
             },
             q: [0.0; MOST_JOINTS],
             v: [0.0; MOST_JOINTS],
             indefinite: 0,
         };
-        let mut mass = [[0.0; MOST_JOINTS]; MOST_JOINTS];
-        let mut bias = [0.0; MOST_JOINTS];
-        new.balance(q, &[0.0; MOST_JOINTS][..n], &mut mass, &mut bias);
-        let largest = (0..n)
-            .map(|i| mass[i][i].abs())
-            .fold(f64::MIN_POSITIVE, f64::max);
+        let (mass, _) = new.balance(q, &[0.0; MOST_JOINTS][..n]);
+        let sizes = (0..n).map(|i| mass[i][i].abs());
+        let largest = sizes.fold(f64::MIN_POSITIVE, f64::max);
         for (i, row) in mass.iter().enumerate().take(n) {
             let inertia = row[i].abs().max(MIN_INERTIA_SHARE * largest);
             new.gains.proportional.push(inertia * frequency * frequency);
@@ -90,34 +88,26 @@ impl<'a> ClosedLoop<'a> {
         self.v[..n].copy_from_slice(&v[..n]);
     }
 
-    /// Torque of the shared parameters at a state.
-    fn inertial(&self, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64; MOST_JOINTS]) {
-        let (n, shared) = (self.columns.joints, &self.theta[..self.columns.shared]);
-        self.robot.torque(shared, q, v, a, &mut out[..n]);
-    }
-
     /// Mass matrix and the torque that needs no acceleration, friction aside.
-    fn balance(
-        &self,
-        q: &[f64],
-        v: &[f64],
-        mass: &mut [[f64; MOST_JOINTS]; MOST_JOINTS],
-        bias: &mut [f64; MOST_JOINTS],
-    ) {
-        let n = self.columns.joints;
+    fn balance(&self, q: &[f64], v: &[f64]) -> (Square, [f64; MOST_JOINTS]) {
+        let (n, shared) = (self.columns.joints, &self.theta[..self.columns.shared]);
+        let torque = |v: &[f64], a: &[f64]| {
+            let mut out = [0.0; MOST_JOINTS];
+            self.robot.torque(shared, q, v, a, &mut out[..n]);
+            out
+        };
         let rest = [0.0; MOST_JOINTS];
-        let mut still = [0.0; MOST_JOINTS];
-        self.inertial(q, &rest[..n], &rest[..n], &mut still);
+        let still = torque(&rest[..n], &rest[..n]);
+        let mut mass = [rest; MOST_JOINTS];
         for i in 0..n {
             let mut unit = rest;
             unit[i] = 1.0;
-            let mut column = [0.0; MOST_JOINTS];
-            self.inertial(q, &rest[..n], &unit[..n], &mut column);
+            let column = torque(&rest[..n], &unit[..n]);
             for j in 0..n {
                 mass[j][i] = column[j] - still[j];
             }
         }
-        self.inertial(q, v, &rest[..n], bias);
+        (mass, torque(v, &rest[..n]))
     }
 
     /// Friction of joint j at speed v and its slope; a sign that jumps is smoothed over `width`.
@@ -139,9 +129,7 @@ impl<'a> ClosedLoop<'a> {
                     sum[0] += size * t;
                     sum[1] += size * (1.0 - t * t) / width;
                 }
-                Own::Offset | Own::Saturating(_) | Own::Law(_) | Own::TorqueRate => {
-                    sum[0] += size * own.column(v)
-                }
+                own => sum[0] += size * own.column(v),
             }
         }
         sum
@@ -150,17 +138,14 @@ impl<'a> ClosedLoop<'a> {
     /// Advances by h towards the reference at the end of the step; the new pose.
     pub fn step(&mut self, h: f64, q_ref: &[f64], v_ref: &[f64]) -> &[f64] {
         let n = self.columns.joints;
-        let mut mass = [[0.0; MOST_JOINTS]; MOST_JOINTS];
-        let mut bias = [0.0; MOST_JOINTS];
         let (q, v) = (self.q, self.v);
-        self.balance(&q[..n], &v[..n], &mut mass, &mut bias);
+        let (mut mass, bias) = self.balance(&q[..n], &v[..n]);
         let mut force = [0.0; MOST_JOINTS];
         for (j, force) in force.iter_mut().enumerate().take(n) {
             let (k, d) = (self.gains.proportional[j], self.gains.derivative[j]);
             let inertia = d / (2.0 * self.gains.frequency);
-            let coulomb: f64 = self.columns.own[j]
-                .iter()
-                .enumerate()
+            let own = self.columns.own[j].iter().enumerate();
+            let coulomb: f64 = own
                 .filter(|(_, own)| **own == Own::Coulomb)
                 .map(|(i, _)| self.theta[self.columns.first_own(j) + i].abs())
                 .sum();
@@ -193,9 +178,8 @@ impl<'a> ClosedLoop<'a> {
     }
 }
 
-/// Solves a x = b in place by Cholesky's factor of the symmetric part; false, with b as it was,
-/// where that is not positive definite.
-fn solve(a: &mut [[f64; MOST_JOINTS]; MOST_JOINTS], b: &mut [f64; MOST_JOINTS], n: usize) -> bool {
+/// Solves a x = b in place by Cholesky's factor of the symmetric part; false where that is not positive definite.
+fn solve(a: &mut Square, b: &mut [f64; MOST_JOINTS], n: usize) -> bool {
     for i in 0..n {
         for j in 0..=i {
             let sum: f64 = (0..j).map(|k| a[i][k] * a[j][k]).sum();
@@ -233,13 +217,7 @@ mod tests {
     #[test]
     fn a_joint_follows_its_reference_and_lags_by_what_friction_and_inertia_ask() {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let columns = RegressorColumns {
-            joints: 1,
-            shared: 1,
-            own: vec![vec![Own::Viscous, Own::Coulomb, Own::Offset]],
-            known: vec![None],
-            rest_speed: Vec::new(),
-        };
+        let columns = RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb, Own::Offset], None);
         let h = 1e-3;
         let theta = vec![95.0, 200.0, 20.0, -3.0];
         let mut joint = ClosedLoop::new(&robot, &columns, theta, &[0.0], 40.0, h);

@@ -1,6 +1,8 @@
 //! Which columns a joint's rows have: shared inertial parameters, its own linear terms, the
 //! gradient of its known friction, and the target.
 
+use nalgebra::DVector;
+
 use crate::motion::{FilterSettings, MotionSample, rest};
 use crate::robot::Robot;
 use crate::robot::friction::{DoubleTanh, sign};
@@ -28,9 +30,8 @@ impl Own {
     pub fn name(self) -> &'static str {
         match self {
             Own::Viscous => "viscous",
-            Own::Coulomb => "coulomb",
+            Own::Coulomb | Own::Saturating(_) => "coulomb",
             Own::Offset => "offset",
-            Own::Saturating(_) => "coulomb",
             Own::Law(k) => DoubleTanh::NAMES[k],
             Own::TorqueRate => "torque rate",
         }
@@ -89,13 +90,13 @@ impl RegressorColumns {
     /// Rows in which a joint with friction rests, by the speed up to which it does [m/s or rad/s], inform no
     /// parameter; joints without friction never rest.
     pub fn rest_at(&mut self, speeds: Vec<f64>) {
-        let friction = |j: usize| {
-            let of_friction = |own: &Own| !matches!(own, Own::Offset);
-            self.known[j].is_some() || self.own[j].iter().any(of_friction)
-        };
-        let speeds = speeds.into_iter().enumerate();
-        let speeds = speeds.map(|(j, speed)| if friction(j) { speed } else { -1.0 });
-        self.rest_speed = speeds.collect();
+        self.rest_speed = speeds;
+        for (j, speed) in self.rest_speed.iter_mut().enumerate() {
+            let mut own = self.own[j].iter();
+            if self.known[j].is_none() && own.all(|own| *own == Own::Offset) {
+                *speed = -1.0;
+            }
+        }
     }
 
     /// The processing of rows in which joints rest as these columns say.
@@ -174,19 +175,31 @@ impl RegressorColumns {
     /// The same columns with the parameters of the known friction among the unknowns, but for those that are
     /// held: their gradient, which stands after the own terms, becomes own terms.
     pub fn with_free_friction(&self) -> RegressorColumns {
-        let mut own = self.own.clone();
-        for (own, known) in own.iter_mut().zip(&self.known) {
-            if let Some(known) = known {
+        let mut columns = self.clone();
+        for (own, known) in columns.own.iter_mut().zip(&mut columns.known) {
+            if let Some(known) = known.take() {
                 let free = (0..GRADIENT).filter(|k| !known.held[*k]);
                 own.extend(free.map(Own::Law));
             }
         }
-        RegressorColumns {
-            joints: self.joints,
-            shared: self.shared,
-            own,
-            known: vec![None; self.joints],
-            rest_speed: self.rest_speed.clone(),
+        columns
+    }
+
+    /// Places of each joint's own terms that are to be kept.
+    pub(super) fn places(&self, keep: impl Fn(&Own) -> bool) -> Vec<Vec<usize>> {
+        let kept = |own: &Vec<Own>| (0..own.len()).filter(|k| keep(&own[*k])).collect();
+        self.own.iter().map(kept).collect()
+    }
+
+    /// Restriction of all unknowns to those of joint j.
+    pub(super) fn own_unknowns(&self, theta: &DVector<f64>, j: usize) -> DVector<f64> {
+        DVector::from_fn(self.unknowns_of(j), |c, _| theta[self.unknown(j, c)])
+    }
+
+    /// Adds numbers of joint j's unknowns, each so many times, to those of all.
+    pub(super) fn add_own(&self, j: usize, times: f64, own: &DVector<f64>, all: &mut DVector<f64>) {
+        for (c, x) in own.iter().enumerate() {
+            all[self.unknown(j, c)] += times * x;
         }
     }
 
@@ -237,18 +250,16 @@ impl RegressorColumns {
     /// The same columns with a torque's rate of its own for each joint, the last of its own terms.
     pub fn with_torque_rates(&self) -> RegressorColumns {
         let mut columns = self.clone();
-        columns
-            .own
-            .iter_mut()
-            .for_each(|own| own.push(Own::TorqueRate));
+        for own in &mut columns.own {
+            own.push(Own::TorqueRate);
+        }
         columns
     }
 
     /// Whether these are columns [`Self::with_torque_rates`].
     pub fn have_torque_rates(&self) -> bool {
-        self.own
-            .iter()
-            .any(|own| own.last() == Some(&Own::TorqueRate))
+        let mut own = self.own.iter();
+        own.any(|own| own.last() == Some(&Own::TorqueRate))
     }
 
     /// Fills in what the torques change over a sample.
@@ -281,6 +292,20 @@ impl RegressorColumns {
                 weighted[place] *= weight;
             }
             from = to;
+        }
+    }
+}
+
+#[cfg(test)]
+impl RegressorColumns {
+    /// Those of a single joint whose rows always count.
+    pub fn of_one(own: &[Own], known: Option<KnownFriction>) -> Self {
+        RegressorColumns {
+            joints: 1,
+            shared: 1,
+            own: vec![own.to_vec()],
+            known: vec![known],
+            rest_speed: Vec::new(),
         }
     }
 }

@@ -8,25 +8,28 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::accumulate::BlockFactors;
-use super::columns::GRADIENT;
+use super::accumulate::{BlockFactors, JointFactor};
+use super::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use super::solution::{FitInputs, WeightedSolution};
 use crate::math::long_run::long_run;
 
-/// The two parts and their sum.
+/// What a fit's unknowns scatter by.
 pub(super) struct Covariances {
     pub sandwich: DMatrix<f64>,
+    /// With what the known friction adds.
     pub total: DMatrix<f64>,
+    pub textbook: DMatrix<f64>,
+    /// d theta / d(known friction) of each joint.
+    pub sensitivity: Vec<Option<DMatrix<f64>>>,
 }
 
-/// Sandwich, textbook covariance, and the sensitivities to each joint's known friction.
 pub(super) fn covariance(
     factors: &BlockFactors,
     joints: &[DMatrix<f64>],
     solution: &WeightedSolution,
     inputs: FitInputs,
     residual: &[f64],
-) -> (Covariances, DMatrix<f64>, Vec<Option<DMatrix<f64>>>) {
+) -> Covariances {
     let columns = &factors.columns;
     let weights = inputs.weights;
     let u = columns.unknowns();
@@ -52,10 +55,8 @@ pub(super) fn covariance(
 
     // score of every block, summed over joints: residuals of joints are correlated with one another
     let scores = scores(factors, &solution.theta, weights);
-    let sandwich = &solution.inverse
-        * (long_run(&scores, u, bandwidth(&scores, u, factors.block_seconds)) + known)
-        * &solution.inverse
-        * freedom;
+    let long = long_run(&scores, u, bandwidth(&scores, u, factors.block_seconds));
+    let sandwich = &solution.inverse * (long + known) * &solution.inverse * freedom;
     // Correlation can only take certainty away here: where the estimate of the middle comes out
     // below the textbook's, the latter is the better one.
     let sandwich = at_least(sandwich, &textbook);
@@ -68,18 +69,36 @@ pub(super) fn covariance(
             continue;
         };
         let xg = factors.parts(r, j).with_gradient();
-        let mut global = DMatrix::zeros(u, GRADIENT);
-        for c in 0..xg.nrows() {
-            for k in 0..GRADIENT {
-                global[(columns.unknown(j, c), k)] = weights[j] * weights[j] * xg[(c, k)];
-            }
-        }
-        let s = -(&solution.inverse * global);
-        let cov = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| known.covariance[a][b]);
-        total += &s * cov * s.transpose();
+        let (s, added) = by_friction(columns, known, (j, weights[j]), &solution.inverse, &xg);
+        total += added;
         sensitivity.push(Some(s));
     }
-    (Covariances { sandwich, total }, textbook, sensitivity)
+    Covariances {
+        sandwich,
+        total,
+        textbook,
+        sensitivity,
+    }
+}
+
+/// d theta / d(known friction of joint j), by X'G of its rows, whose weight is given; and what that adds to the covariance.
+pub(super) fn by_friction(
+    columns: &RegressorColumns,
+    known: &KnownFriction,
+    (j, weight): (usize, f64),
+    inverse: &DMatrix<f64>,
+    xg: &DMatrix<f64>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let mut global = DMatrix::zeros(columns.unknowns(), GRADIENT);
+    for c in 0..xg.nrows() {
+        for k in 0..GRADIENT {
+            global[(columns.unknown(j, c), k)] = weight * weight * xg[(c, k)];
+        }
+    }
+    let s = -(inverse * global);
+    let covariance = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| known.covariance[a][b]);
+    let added = &s * covariance * s.transpose();
+    (s, added)
 }
 
 /// Score of every block at theta with its stretch, summed over joints.
@@ -98,29 +117,25 @@ fn scores(
         };
         let none = || DVector::zeros(columns.unknowns());
         out.extend(stretches.into_iter().map(|stretch| (stretch, none())));
-        for j in 0..columns.joints {
+        for (j, weight) in weights.iter().enumerate() {
             let own = factors.own_unknowns(theta, j);
             let each = match &block.scores {
                 None => vec![factors.parts(&block.r[j], j).score(&own)],
                 Some(scores) => {
-                    let r = &block.r[j];
-                    let x = r.columns(0, columns.unknowns_of(j)).into_owned();
-                    let t = r.column(r.ncols() - 1).into_owned();
+                    let JointFactor { x, t, .. } = factors.parts(&block.r[j], j);
+                    let (x, t) = (x.into_owned(), t.into_owned());
                     scores.at_theta(j, (&x, &t), &own).collect()
                 }
             };
             for ((_, g), s) in out[first..].iter_mut().zip(&each) {
-                for (c, x) in s.iter().enumerate() {
-                    g[columns.unknown(j, c)] += weights[j] * weights[j] * x;
-                }
+                columns.add_own(j, weight * weight, s, g);
             }
         }
     }
     out
 }
 
-/// Time over whose sums of scores the correlation from one to the next is taken [s]; filters alone make shorter
-/// ones alike.
+/// Time over whose sums of scores correlation is taken [s]; filters alone make shorter ones alike.
 const NEIGHBOUR_SECONDS: f64 = 0.25;
 /// Least number of such neighbours that count as correlated, and least time where a block is longer than they are [s].
 const LEAST_LAG: f64 = 4.0;
@@ -167,16 +182,11 @@ pub fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize, block_seconds: f64)
 
 /// Scales rows and columns of a covariance so that no variance is below that of `floor`.
 pub(super) fn at_least(mut c: DMatrix<f64>, floor: &DMatrix<f64>) -> DMatrix<f64> {
-    let up: Vec<f64> = (0..c.nrows())
-        .map(|i| {
-            let (have, need) = (c[(i, i)], floor[(i, i)]);
-            if have > 0.0 && have < need {
-                (need / have).sqrt()
-            } else {
-                1.0
-            }
-        })
-        .collect();
+    let up = |i: usize| match (c[(i, i)], floor[(i, i)]) {
+        (have, need) if have > 0.0 && have < need => (need / have).sqrt(),
+        _ => 1.0,
+    };
+    let up: Vec<f64> = (0..c.nrows()).map(up).collect();
     for i in 0..c.nrows() {
         for j in 0..c.ncols() {
             c[(i, j)] *= up[i] * up[j];

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2};
 
-use super::accumulate::{BlockFactors, JointFactor};
+use super::accumulate::BlockFactors;
 use super::by_speed::Place;
 use super::columns::Own;
 use super::solve::{Fit, weights_of};
@@ -28,7 +28,7 @@ pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
         let noise = fit.residual_std[j].powi(2) * correlated;
         let own = sums.own_unknowns(&fit.theta, j);
         let departure = by_speed.departure(&own, noise);
-        let (square, _) = products(&sums.parts(&sums.joint(j), j), columns.unknowns_of(j));
+        let (square, _) = sums.parts(&sums.joint(j), j).products();
         let line = [place.coulomb, place.viscous];
         let normal = Matrix2::from_fn(|a, b| square[(line[a], line[b])]);
         let mut of_line = normal.try_inverse().unwrap_or_default();
@@ -48,8 +48,7 @@ pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
     }
 }
 
-/// What levels of friction of their own in each class of speed change in the shared parameters, beyond what noise alone
-/// changes; none where there are no classes.
+/// Change of the shared parameters by free levels of friction in each class of speed, beyond that by noise.
 fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<DVector<f64>> {
     let columns = &sums.columns;
     let u = columns.unknowns();
@@ -57,11 +56,9 @@ fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<D
     let mut equations = NormalEquations::of(u);
     let mut levels = vec![false; u];
     for (j, by_speed) in sums.by_speed.iter().enumerate() {
-        let own = columns.unknowns_of(j);
-        let r = sums.joint(j);
-        let (mut n, mut b) = products(&sums.parts(&r, j), own);
+        let (mut n, mut b) = sums.parts(&sums.joint(j), j).products();
         for class in by_speed.filled() {
-            let x = DVector::from_column_slice(&class.product[..own]);
+            let x = DVector::from_column_slice(&class.product[..b.len()]);
             n.ger(-1.0 / class.square, &x, &x, 1.0);
             b.axpy(-class.product.last()? / class.square, &x, 1.0);
         }
@@ -73,22 +70,16 @@ fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<D
         }
     }
     let NormalEquations { normal, target } = equations;
-    let kept: Vec<usize> = (0..u)
-        .filter(|i| !levels[*i] && normal[(*i, *i)] > 0.0)
-        .collect();
+    let kept = |i: &usize| !levels[*i] && normal[(*i, *i)] > 0.0;
+    let kept: Vec<usize> = (0..u).filter(kept).collect();
     if kept.len() == u {
         return None;
     }
-    let inverse = inverse_scaled(&DMatrix::from_fn(kept.len(), kept.len(), |a, b| {
-        normal[(kept[a], kept[b])]
-    }))?;
-    let solved = &inverse * DVector::from_fn(kept.len(), |a, _| target[kept[a]]);
+    let inverse = inverse_scaled(&normal.select_rows(&kept).select_columns(&kept))?;
+    let solved = &inverse * target.select_rows(&kept);
     let mut change = DVector::zeros(u);
-    for (a, &i) in kept
-        .iter()
-        .enumerate()
-        .filter(|(_, i)| **i < columns.shared)
-    {
+    let of_shared = kept.iter().enumerate();
+    for (a, &i) in of_shared.filter(|(_, i)| **i < columns.shared) {
         let moved = solved[a] - fit.theta[i];
         let by_noise = (inverse[(a, a)] - fit.textbook[(i, i)]).max(0.0);
         let beyond = (moved * moved - by_noise * correlated).max(0.0);
@@ -131,28 +122,14 @@ impl NormalEquations {
 
 /// Inverse of normal equations, by columns of one size; what no row determines, with a diagonal of 0, stays 0.
 pub(super) fn inverse_scaled(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let scale = normal
-        .diagonal()
-        .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
-    let scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |a, b| {
-        let ridge = if a != b {
-            0.0
-        } else if scale[a] > 0.0 {
-            RIDGE
-        } else {
-            1.0
-        };
-        normal[(a, b)] * scale[a] * scale[b] + ridge
-    });
-    let inverse = scaled.cholesky()?.inverse();
-    Some(DMatrix::from_fn(normal.nrows(), normal.ncols(), |a, b| {
-        inverse[(a, b)] * scale[a] * scale[b]
-    }))
-}
-
-/// X'X and X't of a joint.
-pub(super) fn products(factor: &JointFactor, unknowns: usize) -> (DMatrix<f64>, DVector<f64>) {
-    let x = factor.r.columns(0, unknowns);
-    let t = factor.r.column(factor.r.ncols() - 1);
-    (x.tr_mul(&x), x.tr_mul(&t))
+    let size = |x: f64| if x > 0.0 { x.sqrt().recip() } else { 0.0 };
+    let scale = normal.diagonal().map(size);
+    let scaled = |of: &DMatrix<f64>| {
+        DMatrix::from_fn(of.nrows(), of.ncols(), |a, b| {
+            of[(a, b)] * scale[a] * scale[b]
+        })
+    };
+    let ridge = scale.map(|s| if s > 0.0 { RIDGE } else { 1.0 });
+    let ridged = scaled(normal) + DMatrix::from_diagonal(&ridge);
+    Some(scaled(&ridged.cholesky()?.inverse()))
 }

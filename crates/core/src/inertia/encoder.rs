@@ -19,8 +19,7 @@ use crate::robot::Robot;
 /// Number of shifted grids.
 pub const GRIDS: u32 = 6;
 
-/// Shifts of grid number `grid`, as parts of a step per motor: multiples of irrational numbers,
-/// spread evenly without chance.
+/// Shifts of a grid as parts of a step per motor: multiples of irrational numbers, spread evenly without chance.
 fn shifts(grid: u32) -> [f64; 4] {
     const TURNS: [f64; 4] = [
         0.618_033_988_7,

@@ -43,9 +43,9 @@ pub fn essential(factor: &DMatrix<f64>, rows: f64, effective: f64) -> Result<Ess
     let whole = ReducedFactor::of(factor, &kept).square;
     // residuals of correlated rows count by their effective sample size
     let variance = whole / freedom;
-    let limit = |gone: usize| -> f64 {
-        FisherSnedecor::new(gone as f64, freedom)
-            .map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - LEVEL))
+    let limit = |gone: usize| {
+        let law = FisherSnedecor::new(gone as f64, freedom);
+        law.map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - LEVEL))
     };
     let mut gone = 0;
     loop {
@@ -92,15 +92,9 @@ struct Solved {
 
 impl ReducedFactor {
     fn of(factor: &DMatrix<f64>, kept: &[usize]) -> Self {
-        let last = factor.ncols() - 1;
-        let mut small = RFactor::new(kept.len() + 1);
-        let mut row = vec![0.0; kept.len() + 1];
-        for i in 0..factor.nrows() {
-            for (x, c) in row.iter_mut().zip(kept.iter().chain([&last])) {
-                *x = factor[(i, *c)];
-            }
-            small.fold(&row);
-        }
+        let columns = [kept, &[factor.ncols() - 1]].concat();
+        let mut small = RFactor::new(columns.len());
+        small.fold(factor.select_columns(&columns).transpose().as_slice());
         let r = small.r();
         let square = r[(kept.len(), kept.len())].powi(2);
         ReducedFactor { r, square }
@@ -116,9 +110,8 @@ impl ReducedFactor {
         let right = self.r.view((0, k), (k, 1)).column(0).into_owned();
         let theta = square.solve_upper_triangular(&right)?;
         let inverse = square.solve_upper_triangular(&DMatrix::identity(k, k))?;
-        let relative = (0..k)
-            .map(|i| inverse.row(i).norm() / theta[i].abs())
-            .collect();
+        let relative = |i: usize| inverse.row(i).norm() / theta[i].abs();
+        let relative = (0..k).map(relative).collect();
         Some(Solved { theta, relative })
     }
 }
@@ -141,8 +134,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Five columns, the second and fourth without a part in the target, the fifth the sum of the
-    /// first and third.
+    /// Five columns, the second and fourth without a part in the target, the fifth the sum of the first and third.
     fn factor(noise: f64) -> DMatrix<f64> {
         let mut chance = ChaCha8Rng::seed_from_u64(8);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;

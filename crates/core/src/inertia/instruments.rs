@@ -18,7 +18,7 @@ use super::BLOCK_SECONDS;
 use super::accumulate::{Accumulator, BlockFactor, BlockFactors};
 use super::closed_loop::{ClosedLoop, LoopGains};
 use super::columns::{GRADIENT, RegressorColumns};
-use super::covariance::{at_least, bandwidth};
+use super::covariance::{at_least, bandwidth, by_friction};
 use super::solution::FitError;
 use super::solve::{Fit, weights_of};
 use super::two_pass::two_passes;
@@ -50,13 +50,10 @@ pub enum ReferenceSource {
 
 /// Columns that hold the instruments of `columns` before the regressor itself.
 fn doubled(columns: &RegressorColumns) -> RegressorColumns {
-    let twice = |own: &Vec<super::columns::Own>| own.iter().chain(own).copied().collect();
     RegressorColumns {
-        joints: columns.joints,
         shared: 2 * columns.shared,
-        own: columns.own.iter().map(twice).collect(),
-        known: columns.known.clone(),
-        rest_speed: columns.rest_speed.clone(),
+        own: columns.own.iter().map(|own| own.repeat(2)).collect(),
+        ..columns.clone()
     }
 }
 
@@ -89,10 +86,16 @@ pub fn accumulate<E: Send>(
         ReferenceSource::Logged => (2 * n, ABOVE),
         ReferenceSource::Smoothed => (n, REFERENCE_SHARE),
     };
-    let smooth = reference_filter(
-        settings,
-        (share * settings.cutoff_hz).min(HIGHEST_SHARE / step),
-    );
+    // of the reference every row is kept
+    let smooth = FilterSettings {
+        cutoff_hz: (share * settings.cutoff_hz).min(HIGHEST_SHARE / step),
+        filter: ParallelFilter::Butterworth { order: 4 },
+        decimation: Some(1),
+        q_order: 0,
+        q_trim_s: None,
+        trim_s: None,
+        ..settings.clone()
+    };
     let from = width - n;
     let mut simulation = Simulation {
         run: None,
@@ -151,19 +154,6 @@ pub fn accumulate<E: Send>(
         gains,
         indefinite: indefinite as f64 / steps,
     })
-}
-
-/// Filters of the reference: up to a cut-off \[Hz\], every row kept.
-fn reference_filter(settings: &FilterSettings, cutoff_hz: f64) -> FilterSettings {
-    FilterSettings {
-        cutoff_hz,
-        filter: ParallelFilter::Butterworth { order: 4 },
-        decimation: Some(1),
-        q_order: 0,
-        q_trim_s: None,
-        trim_s: None,
-        ..settings.clone()
-    }
 }
 
 /// The loop along the reference of a log, row by row.
@@ -291,30 +281,29 @@ impl InstrumentSystem {
     }
 }
 
-/// The fit with instruments.
+/// The fit of one more reading, with weights from the fit before.
 ///
 /// # Errors
 /// [`FitError`].
-fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Result<Fit, FitError> {
+pub fn again(
+    columns: &RegressorColumns,
+    before: &Fit,
+    factors: &BlockFactors,
+) -> Result<Fit, FitError> {
     let (n, u) = (columns.joints, columns.unknowns());
-    let weights = weights_of(factors, &plain.residual_std);
+    let weights = weights_of(factors, &before.residual_std);
     let joints: Vec<DMatrix<f64>> = (0..n).map(|j| factors.joint(j)).collect();
-    let system = InstrumentSystem::of(&joints, columns, &weights, &plain.residual_std);
+    let system = InstrumentSystem::of(&joints, columns, &weights, &before.residual_std);
     let inverse = system.inverse()?;
     let theta = &inverse * &system.target;
-    let own: Vec<DVector<f64>> = (0..n)
-        .map(|j| {
-            let of = |c, _| theta[columns.unknown(j, c)];
-            DVector::from_fn(columns.unknowns_of(j), of)
-        })
-        .collect();
+    let own: Vec<DVector<f64>> = (0..n).map(|j| columns.own_unknowns(&theta, j)).collect();
     // b - X theta of a joint's triangle
     let residual = |r: &DMatrix<f64>, j: usize| {
         let c = columns.unknowns_of(j);
         r.column(r.ncols() - 1) - r.columns(c, c) * &own[j]
     };
     let rows = factors.rows_per_joint();
-    let mut fit = plain.clone();
+    let mut fit = before.clone();
     for (j, r) in joints.iter().enumerate() {
         let square = residual(r, j).norm_squared();
         fit.residual_std[j] = (square / factors.moving[j].count.max(1) as f64).sqrt();
@@ -326,9 +315,7 @@ fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Res
         for (j, r) in block.r.iter().enumerate() {
             let c = columns.unknowns_of(j);
             let score = r.columns(0, c).tr_mul(&residual(r, j));
-            for (c, s) in score.iter().enumerate() {
-                g[columns.unknown(j, c)] += weights[j] * weights[j] * s;
-            }
+            columns.add_own(j, weights[j] * weights[j], &score, &mut g);
         }
         (block.stretch, g)
     };
@@ -336,25 +323,8 @@ fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Res
     let freedom = rows / (rows - u as f64 / n as f64).max(1.0);
     let about = |middle: DMatrix<f64>| &inverse * middle * inverse.transpose() * freedom;
     fit.textbook = about(system.square);
-    let long = about(long_run(
-        &scores,
-        u,
-        bandwidth(&scores, u, factors.block_seconds),
-    ));
-    fit.covariance = at_least(long, &fit.textbook);
-    add_known_friction(&mut fit, &joints, columns, &weights, &inverse);
-    fit.theta = theta;
-    Ok(fit)
-}
-
-/// Adds what the known friction's own uncertainty makes of the parameters.
-fn add_known_friction(
-    fit: &mut Fit,
-    joints: &[DMatrix<f64>],
-    columns: &RegressorColumns,
-    weights: &[f64],
-    inverse: &DMatrix<f64>,
-) {
+    let long = long_run(&scores, u, bandwidth(&scores, u, factors.block_seconds));
+    fit.covariance = at_least(about(long), &fit.textbook);
     for (j, r) in joints.iter().enumerate() {
         fit.friction_sensitivity[j] = None;
         let Some(known) = &columns.known[j] else {
@@ -362,17 +332,12 @@ fn add_known_friction(
         };
         let own = columns.unknowns_of(j);
         let zg = r.columns(0, own).tr_mul(&r.columns(2 * own, GRADIENT));
-        let mut global = DMatrix::zeros(columns.unknowns(), GRADIENT);
-        for c in 0..own {
-            for k in 0..GRADIENT {
-                global[(columns.unknown(j, c), k)] = weights[j] * weights[j] * zg[(c, k)];
-            }
-        }
-        let s = -(inverse * global);
-        let covariance = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| known.covariance[a][b]);
-        fit.covariance += &s * covariance * s.transpose();
+        let (s, added) = by_friction(columns, known, (j, weights[j]), &inverse, &zg);
+        fit.covariance += added;
         fit.friction_sensitivity[j] = Some(s);
     }
+    fit.theta = theta;
+    Ok(fit)
 }
 
 /// A fit with instruments.
@@ -394,44 +359,25 @@ pub fn iterate<E: From<FitError>>(
     plain: &Fit,
     pass: &mut dyn FnMut(&DVector<f64>) -> Result<BlockFactors, E>,
 ) -> Result<Instrumental, E> {
-    let mut fit = plain.clone();
-    for iterations in 1..=MAX_ITERATIONS {
-        let next = solve(&pass(&fit.theta)?, columns, &fit)?;
+    let (mut fit, mut iterations) = (plain.clone(), 0);
+    let mut ending = Ending::IterationLimit;
+    while iterations < MAX_ITERATIONS && ending == Ending::IterationLimit {
+        let next = again(columns, &fit, &pass(&fit.theta)?)?;
+        iterations += 1;
         let moved = |i: usize| {
             let std = next.covariance[(i, i)].max(0.0).sqrt();
             next.determined[i] && (next.theta[i] - fit.theta[i]).abs() > SETTLED * std
         };
-        let settled = !(0..next.theta.len()).any(moved);
-        fit = next;
-        if settled || iterations == MAX_ITERATIONS {
-            return Ok(Instrumental {
-                fit,
-                ending: if settled {
-                    Ending::Converged
-                } else {
-                    Ending::IterationLimit
-                },
-                iterations,
-            });
+        if !(0..next.theta.len()).any(moved) {
+            ending = Ending::Converged;
         }
+        fit = next;
     }
     Ok(Instrumental {
         fit,
-        ending: Ending::IterationLimit,
-        iterations: MAX_ITERATIONS,
+        ending,
+        iterations,
     })
-}
-
-/// The fit of one more reading, with weights from `fit`.
-///
-/// # Errors
-/// [`FitError`].
-pub fn again(
-    columns: &RegressorColumns,
-    fit: &Fit,
-    factors: &BlockFactors,
-) -> Result<Fit, FitError> {
-    solve(factors, columns, fit)
 }
 
 #[cfg(test)]

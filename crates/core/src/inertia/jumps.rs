@@ -1,5 +1,7 @@
 //! Stretches of a log in which several joints leave many times their usual residual: something pushes the robot there.
 
+use nalgebra::DVector;
+
 use super::accumulate::{BlockFactor, BlockFactors};
 use super::columns::Own;
 use super::solution::FitError;
@@ -11,8 +13,7 @@ struct Limits {
     fitted: f64,
     /// Times that the blocks to be fitted are chosen anew; each time their residuals fall.
     rounds: usize,
-    /// A residual jumps to so many times the median of its joint. Half of it shows what models of real arms lack;
-    /// a push that makes less than twice of it spoils a fit little.
+    /// A residual jumps to so many times the median of its joint; models of real arms lack half of that.
     times: f64,
     /// So long at least \[s\]: a reversal is over sooner.
     seconds: f64,
@@ -49,7 +50,7 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
     }
     let mut kept: Vec<BlockFactor> = blocks.iter().copied().cloned().collect();
     let (mut ratios, mut usual) = (Vec::new(), Vec::new());
-    let mut theta = nalgebra::DVector::zeros(0);
+    let mut theta = DVector::zeros(0);
     for round in 0..=LIMITS.rounds {
         let part = BlockFactors {
             blocks: std::mem::take(&mut kept),
@@ -78,23 +79,21 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
     Ok(joined(&blocks, &ratios))
 }
 
-/// Coulomb levels by which the torque of a joint that sticks or turns may be off, from one side to the other: a push
-/// leaves more at one joint at least.
+/// Coulomb levels that a joint's torque may be off by where it sticks or turns; a push leaves more at one joint.
 const BY_FRICTION: f64 = 2.0;
 
 /// Coulomb level of a joint by a fit; 0 where it is not fitted.
-fn coulomb(factors: &BlockFactors, theta: &nalgebra::DVector<f64>, j: usize) -> f64 {
+fn coulomb(factors: &BlockFactors, theta: &DVector<f64>, j: usize) -> f64 {
     let mut own = factors.columns.own[j].iter();
     let at = own.position(|own| *own == Own::Coulomb);
     at.map_or(0.0, |at| theta[factors.columns.first_own(j) + at].abs())
 }
 
-/// Root mean square residual of each block and joint over the median of the joint, 0 where it does not move; and the
-/// medians.
+/// Rms residual of each block and joint over the joint's median, 0 where it does not move; and the medians.
 fn over_median(
     factors: &BlockFactors,
     blocks: &[&BlockFactor],
-    theta: &nalgebra::DVector<f64>,
+    theta: &DVector<f64>,
 ) -> (Vec<Vec<f64>>, Vec<f64>) {
     let n = factors.columns.joints;
     let mut all = vec![vec![0.0; n]; blocks.len()];
@@ -125,11 +124,8 @@ fn over_median(
 fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<Jump> {
     let mut found: Vec<Jump> = Vec::new();
     for (block, ratios) in blocks.iter().zip(ratios) {
-        let high = ratios
-            .iter()
-            .enumerate()
-            .filter(|(_, r)| **r > LIMITS.times);
-        let joints: Vec<(usize, f64)> = high.map(|(j, r)| (j, *r)).collect();
+        let joints = ratios.iter().copied().enumerate();
+        let joints: Vec<(usize, f64)> = joints.filter(|(_, r)| *r > LIMITS.times).collect();
         if joints.len() < 2 {
             continue;
         }
@@ -210,10 +206,8 @@ mod tests {
         let found = pushed([2.0, -1.0]);
         assert_eq!(found.len(), 1, "{found:?}");
         let [from, to] = found[0].span;
-        assert!(
-            (from - 8.0).abs() < 0.1 && (to - 10.0).abs() < 0.1,
-            "{found:?}"
-        );
+        let near = (from - 8.0).abs() < 0.1 && (to - 10.0).abs() < 0.1;
+        assert!(near, "{found:?}");
         assert_eq!(found[0].joints.len(), 2);
     }
 

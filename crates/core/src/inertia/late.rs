@@ -9,21 +9,15 @@ use nalgebra::DMatrix;
 
 use super::accumulate::BlockFactors;
 use super::columns::Own;
-use super::departure::{NormalEquations, inverse_scaled, products};
+use super::departure::{NormalEquations, inverse_scaled};
 use super::solve::{Fit, weights_of};
 
-/// Standard deviation of a delay before the rows are asked, in samples: a command is logged with the position before
-/// or after it.
+/// Standard deviation of a delay beforehand, in samples: a command is logged with the position before or after it.
 const DELAY_SAMPLES: f64 = 0.5;
 
 /// The rows of columns [`with_torque_rates`](super::columns::RegressorColumns::with_torque_rates) without the rates.
 pub fn without_rates(sums: &BlockFactors) -> BlockFactors {
-    let kept = |own: &Vec<Own>| {
-        (0..own.len())
-            .filter(|k| own[*k] != Own::TorqueRate)
-            .collect()
-    };
-    sums.with_own(&sums.columns.own.iter().map(kept).collect::<Vec<_>>())
+    sums.with_own(&sums.columns.places(|own| *own != Own::TorqueRate))
 }
 
 /// Adds to a fit's covariance the second moment of what delays change in it: their mean and scatter by `sums`, rows with
@@ -42,7 +36,7 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
             c if c < columns.shared => c,
             c => columns.unknown(j, c) - j,
         };
-        let rows = products(&sums.parts(&sums.joint(j), j), own);
+        let rows = sums.parts(&sums.joint(j), j).products();
         equations.add(&place, *weight, &rows);
     }
     let NormalEquations { normal, target } = equations;
@@ -69,16 +63,9 @@ mod tests {
     const STEP: f64 = 0.01;
     const TRUE: [f64; 2] = [0.012, 0.5];
 
-    /// Error of the inertia of a light joint over its standard deviation, before and after, and that after, over what a
-    /// delay of which nothing is seen would make of it; each row holds the torque of `late` samples before.
+    /// Error of a light joint's inertia in deviations, before and after; and the deviation over that of an unseen delay.
     fn errors(late: f64) -> [f64; 3] {
-        let columns = RegressorColumns {
-            joints: 1,
-            shared: 1,
-            own: vec![vec![Own::Viscous]],
-            known: vec![None],
-            rest_speed: Vec::new(),
-        };
+        let columns = RegressorColumns::of_one(&[Own::Viscous], None);
         let rates = columns.with_torque_rates();
         let motion = |t: f64| {
             let waves = [(0.4, 3.0, 0.0), (0.2, 7.0, 1.0)];

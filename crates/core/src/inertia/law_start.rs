@@ -64,25 +64,20 @@ impl<'a> SlopeLadder<'a> {
         }
     }
 
-    /// Places of a joint's own terms beside the ladder.
-    fn base(&self, j: usize) -> Vec<usize> {
-        let all = self.columns.own[j].iter().enumerate();
-        all.filter(|(_, o)| !matches!(o, Own::Saturating(_)))
-            .map(|(k, _)| k)
-            .collect()
+    /// Places of each joint's own terms beside the ladder.
+    fn base(&self) -> Vec<Vec<usize>> {
+        self.columns.places(|o| !matches!(o, Own::Saturating(_)))
     }
 
     /// The same with a pair of slopes on each joint.
     fn with_pairs(&self, pairs: &[[usize; 2]]) -> Vec<Vec<usize>> {
-        let of = |(j, pair): (usize, &[usize; 2])| {
-            let mut keep = self.base(j);
-            if viscous(&self.columns.own[j]).is_some() {
-                let first = self.columns.own[j].len() - SLOPES.len();
-                keep.extend(pair.map(|k| first + k));
+        let mut keep = self.base();
+        for ((keep, own), pair) in keep.iter_mut().zip(&self.columns.own).zip(pairs) {
+            if viscous(own).is_some() {
+                keep.extend(pair.map(|k| own.len() - SLOPES.len() + k));
             }
-            keep
-        };
-        pairs.iter().enumerate().map(of).collect()
+        }
+        keep
     }
 
     /// The two slopes that explain most, joint after joint.
@@ -126,7 +121,7 @@ impl<'a> SlopeLadder<'a> {
             let at = |k: usize| found.theta[chosen.columns.first_own(j) + k];
             let last = chosen.columns.own[j].len();
             let [steep, flat] = pair.map(|k| self.slopes[j][k]);
-            let place = self.base(j).iter().position(|b| *b == k);
+            let place = self.base()[j].iter().position(|b| *b == k);
             start.own[j].retain(|o| !matches!(o, Own::Viscous | Own::Coulomb));
             start.known[j] = Some(KnownFriction {
                 law: DoubleTanh::from_parameters([

@@ -40,8 +40,7 @@ use accumulate::{Accumulator, BlockFactors};
 use columns::RegressorColumns;
 use robust::Weigher;
 
-/// Length of the blocks whose scores make the covariance, to begin with [s]: so short beside the time over which
-/// residuals are correlated that it does not matter where they begin.
+/// Length of the blocks whose scores make the covariance, to begin with [s]: short beside their correlation.
 const BLOCK_SECONDS: f64 = 0.05;
 
 /// Reads one log and reduces its filtered, decimated rows to block factors. Those of several logs merge.

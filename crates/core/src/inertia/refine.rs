@@ -17,8 +17,7 @@ use crate::math::descent::{Ending, StepControl, Trial, descend};
 use crate::math::rank;
 use crate::robot::friction::DoubleTanh;
 
-/// A step that promises or brings less than this share of the cost is the last: far less than what
-/// one independent row is worth.
+/// A step of less than this share of the cost is the last: far less than one independent row is worth.
 const SETTLED: f64 = 1e-6;
 /// Most passes over the logs.
 const MAX_PASSES: usize = 40;
@@ -59,15 +58,13 @@ impl RefinedFit {
         add_laws(&self.columns, &mut fit.theta);
         Ok(fit)
     }
-}
 
-impl RefinedFit {
     /// The fit of all but the laws, as they were refined, and the rows that it is about.
     ///
     /// # Errors
     /// [`FitError`].
     pub fn without_laws(&self) -> Result<(Fit, BlockFactors), FitError> {
-        let rows = self.factors.with_own(&without_law(&self.factors.columns));
+        let rows = without_law(&self.factors);
         Ok((fit(&rows, Weighting::Wls)?, rows.in_one_block()))
     }
 
@@ -90,9 +87,7 @@ fn add_laws(columns: &RegressorColumns, theta: &mut DVector<f64>) {
     }
 }
 
-/// Rows of the friction that was known before: L (phi - phi_0) of unit noise, L'L the inverse of its
-/// covariance, times the root of `strength`. What is held stays at phi_0, and its column is left out: what remains is
-/// known under that condition. `None` where nothing was known.
+/// Rows L (phi - phi_0) of the friction that was known before, L'L the inverse of its covariance, times root `strength`.
 fn prior(
     before: &RegressorColumns,
     now: &RegressorColumns,
@@ -105,27 +100,19 @@ fn prior(
         let (Some(known), Some(present)) = (known, &now.known[j]) else {
             continue;
         };
-        let size: Vec<f64> = (0..GRADIENT)
-            .map(|k| known.covariance[k][k].max(0.0).sqrt())
-            .collect();
+        let size: [f64; GRADIENT] = std::array::from_fn(|k| known.covariance[k][k].max(0.0).sqrt());
         // correlations, so that parameters of all units compare
         let scaled = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| match size[a] * size[b] {
             s if s > 0.0 => known.covariance[a][b] / s,
             _ => 0.0,
         });
         let svd = rank::svd(&scaled)?;
-        let off: Vec<f64> = present
-            .law
-            .parameters()
-            .iter()
-            .zip(known.law.parameters())
-            .map(|(now, before)| before - now)
-            .collect();
+        let [now, before] = [present, known].map(|known| known.law.parameters());
         for (i, s) in svd.s.iter().enumerate().filter(|(_, s)| **s > 1e-10) {
             let mut row = vec![0.0; u + 1];
             for (at, k) in free.law_unknowns(j).filter(|(_, k)| size[*k] > 0.0) {
                 row[at] = (strength / s).sqrt() * svd.v[(k, i)] / size[k];
-                row[u] += row[at] * off[k];
+                row[u] += row[at] * (before[k] - now[k]);
             }
             rows.push(row);
         }
@@ -147,11 +134,8 @@ fn damped(
     let mut rows = prior.map_or(DMatrix::zeros(0, u + 1), |p| p.rows.clone());
     for (j, own) in factors.columns.own.iter().enumerate() {
         let r = factors.joint(j);
-        for (k, _) in own
-            .iter()
-            .enumerate()
-            .filter(|(_, o)| matches!(o, Own::Law(_)))
-        {
+        let of_law = own.iter().enumerate();
+        for (k, _) in of_law.filter(|(_, own)| matches!(own, Own::Law(_))) {
             let size = weights[j] * r.column(factors.columns.shared + k).norm();
             let at = rows.nrows();
             rows = rows.insert_row(at, 0.0);
@@ -164,14 +148,10 @@ fn damped(
     }
 }
 
-/// Places of each joint's own terms that are no part of a law.
-fn without_law(columns: &RegressorColumns) -> Vec<Vec<usize>> {
-    let linear = |own: &Vec<Own>| {
-        let all = own.iter().enumerate();
-        let kept = all.filter(|(_, o)| !matches!(o, Own::Law(_)));
-        kept.map(|(k, _)| k).collect()
-    };
-    columns.own.iter().map(linear).collect()
+/// The rows without the terms of laws.
+fn without_law(factors: &BlockFactors) -> BlockFactors {
+    let linear = |own: &Own| !matches!(own, Own::Law(_));
+    factors.with_own(&factors.columns.places(linear))
 }
 
 /// Least cost that the linear parameters reach with the law as it stands.
@@ -183,7 +163,7 @@ fn cost(
     let u = factors.columns.unknowns();
     let inputs = FitInputs::weighted(weights, None);
     let known = prior.map_or(0.0, |p| p.rows.column(u).norm_squared());
-    Ok(least_square(&factors.with_own(&without_law(&factors.columns)), inputs)? + known)
+    Ok(least_square(&without_law(factors), inputs)? + known)
 }
 
 /// A point of the descent: the friction, the rows about it, and the least cost there.
@@ -232,12 +212,9 @@ impl DescentPoint {
         let mut fit = fit_with(&self.factors, inputs)?;
         let found = linear_fit(&self.factors)?;
         fit.theta.fill(0.0);
-        for c in 0..linear.shared {
-            fit.theta[c] = found.theta[c];
-        }
         for j in 0..linear.joints {
-            for k in 0..linear.own[j].len() {
-                fit.theta[all.first_own(j) + k] = found.theta[linear.first_own(j) + k];
+            for c in 0..linear.unknowns_of(j) {
+                fit.theta[all.unknown(j, c)] = found.theta[linear.unknown(j, c)];
             }
         }
         add_laws(linear, &mut fit.theta);
@@ -249,10 +226,7 @@ impl DescentPoint {
 
 /// The fit of all but the laws.
 fn linear_fit(factors: &BlockFactors) -> Result<Fit, FitError> {
-    fit(
-        &factors.with_own(&without_law(&factors.columns)),
-        Weighting::Wls,
-    )
+    fit(&without_law(factors), Weighting::Wls)
 }
 
 /// Rms speed of each joint that has a law; 0 of the others.
@@ -339,19 +313,16 @@ fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> Regr
         let Some(known) = known else { continue };
         let mut p = known.law.parameters();
         for (at, k) in free.law_unknowns(j) {
-            let p = &mut p[k];
-            let wanted = *p + step[at];
-            *p = if k >= 3 {
-                let steepest = if speed[j] > 0.0 {
-                    STEEPEST / speed[j]
-                } else {
-                    f64::MAX
+            let (before, wanted) = (p[k], p[k] + step[at]);
+            p[k] = wanted;
+            if k >= 3 {
+                let steepest = match speed[j] {
+                    speed if speed > 0.0 => STEEPEST / speed,
+                    _ => f64::MAX,
                 };
-                let (low, high) = (*p / FARTHEST, *p * FARTHEST);
-                wanted.clamp(low.min(high), high.max(low)).min(steepest)
-            } else {
-                wanted
-            };
+                let (low, high) = (before / FARTHEST, before * FARTHEST);
+                p[k] = wanted.clamp(low.min(high), high.max(low)).min(steepest);
+            }
         }
         known.law = DoubleTanh::from_parameters(p);
     }
@@ -361,44 +332,34 @@ fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> Regr
 #[cfg(test)]
 mod tests {
     use super::super::BLOCK_SECONDS;
-    use super::super::accumulate::Accumulator;
     use super::super::columns::KnownFriction;
     use super::super::law_start::begin;
     use super::*;
-    use crate::robot::{JointKind, Robot};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     const INERTIA: f64 = 3.0;
     const LAW: [f64; 5] = [2.0, 1.4, -0.5, 60.0, 6.0];
 
-    fn columns(own: Vec<Own>, known: Option<KnownFriction>) -> RegressorColumns {
-        RegressorColumns {
-            joints: 1,
-            shared: 1,
-            own: vec![own],
-            known: vec![known],
-            rest_speed: Vec::new(),
-        }
+    /// Inertia, offset and law: the unknowns of a refined fit.
+    const TRUTH: [f64; 7] = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
+
+    fn linear() -> RegressorColumns {
+        RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb, Own::Offset], None)
     }
 
     /// Rows of a joint with inertia and law, of which every speed is seen often.
     fn read(columns: &RegressorColumns, noise: f64, seed: u64) -> Result<BlockFactors, FitError> {
-        let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let law = DoubleTanh::from_parameters(LAW);
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
-        let mut all = Accumulator::new(columns.clone(), BLOCK_SECONDS);
-        let mut channels = vec![0.0; columns.channels()];
-        for k in 0..6000 {
+        let rows = (0..6000).map(|k| {
             let t = f64::from(k) * 0.01;
             let v = 0.6 * (0.9 * t).sin() * (0.13 * t).cos();
             let a = draw();
-            let tau = INERTIA * a + law.torque(v) + 0.3 + noise * draw();
-            columns.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-            all.add(0, 0.01, &channels);
-        }
-        Ok(all.finish())
+            [v, a, INERTIA * a + law.torque(v) + 0.3 + noise * draw()]
+        });
+        Ok(columns.rows_of_one(BLOCK_SECONDS, rows))
     }
 
     #[test]
@@ -412,30 +373,23 @@ mod tests {
                 b * v + f1 * (w1 * v).tanh() + f2 * (w2 * v).tanh()
             };
             let (_, dual) = gradient(torque, &nalgebra::SVector::from(LAW));
-            for k in 0..5 {
-                assert!(
-                    (exact[k] - dual[k]).abs() < 1e-12,
-                    "{k} at {v}: {} {}",
-                    exact[k],
-                    dual[k]
-                );
+            for (k, (exact, dual)) in exact.iter().zip(&dual).enumerate() {
+                assert!((exact - dual).abs() < 1e-12, "{k} at {v}: {exact} {dual}");
             }
         }
     }
 
     #[test]
     fn a_law_without_one_joint_logs_is_found_with_the_inertia() {
-        let linear = columns(vec![Own::Viscous, Own::Coulomb, Own::Offset], None);
         let mut passes = 0;
         let mut pass = |c: &RegressorColumns| {
             passes += 1;
             read(c, 0.0, 1)
         };
-        let start = begin(&linear, &mut pass).unwrap();
+        let start = begin(&linear(), &mut pass).unwrap();
         let found = refine(start, &mut pass).unwrap();
         assert_eq!(found.ending, Ending::Converged);
-        let truth = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
-        for (i, truth) in truth.into_iter().enumerate() {
+        for (i, truth) in TRUTH.into_iter().enumerate() {
             let off = (found.fit.theta[i] / truth - 1.0).abs();
             assert!(off < 1e-6, "unknown {i}: {} {truth}", found.fit.theta[i]);
         }
@@ -444,14 +398,12 @@ mod tests {
 
     #[test]
     fn intervals_of_a_refined_law_cover() {
-        let linear = columns(vec![Own::Viscous, Own::Coulomb, Own::Offset], None);
-        let truth = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
         let mut covered = [0; 7];
         for seed in 0..60 {
             let mut pass = |c: &RegressorColumns| read(c, 0.05, seed);
-            let start = begin(&linear, &mut pass).unwrap();
+            let start = begin(&linear(), &mut pass).unwrap();
             let found = refine(start, &mut pass).unwrap();
-            for (i, truth) in truth.into_iter().enumerate() {
+            for (i, truth) in TRUTH.into_iter().enumerate() {
                 let std = found.fit.covariance[(i, i)].sqrt();
                 covered[i] += u32::from((found.fit.theta[i] - truth).abs() < 1.96 * std);
             }
@@ -469,15 +421,12 @@ mod tests {
             for (k, row) in covariance.iter_mut().enumerate() {
                 row[k] = (sure * LAW[k]).powi(2);
             }
-            let law = DoubleTanh::from_parameters(off);
-            let known = columns(
-                vec![Own::Offset],
-                Some(KnownFriction {
-                    law,
-                    covariance,
-                    held: [false; GRADIENT],
-                }),
-            );
+            let known = KnownFriction {
+                law: DoubleTanh::from_parameters(off),
+                covariance,
+                held: [false; GRADIENT],
+            };
+            let known = RegressorColumns::of_one(&[Own::Offset], Some(known));
             let found = refine(known, &mut |c: &RegressorColumns| read(c, 0.02, 5)).unwrap();
             let viscous = found.fit.theta[2];
             let near = if stays { off[0] } else { LAW[0] };

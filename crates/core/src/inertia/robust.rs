@@ -8,8 +8,6 @@
 //! section 2.7). Each pass streams over the logs: medians come from histograms of fixed size.
 
 use nalgebra::DVector;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::accumulate::BlockFactors;
 use super::columns::RegressorColumns;
@@ -36,8 +34,7 @@ const RATIO: f64 = 1.01;
 const LOWEST: f64 = 1e-6;
 
 /// How a residual of u scales counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy)]
 enum Loss {
     /// All rows alike.
     Square,
@@ -66,20 +63,16 @@ impl Loss {
         match self {
             Loss::Square => 1.0,
             Loss::Huber => f64::from(u8::from(u.abs() <= HUBER)),
-            Loss::Bisquare => {
-                let x = (u / BISQUARE).powi(2);
-                if x < 1.0 {
-                    (1.0 - x) * (1.0 - 5.0 * x)
-                } else {
-                    0.0
-                }
-            }
+            Loss::Bisquare => match (u / BISQUARE).powi(2) {
+                x if x < 1.0 => (1.0 - x) * (1.0 - 5.0 * x),
+                _ => 0.0,
+            },
         }
     }
 }
 
 /// Counts of absolute residuals of one joint, and what their weights sum up to.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Tally {
     /// Residual of the first bin's upper edge [N or Nm].
     lowest: f64,
@@ -97,20 +90,15 @@ impl Tally {
         Tally {
             lowest: LOWEST * rms,
             bins: vec![0; BINS],
-            rows: 0,
-            down: 0,
-            weight: 0.0,
-            slope: 0.0,
-            square: 0.0,
+            ..Tally::default()
         }
     }
 
     fn add(&mut self, residual: f64, weight: f64, slope: f64) {
         let size = residual.abs();
-        let bin = if size > self.lowest && self.lowest > 0.0 {
-            ((size / self.lowest).ln() / RATIO.ln()) as usize + 1
-        } else {
-            0
+        let bin = match size > self.lowest && self.lowest > 0.0 {
+            true => ((size / self.lowest).ln() / RATIO.ln()) as usize + 1,
+            false => 0,
         };
         self.bins[bin.min(BINS - 1)] += 1;
         self.rows += 1;
@@ -151,8 +139,7 @@ pub struct Weigher {
 }
 
 impl Weigher {
-    /// Weights by the residuals of `theta`, in `scale` per joint; `rms` is about the size of a
-    /// joint's residuals.
+    /// Weights by the residuals of `theta`, in `scale` per joint; `rms` is about the size of a joint's residuals.
     fn new(loss: Loss, theta: DVector<f64>, scale: Vec<f64>, rms: &[f64]) -> Self {
         Weigher {
             loss,
@@ -204,10 +191,8 @@ impl Weigher {
 
     /// Scale of each joint's residuals, not below `floor` [N or Nm].
     fn scales(&self, floor: &[f64]) -> Vec<f64> {
-        let tallies = self.tally.iter().zip(floor);
-        tallies
-            .map(|(t, f)| (NORMAL * t.median()).max(*f))
-            .collect()
+        let scale = |(t, f): (&Tally, &f64)| (NORMAL * t.median()).max(*f);
+        self.tally.iter().zip(floor).map(scale).collect()
     }
 
     /// The fit of block factors that this weigher has weighted.
@@ -217,12 +202,9 @@ impl Weigher {
     pub fn solve(&self, factors: &BlockFactors) -> Result<Fit, FitError> {
         let inverse = |s: &f64| if *s > 0.0 { 1.0 / s } else { 0.0 };
         let weights: Vec<f64> = self.scale.iter().map(inverse).collect();
-        let share = |t: &Tally| {
-            if t.weight > 0.0 {
-                (t.slope / t.weight).max(LEAST_SLOPE)
-            } else {
-                1.0
-            }
+        let share = |t: &Tally| match t.weight > 0.0 {
+            true => (t.slope / t.weight).max(LEAST_SLOPE),
+            false => 1.0,
         };
         let slope: Vec<f64> = self.tally.iter().map(share).collect();
         let inputs = FitInputs {
@@ -324,21 +306,14 @@ mod tests {
 
     const TRUTH: [f64; 3] = [3.0, 2.0, 0.7];
 
-    /// Rows of a joint with inertia 3, Fv 2 and Fc 0.7, read as often as a fit asks for them; a
-    /// share of them is hit by a force of 40 that always pushes forward.
+    /// Rows of a joint with inertia 3, Fv 2 and Fc 0.7; a share of them is hit by a force of 40 that pushes forward.
     fn read(
         hit: f64,
         seed: u64,
         mut weigher: Option<&mut Weigher>,
     ) -> Result<BlockFactors, FitError> {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let columns = RegressorColumns {
-            joints: 1,
-            shared: 1,
-            own: vec![vec![Own::Viscous, Own::Coulomb]],
-            known: vec![None],
-            rest_speed: Vec::new(),
-        };
+        let columns = RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb], None);
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
         let mut all = Accumulator::new(columns.clone(), BLOCK_SECONDS);
@@ -374,11 +349,8 @@ mod tests {
         // the spikes and 1.1 % of the others
         let share = robust.down_weighted[0];
         assert!((0.025..0.037).contains(&share), "{share}");
-        assert!(
-            (robust.scale[0] / 0.1 - 1.0).abs() < 0.06,
-            "{}",
-            robust.scale[0]
-        );
+        let scale = robust.scale[0];
+        assert!((scale / 0.1 - 1.0).abs() < 0.06, "{scale}");
         // the rms that is reported is that of all rows
         assert!(robust.fit.residual_std[0] > 5.0);
     }
@@ -390,11 +362,12 @@ mod tests {
             let plain = fit(&read(0.0, seed, None).unwrap(), Weighting::Wls).unwrap();
             let robust = irls(&mut |w| read(0.0, seed, w)).unwrap();
             for (i, truth) in TRUTH.into_iter().enumerate() {
-                let std = |fit: &Fit| fit.covariance[(i, i)].sqrt();
-                assert!((robust.fit.theta[i] - plain.theta[i]).abs() < 1.5 * std(&plain));
-                assert!(std(&robust.fit) < 1.3 * std(&plain));
-                covered[i] +=
-                    u32::from((robust.fit.theta[i] - truth).abs() < 1.96 * std(&robust.fit));
+                let [std, of_plain] =
+                    [&robust.fit, &plain].map(|fit| fit.covariance[(i, i)].sqrt());
+                let found = robust.fit.theta[i];
+                assert!((found - plain.theta[i]).abs() < 1.5 * of_plain);
+                assert!(std < 1.3 * of_plain);
+                covered[i] += u32::from((found - truth).abs() < 1.96 * std);
             }
         }
         // of 100 draws of 0.95 fewer than 87 come in 0.1 % of all tests
@@ -416,9 +389,8 @@ mod tests {
     fn the_histogram_s_median_is_the_sorted_one() {
         let mut tally = Tally::new(1.0);
         let mut chance = ChaCha8Rng::seed_from_u64(4);
-        let mut all: Vec<f64> = (0..5001)
-            .map(|_| chance.random::<f64>().powi(3) * 7.0)
-            .collect();
+        let mut draw = || chance.random::<f64>().powi(3) * 7.0;
+        let mut all: Vec<f64> = (0..5001).map(|_| draw()).collect();
         for x in &all {
             tally.add(-*x, 1.0, 1.0);
         }

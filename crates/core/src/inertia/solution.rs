@@ -84,9 +84,8 @@ pub(super) fn joints(factors: &BlockFactors) -> Result<Vec<DMatrix<f64>>, FitErr
     if rows < 2 * u as u64 {
         return Err(FitError::TooFewRows { rows, unknowns: u });
     }
-    Ok((0..factors.columns.joints)
-        .map(|j| factors.joint(j))
-        .collect())
+    let joints = 0..factors.columns.joints;
+    Ok(joints.map(|j| factors.joint(j)).collect())
 }
 
 /// Weighted solution with the directions that the data leave open fixed at zero.
@@ -120,9 +119,8 @@ pub(super) fn stacked(
             factor.fold(&row);
         }
     }
-    for known in prior.iter().flat_map(|prior| prior.rows.row_iter()) {
-        row.iter_mut().zip(&known).for_each(|(row, x)| *row = *x);
-        factor.fold(&row);
+    if let Some(prior) = prior {
+        factor.fold(prior.rows.transpose().as_slice());
     }
     factor.r()
 }
@@ -137,11 +135,8 @@ pub(super) fn conditions(x: &DMatrix<f64>) -> Result<(ConditionNumbers, usize), 
         }
     }
     let normalised = rank::svd(&scaled)?;
-    let k = normalised
-        .s
-        .iter()
-        .filter(|s| **s > RANK_TOLERANCE * normalised.s[0])
-        .count();
+    let shown = |s: &&f64| **s > RANK_TOLERANCE * normalised.s[0];
+    let k = normalised.s.iter().filter(shown).count();
     if k == 0 || normalised.s[0] == 0.0 {
         return Err(FitError::NothingExcited);
     }
@@ -156,12 +151,10 @@ pub(super) fn conditions(x: &DMatrix<f64>) -> Result<(ConditionNumbers, usize), 
     ))
 }
 
-/// Singular values of the scaled columns below this share of the largest carry nothing but
-/// rounding and the differentiation's own error.
+/// Singular values of the scaled columns below this share of the largest are rounding and errors of differentiation.
 const RANK_TOLERANCE: f64 = 1e-8;
-/// A combination of unknowns whose torque has a standard deviation of so many times the whole torque is not taken from
-/// the data: what they give for it is noise, and huge where the combination shows in other motion. Its values are the
-/// nearest to zero, and its deviation stays. Five or twenty change none of the measured sets.
+/// Standard deviation of a combination's torque over the whole torque from which on its values are the nearest to zero.
+// what the data give for it is noise, and huge where it shows in other motion; 5 or 20 change none of the measured sets
 const OPEN_DEVIATION: f64 = 10.0;
 /// Share of an unknown in an open direction from which on it counts as not determined.
 const SHARE: f64 = 1e-3;
@@ -179,24 +172,23 @@ pub(super) fn solve(
     let unscale = |i: usize| if scale[i] > 0.0 { 1.0 / scale[i] } else { 0.0 };
     let scaled = DMatrix::from_fn(r.nrows(), u, |i, j| r[(i, j)] * unscale(j));
     let svd = rank::svd(&scaled)?;
-    let kept: Vec<usize> = (0..svd.s.len())
-        .filter(|&k| svd.s[k] > RANK_TOLERANCE * svd.s[0])
-        .collect();
+    let kept = |k: &usize| svd.s[*k] > RANK_TOLERANCE * svd.s[0];
+    let (kept, lost): (Vec<usize>, Vec<usize>) = (0..svd.s.len()).partition(kept);
     let target = r.column(u);
     let rows: u64 = factors.moving.iter().map(|rows| rows.count).sum();
     let noise = r[(u, u)].abs() / (rows.max(1) as f64).sqrt();
     let least = noise / (OPEN_DEVIATION * target.norm()).max(f64::MIN_POSITIVE);
     let mut z = DVector::zeros(u);
     let mut inverse = DMatrix::zeros(u, u);
-    for &k in &kept {
+    for k in kept {
         let v = svd.v.column(k);
         if svd.s[k] > least {
             z += v * (svd.u.column(k).dot(&target) / svd.s[k]);
         }
         inverse += v * v.transpose() / (svd.s[k] * svd.s[k]);
     }
-    let lost = (0..svd.s.len()).filter(|k| !kept.contains(k));
-    let confounded = open_directions(lost.map(|k| svd.v.column(k).into_owned()), &scale);
+    let lost = lost.into_iter().map(|k| svd.v.column(k).into_owned());
+    let confounded = open_directions(lost, &scale);
     let mut determined = vec![true; u];
     for (i, _) in confounded.iter().flat_map(|c| &c.terms) {
         determined[*i] = false;
@@ -242,13 +234,10 @@ pub(super) fn residual_std(
     joints: &[DMatrix<f64>],
     theta: &DVector<f64>,
 ) -> Vec<f64> {
-    joints
-        .iter()
-        .enumerate()
-        .map(|(j, r)| {
-            let own = factors.own_unknowns(theta, j);
-            let rows = factors.moving[j].count.max(1);
-            (factors.parts(r, j).residual_square(&own) / rows as f64).sqrt()
-        })
-        .collect()
+    let of = |(j, r): (usize, &DMatrix<f64>)| {
+        let own = factors.own_unknowns(theta, j);
+        let rows = factors.moving[j].count.max(1);
+        (factors.parts(r, j).residual_square(&own) / rows as f64).sqrt()
+    };
+    joints.iter().enumerate().map(of).collect()
 }

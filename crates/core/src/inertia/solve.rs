@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::accumulate::{BlockFactors, JointRows, RelativeResidual};
-use super::covariance::covariance;
+use super::covariance::{Covariances, covariance};
 use super::solution::{
     ConditionNumbers, Confounded, FitError, FitInputs, conditions, joints, residual_std, solve,
     stacked,
@@ -71,9 +71,6 @@ pub fn fit(factors: &BlockFactors, estimator: Weighting) -> Result<Fit, FitError
 }
 
 /// Fits all unknowns of the block factors with weights and prior given.
-///
-/// # Errors
-/// [`FitError`].
 pub(super) fn fit_with(factors: &BlockFactors, inputs: FitInputs) -> Result<Fit, FitError> {
     finish(factors, &joints(factors)?, inputs)
 }
@@ -81,7 +78,7 @@ pub(super) fn fit_with(factors: &BlockFactors, inputs: FitInputs) -> Result<Fit,
 /// Weight of each joint's rows from the standard deviation of its residual [N or Nm].
 pub fn weights_of(factors: &BlockFactors, residual: &[f64]) -> Vec<f64> {
     let of = |(s, t): (&f64, &JointRows)| {
-        let floor = 1e-9 * (t.torque_square / t.count.max(1) as f64).sqrt();
+        let floor = 1e-9 * t.torque_rms();
         match s.max(floor) {
             0.0 => 0.0,
             s => 1.0 / s,
@@ -119,25 +116,15 @@ fn finish(
     let (n, u) = (columns.joints, columns.unknowns());
     let whole = stacked(factors, joints, &vec![1.0; n], None);
     let (condition, rank) = conditions(&whole.columns(0, u).into_owned())?;
-    let weights = inputs.weights;
-    let mut solution = solve(factors, joints, weights, inputs.prior)?;
+    let mut solution = solve(factors, joints, inputs.weights, inputs.prior)?;
     let residual = residual_std(factors, joints, &solution.theta);
     if let Some(slope) = inputs.slope {
-        let bread: Vec<f64> = weights
-            .iter()
-            .zip(slope)
-            .map(|(w, s)| w * s.sqrt())
-            .collect();
+        let bread = inputs.weights.iter().zip(slope);
+        let bread: Vec<f64> = bread.map(|(w, s)| w * s.sqrt()).collect();
         solution.inverse = solve(factors, joints, &bread, inputs.prior)?.inverse;
     }
-    let (covariance, textbook, sensitivity) =
-        covariance(factors, joints, &solution, inputs, &residual);
+    let covariances = covariance(factors, joints, &solution, inputs, &residual);
     let rows = factors.rows_per_joint();
-    let torque_rms: Vec<f64> = factors
-        .moving
-        .iter()
-        .map(|rows| (rows.torque_square / rows.count.max(1) as f64).sqrt())
-        .collect();
     let error = |j: usize| {
         let moving = residual[j].powi(2) * factors.moving[j].count as f64;
         factors.relative_residual(j, [moving, factors.square_at_rest(&solution.theta, j)])
@@ -150,27 +137,27 @@ fn finish(
             column_rms[(j, columns.unknown(j, c))] = r.column(c).norm() / of_joint.sqrt();
         }
     }
-    let effective = (0..u)
-        .filter(|&i| solution.determined[i] && covariance.sandwich[(i, i)] > 0.0)
-        .map(|i| textbook[(i, i)] / covariance.sandwich[(i, i)])
-        .collect::<Vec<_>>();
-    let effective_rows = if effective.is_empty() {
-        rows
-    } else {
-        (rows * effective.iter().sum::<f64>() / effective.len() as f64).min(rows)
+    let Covariances {
+        sandwich, textbook, ..
+    } = &covariances;
+    let sure = (0..u).filter(|&i| solution.determined[i] && sandwich[(i, i)] > 0.0);
+    let effective: Vec<f64> = sure.map(|i| textbook[(i, i)] / sandwich[(i, i)]).collect();
+    let effective_rows = match effective.len() {
+        0 => rows,
+        n => (rows * effective.iter().sum::<f64>() / n as f64).min(rows),
     };
     Ok(Fit {
         theta: solution.theta,
-        covariance: covariance.total,
-        textbook,
-        friction_sensitivity: sensitivity,
+        covariance: covariances.total,
+        textbook: covariances.textbook,
+        friction_sensitivity: covariances.sensitivity,
         determined: solution.determined,
         confounded: solution.confounded,
         condition,
         rank,
         residual_std: residual,
         relative_error,
-        torque_rms,
+        torque_rms: factors.moving.iter().map(JointRows::torque_rms).collect(),
         column_rms,
         rows: rows.round() as u64,
         effective_rows,
@@ -180,11 +167,9 @@ fn finish(
 #[cfg(test)]
 mod tests {
     use super::super::BLOCK_SECONDS;
-    use super::super::accumulate::Accumulator;
     use super::super::columns::{KnownFriction, Own, RegressorColumns};
     use super::*;
     use crate::robot::friction::DoubleTanh;
-    use crate::robot::{JointKind, Robot};
 
     /// Chance that needs no crate: uniform in (-1, 1).
     struct Chance(u64);
@@ -197,59 +182,39 @@ mod tests {
         }
     }
 
-    fn columns(own: Vec<Own>, known: Option<KnownFriction>) -> RegressorColumns {
-        RegressorColumns {
-            joints: 1,
-            shared: 1,
-            own: vec![own],
-            known: vec![known],
-            rest_speed: Vec::new(),
-        }
+    fn viscous_and_coulomb() -> RegressorColumns {
+        RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb], None)
     }
 
-    /// Rows of a joint with inertia 3, Fv 2, Fc 0.7 and, where it is known, that friction.
-    fn factors(
-        columns: &RegressorColumns,
-        rows: usize,
-        noise: f64,
-        correlation: f64,
+    /// Speed, acceleration and force of a joint with inertia 3 and a friction, and noise of a correlation.
+    fn rows(
+        friction: impl Fn(f64) -> f64,
+        count: usize,
+        [noise, correlation]: [f64; 2],
         seed: u64,
-    ) -> BlockFactors {
-        in_blocks(BLOCK_SECONDS, columns, rows, noise, correlation, seed)
-    }
-
-    fn in_blocks(
-        block: f64,
-        columns: &RegressorColumns,
-        rows: usize,
-        noise: f64,
-        correlation: f64,
-        seed: u64,
-    ) -> BlockFactors {
-        let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let mut chance = Chance(seed * 2 + 12345);
-        let mut all = Accumulator::new(columns.clone(), block);
-        let mut channels = vec![0.0; columns.channels()];
-        let mut e = 0.0;
-        for k in 0..rows {
+    ) -> impl Iterator<Item = [f64; 3]> {
+        let (mut chance, mut e) = (Chance(seed * 2 + 12345), 0.0);
+        (0..count).map(move |k| {
             let t = k as f64 * 0.01;
             let (v, a) = ((0.9 * t).sin() + 0.4 * (2.3 * t).cos(), chance.next());
             e = correlation * e + (1.0 - correlation * correlation).sqrt() * noise * chance.next();
-            let friction = match &columns.known[0] {
-                Some(known) => known.law.torque(v),
-                None => 2.0 * v + 0.7 * v.signum(),
-            };
-            let tau = 3.0 * a + friction + e;
-            columns.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-            all.add(0, 0.01, &channels);
-        }
-        all.finish()
+            [v, a, 3.0 * a + friction(v) + e]
+        })
+    }
+
+    /// Those of Fv 2 and Fc 0.7 in blocks.
+    fn in_blocks(block: f64, count: usize, noise: [f64; 2], seed: u64) -> BlockFactors {
+        let friction = |v: f64| 2.0 * v + 0.7 * v.signum();
+        viscous_and_coulomb().rows_of_one(block, rows(friction, count, noise, seed))
+    }
+
+    fn factors(count: usize, noise: [f64; 2], seed: u64) -> BlockFactors {
+        in_blocks(BLOCK_SECONDS, count, noise, seed)
     }
 
     #[test]
     fn exact_rows_give_the_exact_parameters() {
-        let c = columns(vec![Own::Viscous, Own::Coulomb], None);
-        let fit = fit(&factors(&c, 3000, 0.0, 0.0, 1), Weighting::Ols).unwrap();
+        let fit = fit(&factors(3000, [0.0; 2], 1), Weighting::Ols).unwrap();
         for (found, truth) in fit.theta.iter().zip([3.0, 2.0, 0.7]) {
             assert!((found - truth).abs() < 1e-12, "{found} {truth}");
         }
@@ -259,15 +224,14 @@ mod tests {
 
     #[test]
     fn blocks_that_merge_change_neither_fit_nor_score() {
-        let c = columns(vec![Own::Viscous, Own::Coulomb], None);
-        let many = factors(&c, 60_000, 0.1, 0.9, 2);
+        let many = factors(60_000, [0.1, 0.9], 2);
         assert!(many.blocks.len() <= 512);
         assert_eq!(many.blocks.iter().map(|b| b.rows).sum::<u64>(), 60_000);
         let halved = fit(&many, Weighting::Ols).unwrap();
-        let whole = fit(&in_blocks(1e9, &c, 60_000, 0.1, 0.9, 2), Weighting::Ols).unwrap();
+        let whole = fit(&in_blocks(1e9, 60_000, [0.1, 0.9], 2), Weighting::Ols).unwrap();
         assert!((&halved.theta - &whole.theta).amax() < 1e-12);
-        let mut merged = factors(&c, 60_000, 0.1, 0.9, 2);
-        merged.merge(factors(&c, 500, 0.1, 0.9, 3));
+        let mut merged = many.clone();
+        merged.merge(factors(500, [0.1, 0.9], 3));
         assert_eq!(merged.rows, 60_500);
         // of two logs the second begins a stretch of its own
         assert!(merged.blocks.last().unwrap().stretch > many.blocks.last().unwrap().stretch);
@@ -275,11 +239,10 @@ mod tests {
 
     #[test]
     fn intervals_cover_under_white_and_under_correlated_residuals() {
-        let c = columns(vec![Own::Viscous, Own::Coulomb], None);
         for correlation in [0.0, 0.95] {
             let (mut covered, mut textbook, runs) = ([0; 3], [0; 3], 200);
             for seed in 0..runs {
-                let s = factors(&c, 4000, 0.3, correlation, 10 + seed);
+                let s = factors(4000, [0.3, correlation], 10 + seed);
                 let fit = fit(&s, Weighting::Wls).unwrap();
                 for (i, truth) in [3.0, 2.0, 0.7].into_iter().enumerate() {
                     let off = (fit.theta[i] - truth).abs();
@@ -291,10 +254,7 @@ mod tests {
                 // 200 draws of 0.95 stay above 178 in 99.9 % of all tests; 40 correlated seconds
                 // leave a few per cent to the asymptotics
                 let least = if correlation > 0.0 { 170 } else { 178 };
-                assert!(
-                    *n >= least,
-                    "correlation {correlation}, unknown {i}: {n} of 200"
-                );
+                assert!(*n >= least, "correlation {correlation}, unknown {i}: {n}");
             }
             if correlation > 0.0 {
                 // the count of rows as if they were independent does not cover: friction's
@@ -306,19 +266,14 @@ mod tests {
 
     #[test]
     fn columns_that_the_motion_cannot_part_are_named_and_not_numbered() {
-        let c = columns(vec![Own::Viscous, Own::Coulomb, Own::Offset], None);
-        let mut all = Accumulator::new(c.clone(), BLOCK_SECONDS);
-        let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let mut channels = vec![0.0; c.channels()];
+        let columns = RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb, Own::Offset], None);
         let mut chance = Chance(99);
-        for _ in 0..2000 {
+        let rows = (0..2000).map(|_| {
             // always forward: Coulomb friction and offset are one column
             let (v, a) = (1.0 + 0.5 * chance.next(), chance.next());
-            let tau = 3.0 * a + 2.0 * v + 0.7;
-            c.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-            all.add(0, 0.01, &channels);
-        }
-        let fit = fit(&all.finish(), Weighting::Wls).unwrap();
+            [v, a, 3.0 * a + 2.0 * v + 0.7]
+        });
+        let fit = fit(&columns.rows_of_one(BLOCK_SECONDS, rows), Weighting::Wls).unwrap();
         assert_eq!(fit.rank, 3);
         assert_eq!(fit.determined, [true, true, false, false]);
         assert_eq!(fit.condition.raw, None);
@@ -336,46 +291,28 @@ mod tests {
         for (i, row) in covariance.iter_mut().enumerate() {
             row[i] = (0.05 * law.parameters()[i]).powi(2);
         }
-        let with = columns(
-            vec![],
-            Some(KnownFriction {
-                law,
+        // the torque of this law, read with another one
+        let read = |as_law: DoubleTanh| {
+            let known = KnownFriction {
+                law: as_law,
                 covariance,
                 held: [false; 5],
-            }),
-        );
-        let base = fit(&factors(&with, 3000, 0.0, 0.0, 4), Weighting::Ols).unwrap();
+            };
+            let rows = rows(|v| law.torque(v), 3000, [0.0; 2], 4);
+            let rows = RegressorColumns::of_one(&[], Some(known)).rows_of_one(BLOCK_SECONDS, rows);
+            fit(&rows, Weighting::Ols).unwrap()
+        };
+        let base = read(law);
         let s = base.friction_sensitivity[0].clone().unwrap();
-        // the same torque, read with each friction parameter a little off
         for k in 0..5 {
             let mut p = law.parameters();
             let step = 1e-5 * p[k].abs();
             p[k] += step;
-            let robot = Robot::single_joint("q1", JointKind::Prismatic);
-            let off = columns(
-                vec![],
-                Some(KnownFriction {
-                    law: DoubleTanh::from_parameters(p),
-                    covariance,
-                    held: [false; 5],
-                }),
-            );
-            let mut all = Accumulator::new(off.clone(), BLOCK_SECONDS);
-            let mut channels = vec![0.0; off.channels()];
-            let mut chance = Chance(4 * 2 + 12345);
-            for i in 0..3000 {
-                let t = f64::from(i) * 0.01;
-                let (v, a) = ((0.9 * t).sin() + 0.4 * (2.3 * t).cos(), chance.next());
-                chance.next();
-                let tau = 3.0 * a + law.torque(v);
-                off.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-                all.add(0, 0.01, &channels);
-            }
-            let moved = fit(&all.finish(), Weighting::Ols).unwrap();
+            let moved = read(DoubleTanh::from_parameters(p));
             let difference = (moved.theta[0] - base.theta[0]) / step;
-            let size = s[(0, k)].abs().max(1e-6);
+            let off = (difference - s[(0, k)]).abs();
             assert!(
-                (difference - s[(0, k)]).abs() < 1e-3 * size,
+                off < 1e-3 * s[(0, k)].abs().max(1e-6),
                 "{k}: {difference} {s}"
             );
         }

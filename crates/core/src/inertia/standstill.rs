@@ -9,8 +9,7 @@ use super::solve::Fit;
 
 /// When samples at standstill count.
 struct Limits {
-    /// Standard deviation of a friction term's torque, as a multiple of the joint's torque, from which on motion leaves
-    /// the term open.
+    /// Standard deviation of a friction term's torque over the joint's torque from which on motion leaves the term open.
     open: f64,
     /// Square of the relative residual with samples at standstill over that without, up to which the law holds there.
     holds: f64,

@@ -30,10 +30,7 @@ impl Outlet {
     }
 }
 
-/// Runs both passes, and returns what they say.
-///
-/// # Errors
-/// That of the first pass, otherwise that of the second.
+/// Runs both passes; an error is that of the first, otherwise that of the second.
 pub(super) fn two_passes<E: Send, A: Send, B>(
     first: impl FnOnce(&mut Outlet) -> Result<A, RunError<E>> + Send,
     second: impl FnOnce(

@@ -12,10 +12,8 @@ pub fn verdict(value: f64, std: f64, determined: bool, torque_share: f64) -> (Ve
     if !determined || !std.is_finite() {
         return (Verdict::NotIdentifiable, false);
     }
-    let negligible = torque_share < NEGLIGIBLE;
-    if negligible {
-        (Verdict::Identified, true)
-    } else {
-        (verdict_of(value, std), false)
+    match torque_share < NEGLIGIBLE {
+        true => (Verdict::Identified, true),
+        false => (verdict_of(value, std), false),
     }
 }

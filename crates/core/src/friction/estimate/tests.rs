@@ -1,21 +1,17 @@
-use super::super::prepare::{SensorModel, prepare};
 use super::super::trial::FrictionTrial;
 use super::*;
 use crate::math::descent::Ending;
-use crate::robot::{JointKind, Robot};
 
 fn run(
     trial: &FrictionTrial,
     seed: u64,
     options: &Options,
 ) -> Result<JointEstimate, FrictionError> {
-    estimate(
-        "q1",
-        &["inertia".to_owned()],
-        &trial.prepared(seed),
-        None,
-        options,
-    )
+    of(&trial.prepared(seed), options)
+}
+
+fn of(prepared: &Prepared, options: &Options) -> Result<JointEstimate, FrictionError> {
+    estimate("q1", &["inertia".to_owned()], prepared, None, options)
 }
 
 fn curve_error(e: &JointEstimate, law: &DoubleTanh) -> f64 {
@@ -38,16 +34,9 @@ fn friction_inertia_and_offset_come_out_of_a_quantised_noisy_log() {
         assert!((v.value - truth).abs() < 3.5 * v.std, "{v:?} {truth}");
         assert!(v.std < 0.05 * truth.abs());
     }
-    assert!(
-        (e.nuisance[0].value - 12.0).abs() < 0.05,
-        "{:?}",
-        e.nuisance[0]
-    );
-    assert!(
-        (e.nuisance[1].value - 1.5).abs() < 0.1,
-        "{:?}",
-        e.nuisance[1]
-    );
+    for (nuisance, (truth, near)) in e.nuisance.iter().zip([(12.0, 0.05), (1.5, 0.1)]) {
+        assert!((nuisance.value - truth).abs() < near, "{nuisance:?}");
+    }
     assert!(e.nis.consistent(), "{:?}", e.nis);
     assert!((0.95..1.05).contains(&e.nis.per_sample), "{:?}", e.nis);
     assert!((e.noise.torque_std / trial.noise - 1.0).abs() < 0.3);
@@ -89,21 +78,8 @@ fn a_force_that_the_model_lacks_leaves_innovations_beyond_their_bounds() {
     for (tau, q) in motion.tau.iter_mut().zip(&motion.q) {
         *tau += 3.0 * (300.0 * q).sin();
     }
-    let robot = Robot::single_joint("q1", JointKind::Prismatic);
-    let variance = trial.step * trial.step / 12.0;
-    let sensors = SensorModel {
-        variance: &|_| variance,
-        zero_order_hold: true,
-    };
-    let prepared = prepare(&robot, 0, &[motion], &sensors).unwrap();
-    let e = estimate(
-        "q1",
-        &["inertia".to_owned()],
-        &prepared,
-        None,
-        &Options::default(),
-    );
-    let nis = e.unwrap().nis;
+    let nis = of(&trial.prepared_of(motion), &Options::default());
+    let nis = nis.unwrap().nis;
     assert!(nis.mean > 2.0 * nis.upper_95, "{nis:?}");
     // what single innovations do not show
     assert!((0.8..1.2).contains(&nis.per_sample), "{nis:?}");
@@ -116,11 +92,9 @@ fn motion_in_one_direction_is_answered_with_what_is_missing() {
     for v in &mut prepared.velocity {
         *v = v.abs();
     }
-    let error = estimate("q1", &[], &prepared, None, &Options::default()).unwrap_err();
-    assert!(
-        matches!(error, FrictionError::NeverReverses { .. }),
-        "{error}"
-    );
+    let error = of(&prepared, &Options::default()).unwrap_err();
+    let named = matches!(error, FrictionError::NeverReverses { .. });
+    assert!(named, "{error}");
     assert!(error.to_string().contains("both directions"));
 }
 

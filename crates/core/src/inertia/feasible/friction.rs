@@ -25,29 +25,17 @@ impl FrictionColumns {
     }
 }
 
-/// What of a joint's friction is held at nothing.
+/// What of a joint's friction is held at nothing: that as the joint begins to move, and that at the greatest speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Held {
-    /// Nothing.
-    Free,
-    /// Friction as the joint begins to move.
-    AtRest,
-    /// Friction at the greatest speed.
-    AtSpeed,
-    /// All of it.
-    Whole,
+struct Held {
+    at_rest: bool,
+    at_speed: bool,
 }
 
 impl Held {
-    /// What is to be held where the friction of a fit that held this would drive.
-    fn after(self, at_rest: f64, at_speed: f64) -> Self {
-        match self {
-            Self::Free if at_rest < 0.0 => Self::AtRest,
-            Self::Free if at_speed < 0.0 => Self::AtSpeed,
-            Self::AtRest if at_speed < 0.0 => Self::Whole,
-            Self::AtSpeed if at_rest < 0.0 => Self::Whole,
-            held => held,
-        }
+    /// Whether f_c follows f_v: friction is nothing at a speed that the joint reaches, and free below.
+    fn ties(self, of: &FrictionColumns) -> bool {
+        self.at_speed && !self.at_rest && of.speed.is_finite()
     }
 }
 
@@ -60,7 +48,11 @@ pub fn with_friction(
     task: &ConsistencyProblem,
     friction: &[FrictionColumns],
 ) -> Result<Feasible, FitError> {
-    let mut held = vec![Held::Free; friction.len()];
+    let free = Held {
+        at_rest: false,
+        at_speed: false,
+    };
+    let mut held = vec![free; friction.len()];
     loop {
         let factor = restricted(task.factor, friction, &held);
         let restricted = ConsistencyProblem {
@@ -70,16 +62,16 @@ pub fn with_friction(
         let mut found = feasible(&restricted)?;
         let mut next = held.clone();
         for ((of, held), next) in friction.iter().zip(&held).zip(&mut next) {
-            if *held == Held::AtSpeed && of.speed.is_finite() {
+            if held.ties(of) {
                 found.theta[of.coulomb] = -of.speed * found.theta[of.viscous];
             }
-            let at_rest = found.theta[of.coulomb];
-            // exactly nothing where it is held there
-            let at_speed = match held {
-                Held::AtSpeed => 0.0,
-                _ => of.at_speed(at_rest, found.theta[of.viscous]),
-            };
-            *next = held.after(at_rest, at_speed);
+            let (coulomb, viscous) = (found.theta[of.coulomb], found.theta[of.viscous]);
+            // one of the two at a time
+            if !held.at_rest && coulomb < 0.0 {
+                next.at_rest = true;
+            } else if !held.at_speed && of.at_speed(coulomb, viscous) < 0.0 {
+                next.at_speed = true;
+            }
         }
         if next == held {
             return Ok(found);
@@ -92,19 +84,15 @@ pub fn with_friction(
 fn restricted(factor: &DMatrix<f64>, friction: &[FrictionColumns], held: &[Held]) -> DMatrix<f64> {
     let mut out = factor.clone();
     for (of, held) in friction.iter().zip(held) {
-        match held {
-            Held::AtSpeed if of.speed.is_finite() => {
-                // f_c = - f_v times the speed
-                let both = out.column(of.viscous) - out.column(of.coulomb) * of.speed;
-                out.set_column(of.viscous, &both);
-                out.column_mut(of.coulomb).fill(0.0);
-            }
-            Held::AtSpeed => out.column_mut(of.viscous).fill(0.0),
-            Held::AtRest | Held::Whole => out.column_mut(of.coulomb).fill(0.0),
-            Held::Free => {}
-        }
-        if *held == Held::Whole {
+        if held.ties(of) {
+            // f_c = - f_v times the speed
+            let both = out.column(of.viscous) - out.column(of.coulomb) * of.speed;
+            out.set_column(of.viscous, &both);
+        } else if held.at_speed {
             out.column_mut(of.viscous).fill(0.0);
+        }
+        if held.at_rest || held.ties(of) {
+            out.column_mut(of.coulomb).fill(0.0);
         }
     }
     out
@@ -140,23 +128,21 @@ mod tests {
 
     #[test]
     fn friction_takes_power_up_to_its_speed_and_every_number_is_finite() {
-        for wanted in [
-            [0.3, 0.2],
-            [-0.3, 0.2],
-            [0.3, -0.2],
-            [-0.3, -0.2],
+        let signs = [
+            [1.0, 1.0],
+            [-1.0, 1.0],
+            [1.0, -1.0],
+            [-1.0, -1.0],
             [0.0, 0.0],
-        ] {
+        ];
+        for wanted in signs.map(|[viscous, coulomb]| [0.3 * viscous, 0.2 * coulomb]) {
             for speed in [0.0, 1.0, 1e3, f64::INFINITY] {
                 let theta = found(wanted, speed);
                 assert!(theta.iter().all(|x| x.is_finite()), "{wanted:?} {speed}");
                 let (viscous, coulomb) = (theta[1], theta[2]);
                 let fast = if speed.is_finite() { speed } else { 1e6 };
-                assert!(coulomb >= 0.0, "{wanted:?} {speed}: {theta:?}");
-                assert!(
-                    coulomb + fast * viscous >= -1e-12,
-                    "{wanted:?} {speed}: {theta:?}"
-                );
+                let takes = coulomb >= 0.0 && coulomb + fast * viscous >= -1e-12;
+                assert!(takes, "{wanted:?} {speed}: {theta:?}");
             }
         }
     }

@@ -79,8 +79,7 @@ pub struct Feasible {
 pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     let links = task.map.links.len();
     let drives = task.map.drives.len();
-    let size = STANDARD * links + drives;
-    let mut prior = DVector::zeros(size);
+    let mut prior = DVector::zeros(STANDARD * links + drives);
     let mut given = Vec::with_capacity(links);
     for i in 0..links {
         let of = |body: Body| log_cholesky::of(&pseudo_inertia(&body.standard()));
@@ -90,9 +89,8 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
             prior.rows_mut(STANDARD * i, STANDARD).copy_from_slice(&x);
         }
     }
-    prior
-        .rows_mut(STANDARD * links, drives)
-        .fill(PLAIN_DRIVE.ln());
+    let of_drives = STANDARD * links;
+    prior.rows_mut(of_drives, drives).fill(PLAIN_DRIVE.ln());
 
     let reduced = EliminatedFactor::of(task);
     let (mut x, mut iterations, mut ending) = (prior.clone(), 0, Ending::IterationLimit);
@@ -121,11 +119,7 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
         links: (0..links)
             .map(|i| std::array::from_fn(|k| standard[STANDARD * i + k]))
             .collect(),
-        drives: standard
-            .rows(STANDARD * links, drives)
-            .iter()
-            .copied()
-            .collect(),
+        drives: standard.as_slice()[of_drives..].to_vec(),
         given,
         ending,
         iterations,
@@ -157,8 +151,7 @@ pub fn nearest(
     Ok(feasible(&task)?.theta)
 }
 
-/// Standard parameters at the search's numbers, and the derivatives of each link's by its own numbers, column by column; a
-/// drive's is its own derivative.
+/// Standard parameters, and the derivatives of each link's by its own numbers, column by column; a drive's is its own.
 fn standard_at(
     map: &StandardMap,
     x: &DVector<f64>,
@@ -188,10 +181,10 @@ struct Point {
 }
 
 impl Point {
-    /// Least-squares step with the columns' own size as damping. Prior and damping have one row a number: the rows of the
-    /// data go under their triangle.
+    /// Least-squares step with the columns' own size as damping.
     fn damped_step(&self, weight: f64, damping: f64) -> DVector<f64> {
-        let (m, n) = self.jacobian.shape();
+        let n = self.jacobian.ncols();
+        // prior and damping have one row a number: the rows of the data go under their triangle
         let mut triangle = vec![0.0; (n + 1) * (n + 1)];
         for (c, column) in self.jacobian.column_iter().enumerate() {
             let size = (weight + damping * (column.norm_squared() + weight)).sqrt();
@@ -199,15 +192,9 @@ impl Point {
             triangle[c * (n + 1) + n] = -weight * self.off[c] / size;
         }
         let mut factor = RFactor::of_triangle(n + 1, triangle);
-        let mut row = vec![0.0; n + 1];
-        for i in 0..m {
-            let entries = self.jacobian.row(i);
-            row.iter_mut()
-                .zip(entries.iter())
-                .for_each(|(to, x)| *to = *x);
-            row[n] = -self.residual[i];
-            factor.fold(&row);
-        }
+        let mut rows = self.jacobian.clone().insert_column(n, 0.0);
+        rows.set_column(n, &-&self.residual);
+        factor.fold(rows.transpose().as_slice());
         let r = factor.r();
         let right = r.view((0, n), (n, 1)).column(0).into_owned();
         let square = r.view((0, 0), (n, n));
@@ -236,15 +223,9 @@ impl EliminatedFactor {
         let (mapped, mut order): (Vec<usize>, Vec<usize>) = (0..u).partition(mapped);
         let free = order.len();
         order.extend(mapped);
+        let ordered = task.factor.select_columns(&[&order[..], &[u]].concat());
         let mut factor = RFactor::new(u + 1);
-        let mut row = vec![0.0; u + 1];
-        for i in 0..task.factor.nrows() {
-            for (k, c) in order.iter().enumerate() {
-                row[k] = task.factor[(i, *c)];
-            }
-            row[u] = task.factor[(i, u)];
-            factor.fold(&row);
-        }
+        factor.fold(ordered.transpose().as_slice());
         let (r, m) = (factor.r(), u - free);
         let scale = task.effective.sqrt();
         let chosen = task.map.matrix.select_rows(&order[free..]);
@@ -289,9 +270,8 @@ impl EliminatedFactor {
             - self.r.view((0, self.free), (self.free, m)) * &known;
         let mut theta = DVector::zeros(u);
         // back substitution; a column that no row excites stays at 0
-        let largest = (0..self.free)
-            .map(|i| self.r[(i, i)].abs())
-            .fold(0.0, f64::max);
+        let sizes = (0..self.free).map(|i| self.r[(i, i)].abs());
+        let largest = sizes.fold(0.0, f64::max);
         let mut free = vec![0.0; self.free];
         for i in (0..self.free).rev() {
             let beyond: f64 = (i + 1..self.free).map(|k| self.r[(i, k)] * free[k]).sum();

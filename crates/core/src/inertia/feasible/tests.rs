@@ -1,8 +1,7 @@
 use super::*;
-use crate::robot::JointKind;
-use crate::robot::Robot;
 use crate::robot::cft::{Setup, Structure};
 use crate::robot::tree::{Coordinate, Link, Tree};
+use crate::robot::{JointKind, Robot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -31,8 +30,7 @@ fn draw(chance: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// R factor of rows at random states with this noise, for shared parameters `theta` and one
-/// offset of 0.5.
+/// R factor of rows at random states with this noise, for shared parameters `theta` and an offset of 0.5.
 fn factor(robot: &Robot, theta: &DVector<f64>, rows: usize, noise: f64) -> DMatrix<f64> {
     let mut chance = ChaCha8Rng::seed_from_u64(21);
     let (n, p) = (robot.joints(), theta.len());
@@ -100,12 +98,8 @@ fn both(
         .solve_upper_triangular(&factor.column(u).rows(0, u).into_owned())
         .unwrap();
     let found = without_priors(&map, &factor);
-    (
-        cost(&factor, &free),
-        cost(&factor, &found.theta),
-        found,
-        free,
-    )
+    let [before, after] = [&free, &found.theta].map(|theta| cost(&factor, theta));
+    (before, after, found, free)
 }
 
 /// Nearest squared distance of parameters to physically consistent ones, without a prior to speak of.
@@ -157,20 +151,15 @@ fn rows_whose_free_fit_is_inconsistent_give_links_that_are_not() {
 }
 
 #[test]
-fn a_prior_fills_what_torques_do_not_tell() {
+fn a_prior_fills_in_where_torques_determine_nothing() {
     let robot = arm();
     let map = robot.standard_map();
     let mut standard = bodies(3);
     standard.extend([PLAIN_DRIVE; 3]);
     let truth = &map.matrix * &standard;
     let factor = factor(&robot, &truth, 400, 1e-3);
-    let given: Vec<Option<Body>> = (0..3)
-        .map(|i| {
-            Some(Body::of(&std::array::from_fn(|k| {
-                standard[STANDARD * i + k]
-            })))
-        })
-        .collect();
+    let body = |i: usize| Body::of(&std::array::from_fn(|k| standard[STANDARD * i + k]));
+    let given: Vec<Option<Body>> = (0..3).map(|i| Some(body(i))).collect();
     let task = ConsistencyProblem {
         map: &map,
         bodies: &given,

@@ -14,15 +14,13 @@ use crate::inertia::covariance::{at_least, bandwidth};
 use crate::inertia::solution::FitError;
 use crate::math::rank;
 
-/// Share of a function's gradient that may lie in an open direction: rounding of the Jacobian, squared
-/// away from the tolerance of its rank.
+/// Share of a gradient that may lie in an open direction: rounding, far from the tolerance of the rank.
 const OPEN: f64 = 1e-4;
 
 /// Inverse of the weighted normal matrix, and the directions that it leaves open.
 struct Solved {
-    /// Directions that the rows determine, unknowns x their number: the normal matrix is 1 in them, and its
-    /// inverse is their square.
-    told: DMatrix<f64>,
+    /// Directions that the rows determine, in which the normal matrix is 1, unknowns x their number.
+    sure: DMatrix<f64>,
     /// Columns in scaled unknowns.
     open: DMatrix<f64>,
     scale: Vec<f64>,
@@ -37,11 +35,10 @@ impl Solved {
         let scaled = DMatrix::from_fn(r.nrows(), u, |a, c| r[(a, c)] * unscale(c));
         let svd = rank::svd(&scaled)?;
         let kept = |k: &usize| svd.s[*k] > RANK_TOLERANCE * svd.s[0];
-        let (told, open): (Vec<usize>, Vec<usize>) = (0..svd.s.len()).partition(kept);
+        let (sure, open): (Vec<usize>, Vec<usize>) = (0..svd.s.len()).partition(kept);
+        let entry = |a: usize, c: usize| svd.v[(a, sure[c])] * unscale(a) / svd.s[sure[c]];
         Ok(Solved {
-            told: DMatrix::from_fn(u, told.len(), |a, c| {
-                svd.v[(a, told[c])] * unscale(a) / svd.s[told[c]]
-            }),
+            sure: DMatrix::from_fn(u, sure.len(), entry),
             open: svd.v.select_columns(&open),
             scale,
         })
@@ -50,11 +47,11 @@ impl Solved {
     /// Whether a function of this gradient is determined by the rows.
     fn determines(&self, gradient: &DVector<f64>) -> bool {
         // an unknown of a zero column is determined by nothing
-        let told = gradient.iter().zip(&self.scale);
-        if told.clone().any(|(g, s)| *g != 0.0 && *s <= 0.0) {
+        let sure = gradient.iter().zip(&self.scale);
+        if sure.clone().any(|(g, s)| *g != 0.0 && *s <= 0.0) {
             return false;
         }
-        let scaled = told.map(|(g, s)| if *s > 0.0 { g / s } else { 0.0 });
+        let scaled = sure.map(|(g, s)| if *s > 0.0 { g / s } else { 0.0 });
         let scaled = DVector::from_iterator(gradient.len(), scaled);
         self.open.tr_mul(&scaled).norm() <= OPEN * scaled.norm()
     }
@@ -71,14 +68,13 @@ fn moments(
     problem: &Problem,
     x: &DVector<f64>,
     weights: &[f64],
-    told: &DMatrix<f64>,
+    sure: &DMatrix<f64>,
 ) -> Vec<Moment> {
-    let mut out = Vec::new();
-    let mut shift = 0;
+    let (mut out, mut shift) = (Vec::new(), 0);
     for set in &problem.sets {
         for block in &set.factors.blocks {
             let mut score = DVector::zeros(problem.unknowns());
-            let mut normal = DMatrix::zeros(told.ncols(), told.ncols());
+            let mut normal = DMatrix::zeros(sure.ncols(), sure.ncols());
             for (j, r) in block.r.iter().enumerate() {
                 let rows = problem.rows_of(x, r, j, set.loaded);
                 let own = rows.slopes.tr_mul(&rows.residual);
@@ -86,7 +82,7 @@ fn moments(
                 for (c, s) in places.iter().zip(&own) {
                     score[*c] += weights[j] * weights[j] * s;
                 }
-                let slopes = rows.slopes * told.select_rows(&places) * weights[j];
+                let slopes = rows.slopes * sure.select_rows(&places) * weights[j];
                 normal += slopes.tr_mul(&slopes);
             }
             out.push(Moment {
@@ -111,17 +107,15 @@ fn covariance(
     solved: &Solved,
 ) -> DMatrix<f64> {
     let u = problem.unknowns();
-    let told = &solved.told;
+    let sure = &solved.sure;
     let n = problem.joints() as f64;
     let rows = problem.rows.iter().sum::<f64>() / n;
     let freedom = rows / (rows - u as f64 / n).max(1.0);
     // weights are one over each joint's own noise: the normal matrix is the middle as well
-    let textbook = told * told.transpose() * freedom;
-    let moments = moments(problem, x, weights, told);
-    let scores: Vec<(usize, DVector<f64>)> = moments
-        .iter()
-        .map(|m| (m.stretch, m.score.clone()))
-        .collect();
+    let textbook = sure * sure.transpose() * freedom;
+    let moments = moments(problem, x, weights, sure);
+    let scores = moments.iter().map(|m| (m.stretch, m.score.clone()));
+    let scores: Vec<(usize, DVector<f64>)> = scores.collect();
     let sets = problem.sets.iter();
     let seconds = sets.fold(f64::INFINITY, |s, set| s.min(set.factors.block_seconds));
     let length = bandwidth(&scores, u, seconds).ceil() as usize + 1;
@@ -129,16 +123,16 @@ fn covariance(
     let mut groups = 0;
     for stretch in moments.chunk_by(|a, b| a.stretch == b.stretch) {
         for group in stretch.chunks(length) {
-            let mut left = DMatrix::identity(told.ncols(), told.ncols()) * (1.0 + LEFT);
+            let mut left = DMatrix::identity(sure.ncols(), sure.ncols()) * (1.0 + LEFT);
             let mut score = DVector::zeros(u);
             for moment in group {
                 left -= &moment.normal;
                 score += &moment.score;
             }
-            let Some(step) = left.lu().solve(&told.tr_mul(&score)) else {
+            let Some(step) = left.lu().solve(&sure.tr_mul(&score)) else {
                 continue;
             };
-            let step = told * step;
+            let step = sure * step;
             spread.ger(1.0, &step, &step, 1.0);
             groups += 1;
         }
@@ -176,15 +170,12 @@ pub(super) fn certain(problem: &Problem, found: Found) -> Result<GainFit, FitErr
         None => x[problem.mass()],
         Some(_) => 1.0,
     };
+    let between = |a: usize, b: usize| gradients[a].dot(&(&covariance * &gradients[b]));
+    let sure = |g: &DVector<f64>| g.iter().all(|x| x.is_finite()) && solved.determines(g);
     Ok(GainFit {
         channel: (0..n).map(|j| x[j] * mass).collect(),
-        covariance: DMatrix::from_fn(n, n, |a, b| {
-            gradients[a].dot(&(&covariance * &gradients[b]))
-        }),
-        determined: gradients
-            .iter()
-            .map(|g| g.iter().all(|x| x.is_finite()) && solved.determines(g))
-            .collect(),
+        covariance: DMatrix::from_fn(n, n, between),
+        determined: gradients.iter().map(sure).collect(),
         reference,
         residual_std: found.residual_std,
         iterations: found.iterations,
@@ -199,19 +190,14 @@ fn beside_one(
     variance: &dyn Fn(&DVector<f64>) -> f64,
 ) -> (usize, Vec<DVector<f64>>) {
     let beside = |reference: usize| -> Vec<DVector<f64>> {
-        gradients
-            .iter()
-            .map(|g| g - &gradients[reference])
-            .collect()
+        let all = gradients.iter();
+        all.map(|g| g - &gradients[reference]).collect()
     };
     let rated = |reference: usize| {
-        let differences = beside(reference);
-        let told: Vec<&DVector<f64>> = differences
-            .iter()
-            .filter(|g| solved.determines(g))
-            .collect();
-        let spread: f64 = told.iter().map(|g| variance(g)).sum();
-        (told.len(), spread)
+        let mut differences = beside(reference);
+        differences.retain(|g| solved.determines(g));
+        let spread: f64 = differences.iter().map(variance).sum();
+        (differences.len(), spread)
     };
     let best = (0..gradients.len())
         .map(|j| (rated(j), j))

@@ -17,19 +17,16 @@
 //! Without the mass only ratios of gains are left, for all gains and all parameters have one factor in
 //! common: the mass that the payload shows on joint j is c_j mu, and g_j = m / (c_j mu).
 
-mod carried;
 mod certainty;
 mod problem;
 mod search;
-mod start;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
-use super::solution::FitError;
+use super::solution::{FitError, joints, solve};
 use crate::math::descent::Ending;
 
-pub use carried::by_gains;
 pub use problem::PayloadColumns;
 use problem::Problem;
 
@@ -68,4 +65,29 @@ pub fn fit_gains(rows: &GainRows) -> Result<GainFit, FitError> {
     let problem = Problem::new(rows)?;
     let found = search::search(&problem)?;
     certainty::certain(&problem, found)
+}
+
+/// Derivatives of the weighted least-squares solution by the logarithm of each joint's gain, unknowns x
+/// joints: the solution for the torque of that joint alone. `shift` is what the solution of the rows lacks
+/// to the parameters, as for a law that they are linear about.
+///
+/// # Errors
+/// [`FitError`].
+pub fn by_gains(
+    factors: &BlockFactors,
+    weights: &[f64],
+    shift: &DVector<f64>,
+) -> Result<DMatrix<f64>, FitError> {
+    let columns = &factors.columns;
+    let triangles = joints(factors)?;
+    let inverse = solve(factors, &triangles, weights, None)?.inverse;
+    let mut slopes = DMatrix::zeros(columns.unknowns(), columns.joints);
+    for (j, r) in triangles.iter().enumerate() {
+        let x = r.columns(0, columns.unknowns_of(j));
+        let torque = r.column(r.ncols() - 1) + x * factors.own_unknowns(shift, j);
+        let mut whole = DVector::zeros(columns.unknowns());
+        columns.add_own(j, weights[j] * weights[j], &x.tr_mul(&torque), &mut whole);
+        slopes.set_column(j, &(&inverse * whole));
+    }
+    Ok(slopes)
 }

@@ -20,8 +20,7 @@ pub struct PayloadColumns {
     rest: DMatrix<f64>,
 }
 
-/// Singular values below this share of the largest are rounding: entries are lengths of links and their
-/// squares.
+/// Singular values below this share of the largest are rounding: entries are lengths and their squares.
 const SPAN: f64 = 1e-9;
 
 impl PayloadColumns {
@@ -51,10 +50,8 @@ impl PayloadColumns {
 
     /// Mass and the rest, p x (1 + r).
     fn columns(&self) -> DMatrix<f64> {
-        let p = self.mass.len();
-        let mut all = DMatrix::zeros(p, 1 + self.rest.ncols());
+        let mut all = self.rest.clone().insert_column(0, 0.0);
         all.set_column(0, &self.mass);
-        all.columns_mut(1, self.rest.ncols()).copy_from(&self.rest);
         all
     }
 }
@@ -90,13 +87,10 @@ impl<'a> Problem<'a> {
     pub fn new(rows: &GainRows<'a>) -> Result<Self, FitError> {
         let columns = &rows.unloaded.columns;
         let p = columns.shared;
-        let set = |factors: &'a BlockFactors, loaded: bool| {
-            let joints = (0..columns.joints).map(|j| factors.joint(j));
-            Set {
-                factors,
-                joints: joints.collect(),
-                loaded,
-            }
+        let set = |factors: &'a BlockFactors, loaded: bool| Set {
+            factors,
+            joints: (0..columns.joints).map(|j| factors.joint(j)).collect(),
+            loaded,
         };
         let mut sets = vec![set(rows.unloaded, false)];
         let mut load = DMatrix::zeros(p, 0);
@@ -105,17 +99,13 @@ impl<'a> Problem<'a> {
             load = payload.columns();
         }
         let moving = |j: usize| sets.iter().map(move |s| s.factors.moving[j]);
-        let joints = 0..columns.joints;
-        let counts: Vec<f64> = joints
-            .clone()
-            .map(|j| moving(j).map(|rows| rows.count as f64).sum())
-            .collect();
-        let channel_rms: Vec<f64> = joints
-            .map(|j| {
-                let square: f64 = moving(j).map(|rows| rows.torque_square).sum();
-                (square / counts[j].max(1.0)).sqrt()
-            })
-            .collect();
+        let count = |j: usize| moving(j).map(|rows| rows.count as f64).sum();
+        let counts: Vec<f64> = (0..columns.joints).map(count).collect();
+        let rms = |(j, count): (usize, &f64)| {
+            let square: f64 = moving(j).map(|rows| rows.torque_square).sum();
+            (square / count.max(1.0)).sqrt()
+        };
+        let channel_rms: Vec<f64> = counts.iter().enumerate().map(rms).collect();
         // each set must determine its own unknowns, and each joint its gain
         for set in &sets {
             let rows = set.factors.moving.iter().map(|rows| rows.count).max();
@@ -182,9 +172,8 @@ impl<'a> Problem<'a> {
             let load = shared * &self.load * x[j];
             slopes.columns_mut(1 + p, loads).copy_from(&load);
         }
-        slopes
-            .columns_mut(1 + p + loads, own)
-            .copy_from(&own_columns);
+        let mut of_own = slopes.columns_mut(1 + p + loads, own);
+        of_own.copy_from(&own_columns);
         Rows { slopes, residual }
     }
 
@@ -212,20 +201,14 @@ impl<'a> Problem<'a> {
 
     /// Standard deviation of each joint's residual in the channel's unit.
     pub fn residual_std(&self, x: &DVector<f64>) -> Vec<f64> {
-        let square = |j: usize| -> f64 {
-            let sets = self.sets.iter();
-            sets.map(|s| {
-                self.rows_of(x, &s.joints[j], j, s.loaded)
-                    .residual
-                    .norm_squared()
-            })
-            .sum()
+        let std = |j: usize| {
+            let residual = |s: &Set| self.rows_of(x, &s.joints[j], j, s.loaded).residual;
+            let squares = self.sets.iter().map(|s| residual(s).norm_squared());
+            let floor = 1e-9 * self.channel_rms[j];
+            (squares.sum::<f64>() / self.rows[j].max(1.0))
+                .sqrt()
+                .max(floor)
         };
-        (0..self.joints())
-            .map(|j| {
-                let floor = 1e-9 * self.channel_rms[j];
-                (square(j) / self.rows[j].max(1.0)).sqrt().max(floor)
-            })
-            .collect()
+        (0..self.joints()).map(std).collect()
     }
 }

@@ -10,13 +10,7 @@ const STEP: f64 = 0.002;
 const FORCE_NOISE: f64 = 2.0;
 
 fn columns() -> RegressorColumns {
-    RegressorColumns {
-        joints: 1,
-        shared: 1,
-        own: vec![vec![Own::Viscous, Own::Offset]],
-        known: vec![None],
-        rest_speed: Vec::new(),
-    }
+    RegressorColumns::of_one(&[Own::Viscous, Own::Offset], None)
 }
 
 fn settings() -> FilterSettings {
@@ -36,16 +30,13 @@ fn log(noise: f64, seed: u64, with_reference: bool) -> Block {
     let mut block = Block::default();
     for k in 0..5000 {
         let t = f64::from(k) * STEP;
-        let parts = [(0.05, 5.0, 0.0), (0.02, 11.0, 1.0), (0.004, 29.0, 2.0)];
-        let q: f64 = parts.iter().map(|(a, w, p)| a * (w * t + p).sin()).sum();
-        let v: f64 = parts
-            .iter()
-            .map(|(a, w, p)| a * w * (w * t + p).cos())
-            .sum();
-        let a: f64 = parts
-            .iter()
-            .map(|(a, w, p)| -a * w * w * (w * t + p).sin())
-            .sum();
+        let (mut q, mut v, mut a) = (0.0, 0.0, 0.0);
+        for (size, w, phase) in [(0.05, 5.0, 0.0), (0.02, 11.0, 1.0), (0.004, 29.0, 2.0)] {
+            let (sin, cos) = f64::sin_cos(w * t + phase);
+            q += size * sin;
+            v += size * w * cos;
+            a -= size * w * w * sin;
+        }
         let tau = TRUTH[0] * a + TRUTH[1] * v + TRUTH[2];
         block.t.push(t);
         block.q.push(q + noise * draw());
@@ -61,13 +52,10 @@ fn log(noise: f64, seed: u64, with_reference: bool) -> Block {
 fn once(block: Block) -> impl FnMut(&mut Block) -> Result<bool, FitError> + Send {
     let mut left = Some(block);
     move |out| {
-        Ok(match left.take() {
-            Some(block) => {
-                *out = block;
-                true
-            }
-            None => false,
-        })
+        let block = left.take();
+        let more = block.is_some();
+        *out = block.unwrap_or_default();
+        Ok(more)
     }
 }
 
@@ -139,9 +127,6 @@ fn noisy_positions_bias_least_squares_and_not_instruments() {
 #[test]
 fn a_smoothed_reference_removes_most_of_the_bias() {
     let found = instrumental(1.5e-4, 3, ReferenceSource::Smoothed).fit;
-    let (off, before) = (
-        found.theta[0] - TRUTH[0],
-        plain(1.5e-4, 3).theta[0] - TRUTH[0],
-    );
+    let [off, before] = [found, plain(1.5e-4, 3)].map(|fit| fit.theta[0] - TRUTH[0]);
     assert!(off.abs() < 0.3 * before.abs(), "{off} {before}");
 }
