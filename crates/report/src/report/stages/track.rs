@@ -232,7 +232,7 @@ fn course(page: &mut Writer, robot: &TrackedRobot) {
     let courses = figure("Parameters without a change", &steady).cells();
     match steady.len() {
         0 => {}
-        ..=AT_ONCE => page.figures(courses),
+        1..=AT_ONCE => page.figures(courses),
         many => page.folded(format!("{many} parameters without a change"), courses),
     }
 }
