@@ -304,36 +304,32 @@ fn belong_together(before: &str, after: &str) -> bool {
         || is_unit(after) && (is_number(before) || is_unit(before) && !ended(before))
 }
 
-/// Words that the end of a line does not part, with a space between them, where a line holds them.
-fn groups(text: &str, width: usize) -> Vec<String> {
-    let mut groups: Vec<String> = Vec::new();
-    let mut last = "";
-    for word in text.split(' ').filter(|word| !word.is_empty()) {
-        let fits = |group: &str| length(group) + 1 + length(word) <= width;
-        match groups.last_mut() {
-            Some(group) if belong_together(last, word) && fits(group) => {
-                group.push(' ');
-                group.push_str(word);
-            }
-            _ => groups.push(word.to_owned()),
+/// Words one after the other, with a space between those that `may` be joined.
+pub(super) fn joined(
+    words: impl IntoIterator<Item = String>,
+    may: impl Fn(&str, &str) -> bool,
+) -> Vec<String> {
+    let mut joined: Vec<String> = Vec::new();
+    for word in words {
+        match joined.last_mut() {
+            Some(before) if may(before, &word) => *before += &format!(" {word}"),
+            _ => joined.push(word),
         }
-        last = word;
     }
-    groups
+    joined
 }
 
 /// `text` in lines of at most `width` characters; a word that alone is longer stays whole, for it may be a path.
 fn flowed(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for group in groups(text, width) {
-        match lines.last_mut() {
-            Some(line) if line.is_empty() => *line = group,
-            Some(line) if length(line) + 1 + length(&group) <= width => {
-                line.push(' ');
-                line.push_str(&group);
-            }
-            _ => lines.push(group),
-        }
+    let fits = |line: &str, word: &str| length(line) + 1 + length(word) <= width;
+    let words = text.split(' ').filter(|word| !word.is_empty());
+    let groups = joined(words.map(str::to_owned), |group, word| {
+        let last = group.rsplit(' ').next().unwrap_or(group);
+        belong_together(last, word) && fits(group, word)
+    });
+    let mut lines = joined(groups, fits);
+    if lines.is_empty() {
+        lines.push(String::new());
     }
     let lines = lines.iter();
     lines.map(|line| line.replace(UNBROKEN, " ")).collect()

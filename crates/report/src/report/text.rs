@@ -1,6 +1,6 @@
 //! A report as a terminal shows it: tables and paragraphs of 80 columns, without colour.
 
-use super::table::{WIDTH, hanging};
+use super::table::{WIDTH, hanging, joined};
 use super::value::{Detail, Part, Report, Shown};
 
 impl Report {
@@ -49,14 +49,9 @@ const CODE: usize = 7;
 
 /// A command in lines that a shell takes as one; none begins with the value of an option.
 fn command_lines(command: &str) -> String {
-    let mut parts: Vec<String> = Vec::new();
-    for word in command.split(' ') {
-        let takes_value = |part: &String| part.starts_with('-') && !part.contains(' ');
-        match parts.last_mut().filter(|part| takes_value(part)) {
-            Some(option) if !word.starts_with('-') => *option += &format!(" {word}"),
-            _ => parts.push(word.to_owned()),
-        }
-    }
+    let parts = joined(command.split(' ').map(str::to_owned), |part, word| {
+        part.starts_with('-') && !part.contains(' ') && !word.starts_with('-')
+    });
     // room for the mark that the command goes on
     let room = WIDTH - 2;
     let mut parts = parts.into_iter();

@@ -5,25 +5,20 @@ use crate::report::encode::extent;
 /// A linear map of a closed interval of data onto an interval of px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
-    pub from: f64,
-    pub to: f64,
-    px_from: f64,
-    px_to: f64,
+    pub data: [f64; 2],
+    px: [f64; 2],
 }
 
 impl Scale {
-    /// `from..to` of the data (in order, both finite, not equal) onto `px_from..px_to`.
-    pub fn new([from, to]: [f64; 2], px_from: f64, px_to: f64) -> Self {
-        Scale {
-            from,
-            to,
-            px_from,
-            px_to,
-        }
+    /// An interval of the data (in order, both finite, not equal) onto `px_from..px_to`.
+    pub fn new(data: [f64; 2], px_from: f64, px_to: f64) -> Self {
+        let px = [px_from, px_to];
+        Scale { data, px }
     }
 
     pub(crate) fn px(&self, value: f64) -> f64 {
-        self.px_from + (value - self.from) / (self.to - self.from) * (self.px_to - self.px_from)
+        let ([from, to], [px_from, px_to]) = (self.data, self.px);
+        px_from + (value - from) / (to - from) * (px_to - px_from)
     }
 }
 

@@ -10,7 +10,7 @@ const LEFT: f64 = 58.0;
 const RIGHT: f64 = 12.0;
 /// Room above a panel for its name, or for marks alone, and below it for numbers and the name of its axis [px].
 const NAME: f64 = 24.0;
-const MARKS: f64 = 14.0;
+pub(super) const MARKS: f64 = 14.0;
 const BELOW: f64 = 40.0;
 
 /// Pictures that belong together, with the sentences below them.
@@ -52,17 +52,8 @@ pub(super) fn cell(
     below(NAME, [title, description], height, draw)
 }
 
-/// The same of a panel that bears no name.
-pub(super) fn nameless(
-    title: &str,
-    description: &str,
-    height: f64,
-    draw: impl FnOnce(&mut Svg, [f64; 4]),
-) -> String {
-    below(MARKS, [title, description], height, draw)
-}
-
-fn below(
+/// The same with another room above.
+pub(super) fn below(
     above: f64,
     [title, description]: [&str; 2],
     height: f64,

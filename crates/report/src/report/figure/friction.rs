@@ -89,32 +89,21 @@ impl FrictionFigure {
         let beyond = |panel: &FrictionPanel| {
             !panel.beyond_curve && !lines(&panel.curve, |a, b| !panel.covers(a.v, b.v)).is_empty()
         };
-        let (measured, model) = (Key::Spot(colour::VERMILLION), Key::Spot(colour::BLUE));
-        let (plateaus, covered) = (Key::Dot(colour::INK), Key::Patch(colour::COVERED));
+        let beyond = self.panels.iter().any(beyond);
+        let [curves, effects] = [any(|p| !p.beyond_curve), any(|p| p.beyond_curve)];
+        let clouds = any(|p| !p.cloud.is_empty());
+        let plateaus = any(|p| !p.plateaus.is_empty());
+        let [truths, covered] = [any(|p| !p.truth.is_empty()), any(|p| !p.covered.is_empty())];
+        let [red, blue] = [colour::VERMILLION, colour::BLUE].map(Key::Spot);
+        let patch = Key::Patch(colour::COVERED);
         let entries = [
-            (
-                any(|p| !p.cloud.is_empty()),
-                measured,
-                "measured, less all else",
-            ),
-            (any(|p| p.beyond_curve), model, "model with every effect"),
-            (
-                any(|p| !p.beyond_curve),
-                Key::Band(CURVE),
-                "estimated, 95 % band",
-            ),
-            (
-                self.panels.iter().any(beyond),
-                Key::Line(BEYOND),
-                "beyond these logs",
-            ),
-            (any(|p| !p.plateaus.is_empty()), plateaus, "plateaus, 95 %"),
-            (any(|p| !p.truth.is_empty()), Key::Line(TRUTH), "truth"),
-            (
-                any(|p| !p.covered.is_empty()),
-                covered,
-                "speeds in these logs",
-            ),
+            (clouds, red, "measured, less all else"),
+            (effects, blue, "model with every effect"),
+            (curves, Key::Band(CURVE), "estimated, 95 % band"),
+            (beyond, Key::Line(BEYOND), "beyond these logs"),
+            (plateaus, Key::Dot(colour::INK), "plateaus, 95 %"),
+            (truths, Key::Line(TRUTH), "truth"),
+            (covered, patch, "speeds in these logs"),
         ];
         let drawn = entries.into_iter().filter(|(drawn, ..)| *drawn);
         drawn.map(|(_, key, name)| (key, name)).collect()

@@ -101,7 +101,8 @@ impl ResidualFigure {
         let of_joint = |(name, panels): &(String, Vec<ResidualPanel>)| {
             let picture = |panel: &ResidualPanel| {
                 let title = format!("residual of {name} over {}", panel.over.0);
-                cell::nameless(&title, &panel.words(name), PLOT, |svg, frame| {
+                let titles = [&*title, &panel.words(name)];
+                cell::below(cell::MARKS, titles, PLOT, |svg, frame| {
                     panel.draw(svg, frame)
                 })
             };
@@ -189,8 +190,8 @@ impl ResidualPanel {
         let mut marks: Vec<&(f64, String)> = self.marks.iter().collect();
         marks.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut free = f64::NEG_INFINITY;
-        let within = |x: f64| panel.x.from <= x && x <= panel.x.to;
-        for (x, name) in marks.into_iter().filter(|(x, _)| within(*x)) {
+        let [from, to] = panel.x.data;
+        for (x, name) in marks.into_iter().filter(|(x, _)| (from..=to).contains(x)) {
             let at = panel.x.px(*x);
             let line = Stroke::dashed(colour::INK, 0.9, "2 2");
             svg.line([at, top], [at, top + height], line);

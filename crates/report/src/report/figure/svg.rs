@@ -92,13 +92,8 @@ impl Svg {
         }
     }
 
-    pub(crate) fn rect(
-        &mut self,
-        [x, y, width, height]: [f64; 4],
-        fill: &str,
-        stroke: Option<Stroke>,
-    ) {
-        let [x, y, width, height] = [x, y, width, height].map(px);
+    pub(crate) fn rect(&mut self, frame: [f64; 4], fill: &str, stroke: Option<Stroke>) {
+        let [x, y, width, height] = frame.map(px);
         let rect = format!("rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");
         self.shape(&format!("{rect} fill=\"{fill}\""), stroke);
     }
@@ -159,8 +154,8 @@ impl Svg {
     }
 
     /// Begins a group that is cut at a rectangle, until [`Svg::end_clip`]; a nested picture needs no id in the page.
-    pub(crate) fn clip(&mut self, [x, y, width, height]: [f64; 4]) {
-        let [x, y, width, height] = [x, y, width, height].map(px);
+    pub(crate) fn clip(&mut self, frame: [f64; 4]) {
+        let [x, y, width, height] = frame.map(px);
         let _ = writeln!(
             self.body,
             "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
