@@ -1,4 +1,4 @@
-//! What the tests of several crates share: the folder of the repository, and the measured logs beside it.
+//! Shared by the tests of several crates: the folder of the repository, and the measured logs beside it.
 
 #![forbid(unsafe_code)]
 

@@ -13,7 +13,7 @@ use thiserror::Error;
 
 use cft_ident_logs::log::Provenance;
 
-/// What a document may not be made from.
+/// Why no document can be made from a result.
 #[derive(Debug, Error)]
 pub enum JsonError {
     /// The result is not an object with named fields.
@@ -50,22 +50,22 @@ impl Document {
         warnings: &[String],
         result: &T,
     ) -> Result<Self, JsonError> {
-        let value = |result: serde_json::Result<Value>| {
-            result.map_err(|source| JsonError::Serialize {
-                command: command.to_owned(),
-                source,
-            })
+        let named = || command.to_owned();
+        let failed = |source| JsonError::Serialize {
+            command: named(),
+            source,
         };
         let mut fields = Map::new();
         fields.insert("schema".into(), schema_of(command).into());
         fields.insert("version".into(), env!("CARGO_PKG_VERSION").into());
-        fields.insert("inputs".into(), value(serde_json::to_value(inputs))?);
+        let inputs = serde_json::to_value(inputs).map_err(failed)?;
+        fields.insert("inputs".into(), inputs);
         fields.insert("warnings".into(), warnings.into());
-        let found = match value(serde_json::to_value(result))? {
+        let found = match serde_json::to_value(result).map_err(failed)? {
             Value::Object(own) => {
                 for (field, value) in own {
                     if fields.contains_key(&field) {
-                        let command = command.to_owned();
+                        let command = named();
                         return Err(JsonError::FieldTaken { command, field });
                     }
                     fields.insert(field, value);
@@ -78,28 +78,21 @@ impl Document {
             Value::String(_) => "a text",
             Value::Array(_) => "a list",
         };
-        Err(JsonError::NotAnObject {
-            command: command.to_owned(),
-            found,
-        })
+        let command = named();
+        Err(JsonError::NotAnObject { command, found })
     }
 
     /// The warnings in it.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
-        self.fields
-            .get("warnings")
-            .and_then(Value::as_array)
-            .into_iter()
-            .flatten()
-            .filter_map(Value::as_str)
+        let warnings = self.fields.get("warnings").and_then(Value::as_array);
+        warnings.into_iter().flatten().filter_map(Value::as_str)
     }
 
     /// Puts further warnings before those that are in it; none stands there twice.
     pub fn warn_first(&mut self, further: Vec<String>) {
-        let own: Vec<String> = self.warnings().map(str::to_owned).collect();
         let mut all = further;
-        all.retain(|text| !own.contains(text));
-        all.extend(own);
+        all.retain(|text| self.warnings().all(|own| own != text));
+        all.extend(self.warnings().map(str::to_owned));
         self.fields.insert("warnings".into(), all.into());
     }
 
@@ -123,13 +116,14 @@ pub fn schema<T: JsonSchema>(command: &str) -> Value {
     let inputs = generator.subschema_for::<Vec<Provenance>>();
     let mut found = Value::from(generator.into_root_schema_for::<T>());
     found["title"] = format!("JSON document of `cft-ident {command}`").into();
-    let mut properties = Map::new();
-    let version = schema_of(command);
-    properties.insert("schema".into(), json!({ "const": version }));
-    properties.insert("version".into(), json!({"type": "string"}));
-    properties.insert("inputs".into(), inputs.into());
     let texts = json!({"type": "array", "items": {"type": "string"}});
-    properties.insert("warnings".into(), texts);
+    let envelope = [
+        ("schema", json!({ "const": schema_of(command) })),
+        ("version", json!({"type": "string"})),
+        ("inputs", inputs.into()),
+        ("warnings", texts),
+    ];
+    let mut properties = Map::from_iter(envelope.map(|(name, schema)| (name.to_owned(), schema)));
     let mut required: Vec<Value> = properties.keys().map(|name| json!(name)).collect();
     if let Some(Value::Object(own)) = found.get_mut("properties").map(Value::take) {
         properties.extend(own);
@@ -183,15 +177,10 @@ mod tests {
         let result = json!({"joints": [], "condition": {"raw": 2.5}});
         let document = Document::new("lsq", &[input()], &["a gap".into()], &result).unwrap();
         let keys: Vec<_> = document.fields().keys().map(String::as_str).collect();
-        let expected = [
-            "schema",
-            "version",
-            "inputs",
-            "warnings",
-            "joints",
-            "condition",
-        ];
-        assert_eq!(keys, expected);
+        assert_eq!(
+            keys.join(" "),
+            "schema version inputs warnings joints condition"
+        );
         let back: Value = serde_json::from_str(&document.text()).unwrap();
         assert_eq!(back["schema"], "cft-ident/lsq/1");
         assert_eq!(back["version"], env!("CARGO_PKG_VERSION"));
@@ -202,19 +191,11 @@ mod tests {
 
     #[test]
     fn numbers_that_are_not_finite_become_null() {
-        #[derive(Serialize)]
-        struct Odd {
-            value: f64,
-            list: Vec<f64>,
-        }
-        let odd = Odd {
-            value: f64::NAN,
-            list: vec![f64::INFINITY, 0.1 + 0.2, f64::NEG_INFINITY],
-        };
+        let list = [f64::INFINITY, 0.1 + 0.2, f64::NEG_INFINITY, f64::NAN];
+        let odd = std::collections::BTreeMap::from([("list", list)]);
         let document = Document::new("friction", &[], &[], &odd).unwrap();
         let back: Value = serde_json::from_str(&document.text()).unwrap();
-        assert_eq!(back["value"], Value::Null);
-        assert_eq!(back["list"], json!([null, 0.30000000000000004, null]));
+        assert_eq!(back["list"], json!([null, 0.30000000000000004, null, null]));
     }
 
     #[test]

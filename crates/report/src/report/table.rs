@@ -5,13 +5,15 @@
 
 use std::fmt;
 
+use super::words;
+use cft_ident_core::number;
 use cft_ident_logs::log::escape_whole;
 
 /// Columns of a terminal that a table keeps to where it can.
 pub const WIDTH: usize = 80;
 /// A column of words is not wrapped below this.
 const NARROWEST: usize = 10;
-/// Columns between two of a table: the most, and the least where it would be too wide.
+/// Room between two columns: the most, and the least where the table would be too wide.
 const GAPS: [usize; 2] = [2, 1];
 
 /// Where the cells of a column line up.
@@ -28,7 +30,8 @@ pub enum Align {
 /// A table under construction; `Display` renders it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
-    caption: Option<String>,
+    /// Empty for none.
+    caption: String,
     columns: Vec<(String, Align)>,
     rows: Vec<Vec<String>>,
 }
@@ -36,37 +39,26 @@ pub struct Table {
 impl Table {
     /// A table with these headers.
     pub fn new(columns: &[(&str, Align)]) -> Self {
+        let columns = columns.iter();
         Table {
-            caption: None,
+            caption: String::new(),
             columns: columns
-                .iter()
                 .map(|(name, align)| (escape_whole(name), *align))
                 .collect(),
             rows: Vec::new(),
         }
     }
 
-    /// A table for a page, which distinguishes numbers from words by itself.
-    pub(crate) fn of_words(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
-        let columns: Vec<(&str, Align)> = head.iter().map(|name| (*name, Align::Left)).collect();
-        let mut table = Table::new(&columns).caption(caption);
-        rows.into_iter().for_each(|row| table.row(row));
-        table
-    }
-
     /// A line above the headers.
     pub fn caption(mut self, text: &str) -> Self {
-        self.caption = Some(escape_whole(text));
+        self.caption = escape_whole(text);
         self
     }
 
     /// Adds a row; missing cells are empty, surplus cells are dropped.
     pub fn row<S: AsRef<str>>(&mut self, cells: impl IntoIterator<Item = S>) {
-        let mut row: Vec<String> = cells
-            .into_iter()
-            .take(self.columns.len())
-            .map(|cell| escape_whole(cell.as_ref()))
-            .collect();
+        let cells = cells.into_iter().take(self.columns.len());
+        let mut row: Vec<String> = cells.map(|cell| escape_whole(cell.as_ref())).collect();
         row.resize(self.columns.len(), String::new());
         self.rows.push(row);
     }
@@ -74,108 +66,43 @@ impl Table {
     /// Caption, names of the columns and rows, for another way to show them.
     pub(super) fn parts(&self) -> (&str, Vec<&str>, &[Vec<String>]) {
         let names = self.columns.iter().map(|(name, _)| name.as_str());
-        (
-            self.caption.as_deref().unwrap_or(""),
-            names.collect(),
-            &self.rows,
-        )
+        (&self.caption, names.collect(), &self.rows)
     }
 
-    /// Whether no row was added.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Widths of the columns and the gap between them, after words were narrowed to fit [`WIDTH`].
-    fn widths(&self, cells: &[Vec<String>]) -> (Vec<usize>, usize) {
-        let natural: Vec<usize> = (0..self.columns.len())
-            .map(|j| {
-                let header = length(&self.columns[j].0);
-                cells
-                    .iter()
-                    .map(|row| length(&row[j]))
-                    .fold(header, usize::max)
-            })
-            .collect();
-        let [wide, narrow] = GAPS;
-        let fits = |widths: &[usize], gap: usize| {
-            widths.iter().sum::<usize>() + gap * widths.len().saturating_sub(1) <= WIDTH
+    fn widths(&self, rows: &[Vec<String>]) -> (Vec<usize>, usize) {
+        let natural = |(j, (name, _)): (usize, &(String, Align))| {
+            let cells = rows.iter().map(|row| length(&row[j]));
+            cells.fold(length(name), usize::max)
         };
-        let widths = self.narrowed(natural.clone(), |widths| fits(widths, wide));
-        match fits(&widths, wide) {
-            true => (widths, wide),
-            false => (
-                self.narrowed(natural, |widths| fits(widths, narrow)),
-                narrow,
-            ),
-        }
+        let natural: Vec<usize> = self.columns.iter().enumerate().map(natural).collect();
+        let [wide, narrow] = GAPS.map(|gap| (self.narrowed(natural.clone(), gap), gap));
+        if fits(&wide.0, wide.1) { wide } else { narrow }
     }
 
     /// Columns of words, narrowed until all fit or none can give more.
-    fn narrowed(&self, mut widths: Vec<usize>, fits: impl Fn(&[usize]) -> bool) -> Vec<usize> {
-        while !fits(&widths) {
+    fn narrowed(&self, mut widths: Vec<usize>, gap: usize) -> Vec<usize> {
+        while !fits(&widths, gap) {
             // The widest column of words gives first, down to the longest of them.
             let widest = (0..widths.len())
                 .filter(|&j| self.columns[j].1 == Align::Left)
                 .filter(|&j| widths[j] > NARROWEST.max(length(&self.columns[j].0)))
                 .max_by_key(|&j| widths[j]);
-            match widest {
-                Some(j) => widths[j] -= 1,
-                None => break,
-            }
+            let Some(widest) = widest else { break };
+            widths[widest] -= 1;
         }
         widths
     }
-}
 
-impl fmt::Display for Table {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut rows = self.rows.clone();
-        for (j, (_, align)) in self.columns.iter().enumerate() {
-            if *align == Align::Decimal {
-                line_up(&mut rows, j);
-            }
-        }
-        let (widths, gap) = self.widths(&rows);
-        if let Some(caption) = &self.caption {
-            for line in flowed(caption, WIDTH) {
-                writeln!(f, "{line}")?;
-            }
-        }
-        let headers: Vec<String> = self.columns.iter().map(|(name, _)| name.clone()).collect();
-        self.write_line(f, &headers, &widths, gap)?;
-        let rules: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
-        self.write_line(f, &rules, &widths, gap)?;
-        for row in &rows {
-            let parts: Vec<Vec<String>> = row
-                .iter()
-                .zip(&widths)
-                .zip(&self.columns)
-                .map(|((cell, &width), (_, align))| match align {
-                    Align::Left => wrapped(cell, width),
-                    _ => vec![cell.clone()],
-                })
-                .collect();
-            let height = parts.iter().map(Vec::len).max().unwrap_or(0);
-            for line in 0..height {
-                let cells: Vec<String> = parts
-                    .iter()
-                    .map(|part| part.get(line).cloned().unwrap_or_default())
-                    .collect();
-                self.write_line(f, &cells, &widths, gap)?;
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Table {
     fn write_line(
         &self,
         f: &mut fmt::Formatter<'_>,
         cells: &[String],
-        widths: &[usize],
-        gap: usize,
+        (widths, gap): (&[usize], usize),
     ) -> fmt::Result {
         let mut line = String::new();
         for (j, cell) in cells.iter().enumerate() {
@@ -192,6 +119,124 @@ impl Table {
     }
 }
 
+fn fits(widths: &[usize], gap: usize) -> bool {
+    widths.iter().sum::<usize>() + gap * widths.len().saturating_sub(1) <= WIDTH
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut rows = self.rows.clone();
+        for (j, (_, align)) in self.columns.iter().enumerate() {
+            if *align == Align::Decimal {
+                line_up(&mut rows, j);
+            }
+        }
+        let (widths, gap) = self.widths(&rows);
+        let room = (widths.as_slice(), gap);
+        if !self.caption.is_empty() {
+            for line in flowed(&self.caption, WIDTH) {
+                writeln!(f, "{line}")?;
+            }
+        }
+        let headers: Vec<String> = self.columns.iter().map(|(name, _)| name.clone()).collect();
+        self.write_line(f, &headers, room)?;
+        let rules: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
+        self.write_line(f, &rules, room)?;
+        for row in &rows {
+            let cells = row.iter().zip(&widths).zip(&self.columns);
+            let lines = cells.map(|((cell, &width), (_, align))| match align {
+                Align::Left => wrapped(cell, width),
+                _ => vec![cell.clone()],
+            });
+            let lines: Vec<Vec<String>> = lines.collect();
+            for k in 0..lines.iter().map(Vec::len).max().unwrap_or(0) {
+                let cell = |lines: &Vec<String>| lines.get(k).cloned().unwrap_or_default();
+                self.write_line(f, &lines.iter().map(cell).collect::<Vec<_>>(), room)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A table that is made column by column, with a row for each item.
+pub(super) struct Columns<R> {
+    items: Vec<R>,
+    table: Table,
+}
+
+impl<R: Copy> Columns<R> {
+    pub fn new(caption: &str, items: impl IntoIterator<Item = R>) -> Self {
+        let items: Vec<R> = items.into_iter().collect();
+        let mut table = Table::new(&[]).caption(caption);
+        table.rows.resize(items.len(), Vec::new());
+        Columns { items, table }
+    }
+
+    pub fn column<S: AsRef<str>>(
+        mut self,
+        align: Align,
+        name: &str,
+        cell: impl Fn(R) -> S,
+    ) -> Self {
+        self.table.columns.push((escape_whole(name), align));
+        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
+            row.push(escape_whole(cell(*item).as_ref()));
+        }
+        self
+    }
+
+    pub fn words<S: AsRef<str>>(self, name: &str, cell: impl Fn(R) -> S) -> Self {
+        self.column(Align::Left, name, cell)
+    }
+
+    pub fn numbers<S: AsRef<str>>(self, name: &str, cell: impl Fn(R) -> S) -> Self {
+        self.column(Align::Decimal, name, cell)
+    }
+
+    /// Two columns of numbers whose cells are made together.
+    pub fn pair(self, [first, second]: [&str; 2], cells: impl Fn(R) -> (String, String)) -> Self {
+        let column = self.numbers(first, |item| cells(item).0);
+        column.numbers(second, |item| cells(item).1)
+    }
+
+    /// A value and its standard deviation where they are known.
+    pub fn estimates<V: Into<Option<f64>>, D: Into<Option<f64>>>(
+        self,
+        names: [&str; 2],
+        estimate: impl Fn(R) -> (V, D),
+    ) -> Self {
+        self.pair(names, |item| {
+            let (value, std) = estimate(item);
+            let known = |x: Option<f64>| x.unwrap_or(f64::NAN);
+            number::value_and_std(known(value.into()), known(std.into()))
+        })
+    }
+
+    /// Numbers with so many digits, where they are known.
+    pub fn digits<V>(self, name: &str, digits: usize, value: impl Fn(R) -> V) -> Self
+    where
+        V: Into<Option<f64>>,
+    {
+        self.numbers(name, |item| words::significant(value(item).into(), digits))
+    }
+
+    /// Fractions as percent, where they are known.
+    pub fn percent<V: Into<Option<f64>>>(self, name: &str, fraction: impl Fn(R) -> V) -> Self {
+        self.numbers(name, |item| words::percent(fraction(item).into()))
+    }
+
+    /// Columns that stand there where they are wanted.
+    pub fn when(self, wanted: bool, add: impl FnOnce(Self) -> Self) -> Self {
+        if wanted { add(self) } else { self }
+    }
+}
+
+impl<R> From<Columns<R>> for Table {
+    fn from(columns: Columns<R>) -> Self {
+        columns.table
+    }
+}
+
 /// Pads the cells of column `j` at their ends, so that right alignment puts the points in one place.
 fn line_up(rows: &mut [Vec<String>], j: usize) {
     let tail = |cell: &str| -> usize {
@@ -199,17 +244,12 @@ fn line_up(rows: &mut [Vec<String>], j: usize) {
         length(&cell[whole..])
     };
     let numeric = |cell: &str| cell.contains(|c: char| c.is_ascii_digit());
-    let longest = rows
-        .iter()
-        .filter(|row| numeric(&row[j]))
-        .map(|row| tail(&row[j]))
-        .max()
-        .unwrap_or(0);
-    for row in rows {
-        if numeric(&row[j]) {
-            let missing = longest - tail(&row[j]);
-            row[j].push_str(&" ".repeat(missing));
-        }
+    let mut cells: Vec<&mut String> = rows.iter_mut().map(|row| &mut row[j]).collect();
+    cells.retain(|cell| numeric(cell));
+    let longest = cells.iter().map(|cell| tail(cell)).max().unwrap_or(0);
+    for cell in cells {
+        let missing = longest - tail(cell);
+        cell.push_str(&" ".repeat(missing));
     }
 }
 
@@ -218,16 +258,7 @@ fn line_up(rows: &mut [Vec<String>], j: usize) {
 pub fn hanging(head: &str, text: &str, indent: usize) -> String {
     let room = WIDTH.saturating_sub(indent.max(length(head)));
     let lines = flowed(&escape_whole(text), room);
-    let mut out = String::new();
-    for (i, line) in lines.iter().enumerate() {
-        match i {
-            0 => out.push_str(head),
-            _ => out.push_str(&" ".repeat(indent)),
-        }
-        out.push_str(line);
-        out.push('\n');
-    }
-    out
+    head.to_owned() + &lines.join(&format!("\n{}", " ".repeat(indent))) + "\n"
 }
 
 /// `text` for a terminal: a line that is too long goes on below, further in.
@@ -243,7 +274,7 @@ pub fn folded(text: &str) -> String {
     text.lines().map(fold).collect()
 }
 
-/// A space at which no line ends; shown as a common one.
+/// A space at which no line ends; it is shown as a common one.
 const UNBROKEN: char = '\u{a0}';
 
 /// `text` as one word, which the end of a line does not part.
@@ -251,8 +282,7 @@ pub(crate) fn unbroken(text: &str) -> String {
     text.replace(' ', UNBROKEN.encode_utf8(&mut [0; 2]))
 }
 
-/// Whether the end of a line may not part these words: a number and its unit, or the two sides of a
-/// sign between numbers.
+/// Whether no line ends between these words: a number and its unit, or the sides of a sign between numbers.
 fn belong_together(before: &str, after: &str) -> bool {
     const UNITS: [&str; 16] = [
         "%", "N", "Nm", "kg", "m", "s", "ms", "rad", "deg", "V", "A", "Hz", "kHz", "1", "2",
@@ -274,45 +304,38 @@ fn belong_together(before: &str, after: &str) -> bool {
         || is_unit(after) && (is_number(before) || is_unit(before) && !ended(before))
 }
 
-/// Words that the end of a line does not part, with a space between them, where a line holds them.
-fn groups(text: &str, width: usize) -> Vec<String> {
-    let mut groups: Vec<String> = Vec::new();
-    let mut last = "";
-    for word in text.split(' ').filter(|word| !word.is_empty()) {
-        let fits = |group: &str| length(group) + 1 + length(word) <= width;
-        match groups.last_mut() {
-            Some(group) if belong_together(last, word) && fits(group) => {
-                group.push(' ');
-                group.push_str(word);
-            }
-            _ => groups.push(word.to_owned()),
+/// Words one after the other, with a space between those that `may` be joined.
+pub(super) fn joined(
+    words: impl IntoIterator<Item = String>,
+    may: impl Fn(&str, &str) -> bool,
+) -> Vec<String> {
+    let mut joined: Vec<String> = Vec::new();
+    for word in words {
+        match joined.last_mut() {
+            Some(before) if may(before, &word) => *before += &format!(" {word}"),
+            _ => joined.push(word),
         }
-        last = word;
     }
-    groups
+    joined
 }
 
-/// `text` in lines of at most `width` characters, broken at spaces but not between a number and its
-/// unit; a word that alone is longer stays whole, for it may be a path.
+/// `text` in lines of at most `width` characters; a word that alone is longer stays whole, for it may be a path.
 fn flowed(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for group in groups(text, width) {
-        match lines.last_mut() {
-            Some(line) if line.is_empty() => *line = group,
-            Some(line) if length(line) + 1 + length(&group) <= width => {
-                line.push(' ');
-                line.push_str(&group);
-            }
-            _ => lines.push(group),
-        }
+    let fits = |line: &str, word: &str| length(line) + 1 + length(word) <= width;
+    let words = text.split(' ').filter(|word| !word.is_empty());
+    let groups = joined(words.map(str::to_owned), |group, word| {
+        let last = group.rsplit(' ').next().unwrap_or(group);
+        belong_together(last, word) && fits(group, word)
+    });
+    let mut lines = joined(groups, fits);
+    if lines.is_empty() {
+        lines.push(String::new());
     }
-    lines
-        .iter()
-        .map(|line| line.replace(UNBROKEN, " "))
-        .collect()
+    let lines = lines.iter();
+    lines.map(|line| line.replace(UNBROKEN, " ")).collect()
 }
 
-/// The same for the cell of a table: a word that is longer is cut, after a part of it where one ends.
+/// The same for the cell of a table: a longer word is cut, after a part of it where one ends.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = Vec::new();
     for line in flowed(text, width) {
@@ -363,14 +386,12 @@ slope_2       16         -
 
     #[test]
     fn words_are_wrapped_to_80_columns_and_numbers_are_not() {
-        let mut table = Table::new(&[
-            ("effect", Align::Left),
-            ("reason", Align::Left),
-            ("bic", Align::Decimal),
-        ]);
         let reason = "the residual repeats with the angle of the motor and not with the joint, and is far above the floor";
-        table.row(["cogging", reason, "12345.678"]);
-        let text = table.to_string();
+        let table = Columns::new("", [()])
+            .words("effect", |()| "cogging")
+            .words("reason", |()| reason)
+            .numbers("bic", |()| "12345.678");
+        let text = Table::from(table).to_string();
         assert!(
             text.lines().all(|line| line.chars().count() <= WIDTH),
             "{text}"

@@ -1,6 +1,6 @@
 //! A report as a terminal shows it: tables and paragraphs of 80 columns, without colour.
 
-use super::table::{WIDTH, hanging};
+use super::table::{WIDTH, hanging, joined};
 use super::value::{Detail, Part, Report, Shown};
 
 impl Report {
@@ -38,49 +38,33 @@ fn shown(part: &Part) -> String {
         Part::Note { head, text, margin } => hanging(head, text, *margin),
         Part::List(items) => items.iter().map(|item| hanging("  ", item, 4)).collect(),
         Part::Table(table) => table.to_string(),
-        Part::Code(command) => command_lines(command, CODE),
-        Part::Figure(_)
-        | Part::Figures(_)
-        | Part::Folded { .. }
-        | Part::Traces { .. }
-        | Part::Details { .. } => String::new(),
+        Part::Code(command) => command_lines(command),
+        // pictures, and text that a page folds away
+        _ => String::new(),
     }
 }
 
 /// Columns before a command.
 const CODE: usize = 7;
 
-/// A command in lines that fit a terminal and that a shell takes as one: none begins with the value
-/// of an option. Its words hold no spaces.
-fn command_lines(command: &str, indent: usize) -> String {
-    let mut parts: Vec<String> = Vec::new();
-    for word in command.split(' ') {
-        match parts.last_mut() {
-            Some(part)
-                if part.starts_with('-') && !part.contains(' ') && !word.starts_with('-') =>
-            {
-                part.push(' ');
-                part.push_str(word);
-            }
-            _ => parts.push(word.to_owned()),
-        }
-    }
+/// A command in lines that a shell takes as one; none begins with the value of an option.
+fn command_lines(command: &str) -> String {
+    let parts = joined(command.split(' ').map(str::to_owned), |part, word| {
+        part.starts_with('-') && !part.contains(' ') && !word.starts_with('-')
+    });
     // room for the mark that the command goes on
     let room = WIDTH - 2;
-    let mut out = String::new();
-    let mut line = " ".repeat(indent);
-    let mut begun = false;
+    let mut parts = parts.into_iter();
+    let mut lines = vec![" ".repeat(CODE) + &parts.next().unwrap_or_default()];
     for part in parts {
-        if begun && line.chars().count() + 1 + part.chars().count() > room {
-            out += &format!("{line} \\\n");
-            line = " ".repeat(indent + 2);
-        } else if begun {
-            line.push(' ');
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + part.chars().count() <= room => {
+                *line += &format!(" {part}");
+            }
+            _ => lines.push(" ".repeat(CODE + 2) + &part),
         }
-        line += &part;
-        begun = true;
     }
-    out + &line + "\n"
+    lines.join(" \\\n") + "\n"
 }
 
 #[cfg(test)]
@@ -91,7 +75,6 @@ mod tests {
     fn a_long_command_is_folded_between_its_options() {
         let lines = command_lines(
             "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 -o separate.csv",
-            7,
         );
         assert_eq!(
             lines,
@@ -99,17 +82,17 @@ mod tests {
              -o separate.csv\n"
         );
         assert!(lines.lines().all(|line| line.len() <= WIDTH));
-        assert_eq!(command_lines("cft-ident new", 2), "  cft-ident new\n");
+        assert_eq!(command_lines("cft-ident new"), "       cft-ident new\n");
     }
 
     #[test]
-    fn a_terminal_shows_what_is_for_it_in_the_order_in_which_it_was_told() {
+    fn a_terminal_shows_its_parts_in_the_order_in_which_they_were_added() {
         let mut report = Report::new("title of the page");
         report.everywhere().verdict("all is well", true);
         report.page().paragraph("not here");
         report.terminal().line("written: a.toml");
         report.everywhere().list(["one", "two"]);
-        report.everywhere().figure("<svg></svg>");
+        report.everywhere().figure("<svg></svg>".to_owned());
         assert_eq!(
             report.text(),
             "all is well\nwritten: a.toml\n  one\n  two\n"

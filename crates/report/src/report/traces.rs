@@ -1,18 +1,18 @@
 //! Series over time for the viewer of a page, thinned so that every extreme survives and the page
 //! stays small.
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::encode;
 
-/// Bytes that the numbers of all traces of one figure may take before they are written as text (a
-/// third more): a log of 60 s at 1 kHz with four joints, measured, reconstructed twice and both
-/// residuals, fits whole.
+/// Most bytes of the numbers of a figure: 60 s at 1 kHz of four joints, measured, by two models and both residuals.
 const MOST_BYTES: usize = 2_700_000;
 
 /// How a line is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TraceStyle {
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum TraceStyle {
     Measured,
     Model,
     Residual,
@@ -21,34 +21,20 @@ pub enum TraceStyle {
     Motion,
 }
 
-impl TraceStyle {
-    fn name(self) -> &'static str {
-        match self {
-            TraceStyle::Measured => "measured",
-            TraceStyle::Model => "model",
-            TraceStyle::Residual => "residual",
-            TraceStyle::Before => "before",
-            TraceStyle::After => "after",
-            TraceStyle::Motion => "motion",
-        }
-    }
-}
-
 /// One line of a panel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TraceLine {
+#[derive(Debug, Clone)]
+pub(crate) struct TraceLine {
     pub name: String,
     pub style: TraceStyle,
     /// One value per time of the trace; a gap where it is not finite.
     pub values: Vec<f64>,
 }
 
-/// One panel: what shares an axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TracePanel {
+/// One panel: lines that share an axis.
+#[derive(Debug, Clone)]
+pub(crate) struct TracePanel {
     /// Joint or coordinate; empty where the panel above has it.
     pub name: String,
-    /// What it is, and its unit.
     pub quantity: String,
     pub unit: String,
     /// Low and centred on 0, below the panel that it belongs to: a residual.
@@ -57,22 +43,22 @@ pub struct TracePanel {
     pub lines: Vec<TraceLine>,
 }
 
-/// What is shown at a time: one log in one form.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trace {
+/// One log in one form, of which a page shows one at a time.
+#[derive(Debug)]
+pub(crate) struct Trace {
     /// Name in the list of traces.
     pub name: String,
     /// Time [s], rising.
     pub t: Vec<f64>,
-    /// First samples of stretches that no line joins with what is before.
+    /// First samples of stretches that no line joins with those before.
     pub breaks: Vec<usize>,
     pub panels: Vec<TracePanel>,
 }
 
 /// The traces of one figure; the first is shown first.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Traces {
-    /// What a screen reader says.
+#[derive(Debug)]
+pub(crate) struct Traces {
+    /// For a screen reader.
     pub label: String,
     /// Traces with the same lines.
     pub traces: Vec<Trace>,
@@ -91,11 +77,8 @@ impl Traces {
     /// Samples that a trace may have for all of them to fit.
     fn most_samples(&self) -> usize {
         let longest = self.traces.iter().map(|t| t.t.len()).max().unwrap_or(0);
-        let bytes = |most: usize| -> usize {
-            let each = self.traces.iter();
-            each.map(|t| t.t.len().min(most) * (4 + 2 * t.lines().count()))
-                .sum()
-        };
+        let size = |t: &Trace, most| t.t.len().min(most) * (4 + 2 * t.lines().count());
+        let bytes = |most: usize| self.traces.iter().map(|t| size(t, most)).sum::<usize>();
         let mut most = longest;
         while bytes(most) > MOST_BYTES && most > 16 {
             most = most / 10 * 9;
@@ -111,18 +94,10 @@ impl Trace {
 
     fn view(&self, most: usize) -> Value {
         let buckets = Buckets::of(self.t.len(), &self.breaks, most);
-        let t = buckets.times(&self.t);
-        let [from, to] = encode::extent(&t);
+        let (t, [from, to]) = encode::times(&buckets.times(&self.t));
         let line = |line: &TraceLine| {
-            let values = buckets.extremes(&line.values);
-            let extent = encode::extent(&values);
-            json!({
-                "name": line.name,
-                "style": line.style.name(),
-                "from": extent[0],
-                "to": extent[1],
-                "data": encode::values(&values, extent),
-            })
+            let (data, [from, to]) = encode::values(&buckets.extremes(&line.values));
+            json!({"name": line.name, "style": line.style, "from": from, "to": to, "data": data})
         };
         let panel = |panel: &TracePanel| {
             json!({
@@ -136,7 +111,7 @@ impl Trace {
         };
         json!({
             "name": self.name,
-            "t": {"from": from, "to": to, "data": encode::times(&t, [from, to])},
+            "t": {"from": from, "to": to, "data": t},
             "breaks": buckets.breaks(),
             "panels": self.panels.iter().map(panel).collect::<Vec<_>>(),
         })
@@ -187,34 +162,35 @@ impl Buckets {
         self.begins.iter().map(|b| each * b).collect()
     }
 
-    fn times(&self, t: &[f64]) -> Vec<f64> {
+    /// Two values for each bucket, where not every sample is one.
+    fn thinned(&self, values: &[f64], both: impl Fn(&[f64]) -> [f64; 2]) -> Vec<f64> {
         if self.whole {
-            return t.to_vec();
+            return values.to_vec();
         }
-        let ends = |range: std::ops::Range<usize>| {
-            let bucket = t.get(range).unwrap_or_default();
+        let buckets = self
+            .ranges()
+            .map(|range| values.get(range).unwrap_or_default());
+        buckets.flat_map(both).collect()
+    }
+
+    fn times(&self, t: &[f64]) -> Vec<f64> {
+        self.thinned(t, |bucket| {
             [bucket.first(), bucket.last()].map(|t| t.copied().unwrap_or(0.0))
-        };
-        self.ranges().flat_map(ends).collect()
+        })
     }
 
     /// The smallest and the largest of each bucket, in their order.
     fn extremes(&self, values: &[f64]) -> Vec<f64> {
-        if self.whole {
-            return values.to_vec();
-        }
-        let both = |range: std::ops::Range<usize>| {
-            let bucket = values.get(range).unwrap_or_default().iter().enumerate();
-            let finite = bucket.filter(|(_, v)| v.is_finite());
+        self.thinned(values, |bucket| {
+            let finite = bucket.iter().enumerate().filter(|(_, v)| v.is_finite());
             let low = finite.clone().min_by(|a, b| a.1.total_cmp(b.1));
             let high = finite.max_by(|a, b| a.1.total_cmp(b.1));
-            match (low, high) {
-                (Some(low), Some(high)) if low.0 <= high.0 => [*low.1, *high.1],
-                (Some(low), Some(high)) => [*high.1, *low.1],
-                _ => [f64::NAN; 2],
+            match low.zip(high) {
+                Some((low, high)) if low.0 <= high.0 => [*low.1, *high.1],
+                Some((low, high)) => [*high.1, *low.1],
+                None => [f64::NAN; 2],
             }
-        };
-        self.ranges().flat_map(both).collect()
+        })
     }
 }
 
@@ -273,30 +249,14 @@ mod tests {
     #[test]
     fn a_minute_of_four_joints_is_kept_whole_and_an_hour_still_fits() {
         let of = |samples: usize| {
-            let line = |style| TraceLine {
-                name: "l".into(),
-                style,
-                values: vec![0.5; samples],
-            };
-            let panel = TracePanel {
-                lines: vec![
-                    line(TraceStyle::Measured),
-                    line(TraceStyle::Before),
-                    line(TraceStyle::After),
-                    line(TraceStyle::Before),
-                    line(TraceStyle::After),
-                ],
-                ..Traces::sample("q").traces[0].panels[0].clone()
-            };
-            Traces {
-                label: "l".into(),
-                traces: vec![Trace {
-                    name: "n".into(),
-                    t: (0..samples).map(|k| k as f64).collect(),
-                    breaks: vec![0],
-                    panels: vec![panel; 4],
-                }],
-            }
+            let mut traces = Traces::sample("q");
+            let trace = &mut traces.traces[0];
+            trace.t = (0..samples).map(|k| k as f64).collect();
+            let panel = &mut trace.panels[0];
+            panel.lines[0].values = vec![0.5; samples];
+            panel.lines = vec![panel.lines[0].clone(); 5];
+            trace.panels = vec![trace.panels[0].clone(); 4];
+            traces
         };
         let minute = of(60_001);
         assert_eq!(minute.most_samples(), 60_001);

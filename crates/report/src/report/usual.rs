@@ -3,7 +3,7 @@
 use cft_ident_core::number;
 use cft_ident_logs::log::TorqueIs;
 
-/// What the torques of a published figure are.
+/// How the torques of a published figure were measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
     /// Sensors at the joints.
@@ -12,7 +12,7 @@ pub enum Measured {
     Currents,
 }
 
-/// Over what an error is taken.
+/// The torques over which an error is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Over {
     /// Norm of the error of all joints over the norm of their torques.
@@ -88,7 +88,7 @@ pub const PUBLISHED: [Published; 6] = [
 ];
 
 /// Least and largest published error.
-pub fn range(measured: Measured) -> [f64; 2] {
+pub(super) fn range(measured: Measured) -> [f64; 2] {
     let rows = PUBLISHED.iter().filter(|row| row.measured == measured);
     let errors = rows.flat_map(|row| row.fitted.into_iter().chain(row.unseen));
     errors.fold([f64::INFINITY, 0.0], |[least, most], error| {
@@ -96,60 +96,58 @@ pub fn range(measured: Measured) -> [f64; 2] {
     })
 }
 
-/// Least and largest error that is usual where torques are these; of both kinds where a log does not say how its torques were
-/// measured.
-pub fn band(torque_is: Option<TorqueIs>) -> [f64; 2] {
-    let currents = range(Measured::Currents);
+/// Whether torques come from the motors; a log may not say it.
+fn of_motors(torque_is: Option<TorqueIs>) -> bool {
+    use TorqueIs::{Commanded, Current, Joint, Motor};
     match torque_is {
-        Some(TorqueIs::Motor | TorqueIs::Current | TorqueIs::Commanded) => currents,
-        Some(TorqueIs::Joint) | None => {
-            let sensors = range(Measured::Sensors);
-            [sensors[0].min(currents[0]), sensors[1].max(currents[1])]
-        }
+        Some(Motor | Current | Commanded) => true,
+        Some(Joint) | None => false,
+    }
+}
+
+/// Least and largest error that is usual where torques are these; of both kinds where they may be sensors'.
+pub(super) fn band(torque_is: Option<TorqueIs>) -> [f64; 2] {
+    let (currents, sensors) = (range(Measured::Currents), range(Measured::Sensors));
+    match of_motors(torque_is) {
+        true => currents,
+        false => [sensors[0].min(currents[0]), sensors[1].max(currents[1])],
     }
 }
 
 /// Errors that are usual, as a picture has them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Usual {
+pub(crate) struct Usual {
     /// Least and largest.
     pub band: [f64; 2],
     pub words: String,
 }
 
-/// The band of a picture, with what it is made of.
-pub fn drawn(torque_is: Option<TorqueIs>) -> Usual {
-    let percent = |ends: [f64; 2]| {
-        let [least, most] = ends.map(|error| number::significant(100.0 * error, 2));
-        format!("{least} to {most} %")
-    };
-    let (band, currents) = (band(torque_is), range(Measured::Currents));
-    let words = match band == currents {
-        true => format!("usual for motor currents: {}", percent(band)),
-        false => format!(
-            "usual: {} (joint sensors), {} (motor currents)",
-            percent(range(Measured::Sensors)),
-            percent(currents)
-        ),
-    };
-    Usual { band, words }
+fn percent(measured: Measured) -> String {
+    let [least, most] = range(measured).map(|error| number::significant(100.0 * error, 2));
+    format!("{least} to {most} %")
 }
 
-/// How large errors usually are, in a sentence; of both kinds where a log does not say how its torques were measured.
-pub fn words(torque_is: Option<TorqueIs>) -> String {
-    let percent = |measured| {
-        let [least, most] = range(measured).map(|error| number::significant(100.0 * error, 2));
-        format!("{least} to {most} %")
-    };
-    let currents = percent(Measured::Currents);
-    match torque_is {
-        Some(TorqueIs::Motor | TorqueIs::Current | TorqueIs::Commanded) => {
-            format!("Usual for torques from motor currents: {currents}.")
+/// The band of a picture, with its kinds.
+pub(super) fn drawn(torque_is: Option<TorqueIs>) -> Usual {
+    let [sensors, currents] = [Measured::Sensors, Measured::Currents].map(percent);
+    Usual {
+        band: band(torque_is),
+        words: match of_motors(torque_is) {
+            true => format!("usual for motor currents: {currents}"),
+            false => format!("usual: {sensors} (joint sensors), {currents} (motor currents)"),
+        },
+    }
+}
+
+/// How large errors usually are, in a sentence; of both kinds where they may be sensors'.
+pub(super) fn words(torque_is: Option<TorqueIs>) -> String {
+    let [sensors, currents] = [Measured::Sensors, Measured::Currents].map(percent);
+    match of_motors(torque_is) {
+        true => format!("Usual for torques from motor currents: {currents}."),
+        false => {
+            format!(
+                "Usual: {currents} for torques from motor currents, {sensors} for joint torque sensors."
+            )
         }
-        Some(TorqueIs::Joint) | None => format!(
-            "Usual: {currents} for torques from motor currents, {} for joint torque sensors.",
-            percent(Measured::Sensors)
-        ),
     }
 }
 
@@ -169,18 +167,10 @@ mod tests {
     #[test]
     fn every_figure_has_a_source_and_is_a_fraction() {
         for row in &PUBLISHED {
-            let errors = [row.fitted, row.unseen];
-            let mut known = errors.iter().flatten().peekable();
-            assert!(
-                known.peek().is_some() && !row.source.is_empty(),
-                "{}",
-                row.machine
-            );
-            assert!(
-                known.all(|error| (0.001..1.0).contains(error)),
-                "{}",
-                row.machine
-            );
+            let known: Vec<f64> = row.fitted.into_iter().chain(row.unseen).collect();
+            let fractions = known.iter().all(|error| (0.001..1.0).contains(error));
+            let sound = fractions && !known.is_empty() && !row.source.is_empty();
+            assert!(sound, "{}", row.machine);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What a run has to say, as one value: verdict, tables, figures and notes in their order. A terminal
+//! The result of a run as one value: verdict, tables, figures and notes in their order. A terminal
 //! and a page are two renderings of it ([`super::text`], [`super::page`]); each part says where it is
 //! shown, since a page has room for more.
 
@@ -8,7 +8,7 @@ use super::traces::Traces;
 
 /// Where a part is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shown {
+pub(super) enum Shown {
     Everywhere,
     Terminal,
     /// On a terminal that is to show little.
@@ -34,7 +34,7 @@ pub enum Detail {
 
 /// One part of a report.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Part {
+pub(super) enum Part {
     /// The verdict in words; `good` where nothing calls for attention.
     Verdict {
         text: String,
@@ -62,8 +62,7 @@ pub enum Part {
         summary: String,
         cells: Cells,
     },
-    /// Series over time that can be zoomed, as the page's viewer reads them, and the SVG document that
-    /// is shown without a script.
+    /// Series over time as the page's viewer reads them, and the SVG document that is shown without a script.
     Traces {
         data: String,
         still: String,
@@ -80,7 +79,7 @@ pub enum Part {
 /// A report under construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
-    title: String,
+    pub(super) title: String,
     parts: Vec<(Shown, Part)>,
 }
 
@@ -93,12 +92,8 @@ impl Report {
         }
     }
 
-    pub fn title(&self) -> &str {
-        &self.title
-    }
-
     /// The parts that are shown in one of these places or everywhere, in their order.
-    pub fn parts<'a>(&'a self, places: &'a [Shown]) -> impl Iterator<Item = &'a Part> + Clone {
+    pub(super) fn parts<'a>(&'a self, places: &'a [Shown]) -> impl Iterator<Item = &'a Part> {
         let there = |shown: Shown| shown == Shown::Everywhere || places.contains(&shown);
         let parts = self.parts.iter().filter(move |(shown, _)| there(*shown));
         parts.map(|(_, part)| part)
@@ -185,38 +180,42 @@ impl Writer<'_> {
         }
     }
 
-    pub fn table(&mut self, table: Table) {
-        self.push(Part::Table(table));
+    pub fn table(&mut self, table: impl Into<Table>) {
+        self.push(Part::Table(table.into()));
     }
 
-    /// The table of these columns, without alignments: those of a page's columns are seen from its cells.
-    pub fn rows(&mut self, caption: &str, head: &[&str], rows: Vec<Vec<String>>) {
-        self.table(Table::of_words(caption, head, rows));
+    /// A table below an empty line.
+    pub(super) fn table_apart(&mut self, table: impl Into<Table>) {
+        self.line("");
+        self.table(table);
     }
 
-    pub fn figure(&mut self, svg: &str) {
-        self.push(Part::Figure(svg.to_owned()));
+    /// A table; nothing where it has no row.
+    pub(super) fn table_if_any(&mut self, table: impl Into<Table>) {
+        let table = table.into();
+        if !table.is_empty() {
+            self.table(table);
+        }
+    }
+
+    pub(super) fn figure(&mut self, svg: String) {
+        self.push(Part::Figure(svg));
     }
 
     /// Small pictures that belong together.
-    pub fn figures(&mut self, cells: &Cells) {
-        self.push(Part::Figures(cells.clone()));
+    pub(super) fn figures(&mut self, cells: Cells) {
+        self.push(Part::Figures(cells));
     }
 
     /// Small pictures that are folded away.
-    pub(crate) fn folded(&mut self, summary: &str, cells: &Cells) {
-        self.push(Part::Folded {
-            summary: summary.to_owned(),
-            cells: cells.clone(),
-        });
+    pub(super) fn folded(&mut self, summary: String, cells: Cells) {
+        self.push(Part::Folded { summary, cells });
     }
 
     /// Series over time, and the still picture that is shown without a script.
-    pub fn traces(&mut self, traces: &Traces, still: &str) {
-        self.push(Part::Traces {
-            data: traces.data(),
-            still: still.to_owned(),
-        });
+    pub(super) fn traces(&mut self, traces: &Traces, still: String) {
+        let data = traces.data();
+        self.push(Part::Traces { data, still });
     }
 
     pub fn code(&mut self, text: &str) {

@@ -1,41 +1,30 @@
 //! From data to px along one axis, and the numbers that stand at it.
 
+use crate::report::encode::extent;
+
 /// A linear map of a closed interval of data onto an interval of px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
-    pub from: f64,
-    pub to: f64,
-    px_from: f64,
-    px_to: f64,
+    pub data: [f64; 2],
+    px: [f64; 2],
 }
 
 impl Scale {
-    /// `from..to` of the data (in order, both finite, not equal) onto `px_from..px_to`.
-    pub fn new([from, to]: [f64; 2], px_from: f64, px_to: f64) -> Self {
-        Scale {
-            from,
-            to,
-            px_from,
-            px_to,
-        }
+    /// An interval of the data (in order, both finite, not equal) onto `px_from..px_to`.
+    pub fn new(data: [f64; 2], px_from: f64, px_to: f64) -> Self {
+        let px = [px_from, px_to];
+        Scale { data, px }
     }
 
     pub(crate) fn px(&self, value: f64) -> f64 {
-        self.px_from + (value - self.from) / (self.to - self.from) * (self.px_to - self.px_from)
+        let ([from, to], [px_from, px_to]) = (self.data, self.px);
+        px_from + (value - from) / (to - from) * (px_to - px_from)
     }
 }
 
-/// The interval of the finite values, widened by `margin` of itself on both sides; `None` where
-/// there are none. A single value gets an interval around it.
+/// The same, widened by `margin` of itself on both sides; a single value gets an interval around it.
 pub(super) fn interval(values: impl IntoIterator<Item = f64>, margin: f64) -> Option<[f64; 2]> {
-    let mut found: Option<[f64; 2]> = None;
-    // Beyond this the width itself would overflow; no torque or time is there.
-    let drawable = |value: &f64| value.abs() < 1e150;
-    for value in values.into_iter().filter(drawable) {
-        let [low, high] = found.unwrap_or([value, value]);
-        found = Some([low.min(value), high.max(value)]);
-    }
-    let [low, high] = found?;
+    let [low, high] = extent(values)?;
     let size = low.abs().max(high.abs());
     if high - low <= 1e-12 * size || size == 0.0 {
         let half = if size == 0.0 { 1.0 } else { 0.1 * size };
@@ -60,35 +49,24 @@ impl Ticks {
         let counted = |step: f64| {
             let first = (from / step - 1e-9).ceil();
             let last = (to / step + 1e-9).floor();
-            (
-                step,
-                first,
-                (last - first + 1.0).clamp(0.0, 1000.0) as usize,
-            )
+            let count = (last - first + 1.0).clamp(0.0, 1000.0) as usize;
+            (step, first, count)
         };
         let (step, first, count) = (0..4)
             .map(|halvings| (to - from) / wanted.max(2) as f64 / f64::from(1 << halvings))
             .map(|raw| counted(round_step(raw)))
             .find(|(_, _, count)| *count >= 3)
             .unwrap_or_else(|| counted(0.25 * (to - from)));
-        let values: Vec<f64> = (0..count)
-            .map(|k| {
-                let value = (first + k as f64) * step;
-                if value.abs() < 1e-9 * step {
-                    0.0
-                } else {
-                    value
-                }
-            })
-            .collect();
+        let values = (0..count).map(|k| (first + k as f64) * step);
+        let at_zero = |value: f64| value.abs() < 1e-9 * step;
+        let values = values.map(|value| if at_zero(value) { 0.0 } else { value });
+        let values: Vec<f64> = values.collect();
         let size = from.abs().max(to.abs());
         let leading = size.log10().floor();
-        let power = if (-3.0..5.0).contains(&leading) {
-            0
-        } else if leading > 0.0 {
-            3 * (leading / 3.0).floor() as i32
-        } else {
-            3 * ((leading + 1.0) / 3.0).floor() as i32
+        let power = match leading {
+            -3.0..5.0 => 0,
+            0.0.. => 3 * (leading / 3.0).floor() as i32,
+            _ => 3 * ((leading + 1.0) / 3.0).floor() as i32,
         };
         let unit = 10f64.powi(power);
         let decimals = (-(step / unit).log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
@@ -108,18 +86,14 @@ impl Ticks {
         if self.power == 0 {
             return unit.to_owned();
         }
-        let digits: String = self
-            .power
-            .to_string()
-            .chars()
-            .map(|c| match c {
-                '-' => '\u{207b}',
-                '1' => '\u{b9}',
-                '2' => '\u{b2}',
-                '3' => '\u{b3}',
-                c => char::from_u32(0x2070 + c.to_digit(10).unwrap_or(0)).unwrap_or(c),
-            })
-            .collect();
+        let raised = |c: char| match c {
+            '-' => '\u{207b}',
+            '1' => '\u{b9}',
+            '2' => '\u{b2}',
+            '3' => '\u{b3}',
+            c => char::from_u32(0x2070 + c.to_digit(10).unwrap_or(0)).unwrap_or(c),
+        };
+        let digits: String = self.power.to_string().chars().map(raised).collect();
         format!("10{digits} {unit}")
     }
 }
@@ -142,16 +116,13 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let ticks = Ticks::new([-0.31, 0.52], 5);
-        assert_eq!(ticks.texts, ["\u{2212}0.2", "0.0", "0.2", "0.4"]);
-        assert_eq!(
-            Ticks::new([0.0, 20.0], 5).texts,
-            ["0", "5", "10", "15", "20"]
-        );
-        assert_eq!(
-            Ticks::new([0.0, 0.3], 3).texts,
-            ["0.0", "0.1", "0.2", "0.3"]
-        );
+        for (ends, wanted, texts) in [
+            ([-0.31, 0.52], 5, "\u{2212}0.2 0.0 0.2 0.4"),
+            ([0.0, 20.0], 5, "0 5 10 15 20"),
+            ([0.0, 0.3], 3, "0.0 0.1 0.2 0.3"),
+        ] {
+            assert_eq!(Ticks::new(ends, wanted).texts.join(" "), texts);
+        }
     }
 
     #[test]
@@ -159,10 +130,13 @@ mod tests {
         for k in 0..400 {
             let half = 1.013f64.powi(k) * 1e-3;
             for (wanted, most) in [(3, 7), (4, 8), (5, 9), (9, 15)] {
-                let count = Ticks::new([-half, half], wanted).values.len();
-                assert!((3..=most).contains(&count), "{half} {wanted}: {count}");
-                let count = Ticks::new([0.4 * half, half], wanted).values.len();
-                assert!((3..=most).contains(&count), "{half} {wanted}: {count}");
+                for from in [-half, 0.4 * half] {
+                    let count = Ticks::new([from, half], wanted).values.len();
+                    assert!(
+                        (3..=most).contains(&count),
+                        "{from} {half} {wanted}: {count}"
+                    );
+                }
             }
         }
     }

@@ -2,22 +2,22 @@
 //! them are seen on a phone.
 
 use super::legend::{self, Key};
-use super::svg::Svg;
+use super::svg::{Anchor, Svg, Type};
 
 /// Width of one picture [px].
-pub(super) const WIDTH: f64 = 380.0;
+const WIDTH: f64 = 380.0;
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 12.0;
 /// Room above a panel for its name, or for marks alone, and below it for numbers and the name of its axis [px].
 const NAME: f64 = 24.0;
-const MARKS: f64 = 14.0;
+pub(super) const MARKS: f64 = 14.0;
 const BELOW: f64 = 40.0;
 
-/// Pictures that belong together, with what is said of them.
+/// Pictures that belong together, with the sentences below them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cells {
     pub title: String,
-    /// What the colours mean, an SVG document each.
+    /// The entries of the legend, an SVG document each.
     pub key: Vec<String>,
     /// SVG documents.
     pub pictures: Vec<String>,
@@ -27,8 +27,22 @@ pub struct Cells {
     pub words: Vec<String>,
 }
 
-/// One picture with a panel of a height [px]; `title` and `description` are what a screen reader says, `draw` is given
-/// the panel's frame: left, top, width, height [px].
+impl Cells {
+    pub(super) fn new(
+        title: &str,
+        entries: &[(Key, &str)],
+        pictures: impl IntoIterator<Item = String>,
+    ) -> Self {
+        Cells {
+            title: title.to_owned(),
+            key: entries.iter().map(|entry| legend::alone(*entry)).collect(),
+            pictures: pictures.into_iter().collect(),
+            ..Cells::default()
+        }
+    }
+}
+
+/// One picture with a panel of a height, which `draw` puts into its frame: left, top, width, height [px].
 pub(super) fn cell(
     title: &str,
     description: &str,
@@ -38,17 +52,8 @@ pub(super) fn cell(
     below(NAME, [title, description], height, draw)
 }
 
-/// The same of a panel that bears no name.
-pub(super) fn nameless(
-    title: &str,
-    description: &str,
-    height: f64,
-    draw: impl FnOnce(&mut Svg, [f64; 4]),
-) -> String {
-    below(MARKS, [title, description], height, draw)
-}
-
-fn below(
+/// The same with another room above.
+pub(super) fn below(
     above: f64,
     [title, description]: [&str; 2],
     height: f64,
@@ -59,7 +64,8 @@ fn below(
     svg.finish()
 }
 
-/// The legend of all pictures.
-pub(super) fn key(entries: &[(Key, &str)]) -> Vec<String> {
-    entries.iter().map(|entry| legend::alone(*entry)).collect()
+/// The name above a panel.
+pub(super) fn name(svg: &mut Svg, [left, top, ..]: [f64; 4], name: &str) {
+    let style = Type::new(11.5, Anchor::Start).bold();
+    svg.text([left, top - 8.0], name, style);
 }

@@ -5,12 +5,12 @@ use super::cell::{self, Cells};
 use super::colour;
 use super::legend::Key;
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use super::svg::{Stroke, Svg, fitted};
 use cft_ident_core::number;
 
 /// One parameter over time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CoursePanel {
+#[derive(Clone)]
+pub(crate) struct CoursePanel {
     /// Name of the parameter, with its joint.
     pub name: String,
     pub unit: String,
@@ -25,8 +25,7 @@ pub struct CoursePanel {
 }
 
 /// A figure of one panel per parameter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CourseFigure {
+pub(crate) struct CourseFigure {
     pub title: String,
     /// `s`, `h`, `d`, or nothing where logs are counted.
     pub time_unit: String,
@@ -56,17 +55,14 @@ impl CourseFigure {
             })
         };
         Cells {
-            title: self.title.clone(),
-            key: cell::key(&key),
-            pictures: self.panels.iter().map(picture).collect(),
             apart: true,
-            words: Vec::new(),
+            ..Cells::new(&self.title, &key, self.panels.iter().map(picture))
         }
     }
 }
 
 impl CoursePanel {
-    /// What a screen reader says: the ends of the course and its changes.
+    /// The ends of the course and its changes, for a screen reader.
     fn words(&self) -> String {
         let known: Vec<[f64; 2]> = self.course.iter().flatten().copied().collect();
         let (Some(first), Some(last)) = (known.first(), known.last()) else {
@@ -88,7 +84,7 @@ impl CoursePanel {
     fn draw(&self, svg: &mut Svg, frame: [f64; 4], time_unit: &str) {
         let [left, top, width, height] = frame;
         let name = fitted(&self.name, 11.5, width);
-        svg.heading([left, top - 7.0], &name, "", Type::new(11.5, Anchor::Start));
+        svg.heading([left, top - 7.0], &name, "");
         let ends = self.course.iter().flatten();
         let ends = ends.flat_map(|[x, std]| [x - BAND * std, x + BAND * std]);
         let values = self.estimates.iter().flatten().copied().chain(ends);
@@ -102,16 +98,10 @@ impl CoursePanel {
         panel.grid(svg);
         svg.clip(frame);
         let place = |t: f64, x: f64| [panel.x.px(t), panel.y.px(x)];
-        let pairs = || self.times.iter().zip(&self.course);
-        let known = || pairs().filter_map(|(t, c)| c.map(|[x, std]| (*t, x, std)));
-        let upper = known().map(|(t, x, std)| place(t, x + BAND * std));
-        let mut lower: Vec<[f64; 2]> = known()
-            .map(|(t, x, std)| place(t, x - BAND * std))
-            .collect();
-        lower.reverse();
-        let band: Vec<[f64; 2]> = upper.chain(lower).collect();
-        svg.area(&band, COURSE.colour, 0.18);
-        svg.curve(&[known().map(|(t, x, _)| place(t, x)).collect()], COURSE);
+        let rows = self.times.iter().zip(&self.course);
+        let known = rows.filter_map(|(t, c)| c.map(|[x, std]| [*t, x, BAND * std]));
+        svg.area(&panel.band(known.clone()), COURSE.colour, 0.18);
+        svg.curve(&[known.map(|[t, x, _]| place(t, x)).collect()], COURSE);
         for (t, x) in self.times.iter().zip(&self.estimates) {
             if let Some(x) = x {
                 svg.dot(place(*t, *x), 2.0, colour::MUTED);
@@ -122,13 +112,11 @@ impl CoursePanel {
             svg.line([at, top], [at, top + height], CHANGE);
         }
         svg.end_clip();
-        panel.outline(svg);
-        panel.x_numbers(svg);
-        match time_unit {
-            "" => panel.x_title(svg, "log", "number"),
-            unit => panel.x_title(svg, "time", unit),
-        }
-        panel.y_title(svg, 46.0, "value", &self.unit);
+        let below = match time_unit {
+            "" => ["log", "number"],
+            unit => ["time", unit],
+        };
+        panel.axes(svg, 46.0, below, ["value", &self.unit]);
     }
 }
 

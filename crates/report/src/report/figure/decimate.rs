@@ -4,73 +4,37 @@
 /// Points that a line has at most, gaps aside.
 pub(super) const POINTS: usize = 2000;
 
-/// Runs of drawable points of a series, split where `x` or `y` is not finite.
-///
-/// At most `points` of them (each gap may add two): consecutive samples form buckets, and a bucket
-/// gives its smallest and its largest value in order of time. Short series are kept as they are.
+/// Runs of at most `points` of a series (each gap may add two), split where `x` or `y` is not finite.
 pub(super) fn decimated(x: &[f64], y: &[f64], points: usize) -> Vec<Vec<[f64; 2]>> {
-    let count = x.len().min(y.len());
-    let size = if count <= points {
-        1
-    } else {
-        (2 * count).div_ceil(points.max(2))
+    let samples: Vec<[f64; 2]> = x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
+    let size = match samples.len() <= points {
+        true => 1,
+        false => (2 * samples.len()).div_ceil(points.max(2)),
     };
     let mut runs = Vec::new();
     let mut run: Vec<[f64; 2]> = Vec::new();
-    let mut bucket = Bucket::default();
-    for k in 0..count {
-        if k % size == 0 {
-            bucket.empty_into(&mut run);
-        }
-        if x[k].is_finite() && y[k].is_finite() {
-            bucket.add([x[k], y[k]]);
-        } else {
-            bucket.empty_into(&mut run);
-            if !run.is_empty() {
+    for bucket in samples.chunks(size) {
+        let gap = |sample: &[f64; 2]| !(sample[0].is_finite() && sample[1].is_finite());
+        for (k, part) in bucket.split(gap).enumerate() {
+            if k > 0 {
                 runs.push(std::mem::take(&mut run));
             }
+            run.extend(extremes(part));
         }
     }
-    bucket.empty_into(&mut run);
-    if !run.is_empty() {
-        runs.push(run);
-    }
+    runs.push(run);
+    runs.retain(|run| !run.is_empty());
     runs
 }
 
-/// Extremes of consecutive samples, with their place among them.
-#[derive(Default)]
-struct Bucket {
-    samples: usize,
-    low: (usize, [f64; 2]),
-    high: (usize, [f64; 2]),
-}
-
-impl Bucket {
-    fn add(&mut self, point: [f64; 2]) {
-        if self.samples == 0 || point[1] < self.low.1[1] {
-            self.low = (self.samples, point);
-        }
-        if self.samples == 0 || point[1] > self.high.1[1] {
-            self.high = (self.samples, point);
-        }
-        self.samples += 1;
-    }
-
-    fn empty_into(&mut self, run: &mut Vec<[f64; 2]>) {
-        if self.samples > 0 {
-            let (first, second) = if self.low.0 <= self.high.0 {
-                (self.low, self.high)
-            } else {
-                (self.high, self.low)
-            };
-            run.push(first.1);
-            if second.0 > first.0 {
-                run.push(second.1);
-            }
-            self.samples = 0;
-        }
-    }
+/// The samples of the smallest and of the largest value, in order of time; once where they are one.
+fn extremes(part: &[[f64; 2]]) -> impl Iterator<Item = [f64; 2]> {
+    let value = |k: usize| part[k][1];
+    let low = (0..part.len()).reduce(|a, b| if value(b) < value(a) { b } else { a });
+    let high = (0..part.len()).reduce(|a, b| if value(b) > value(a) { b } else { a });
+    let ends = low.zip(high).map(|(a, b)| [a.min(b), a.max(b)]);
+    let ends = ends.map(|[first, last]| [Some(first), Some(last).filter(|_| last > first)]);
+    ends.into_iter().flatten().flatten().map(|k| part[k])
 }
 
 #[cfg(test)]
@@ -91,15 +55,11 @@ mod tests {
     }
 
     #[test]
-    fn short_series_stay_as_they_are_and_gaps_split() {
+    fn short_series_stay_as_they_are_and_gaps_split_even_all_of_it() {
         let x = [0.0, 1.0, 2.0, 3.0, 4.0];
         let y = [5.0, 6.0, f64::NAN, 6.0, 5.0];
         let runs = decimated(&x, &y, POINTS);
         assert_eq!(runs, [[[0.0, 5.0], [1.0, 6.0]], [[3.0, 6.0], [4.0, 5.0]]]);
-    }
-
-    #[test]
-    fn nothing_comes_of_nothing() {
         assert!(decimated(&[], &[], POINTS).is_empty());
         assert!(decimated(&[0.0, 1.0], &[f64::NAN; 2], POINTS).is_empty());
     }

@@ -1,23 +1,20 @@
 //! One effect over the signal on which it depends: the residual without it as a cloud with the torque that it adds
-//! over it, and beside it what is left with it.
+//! over it, and beside it the residual with it.
 
 use super::axis;
 use super::cell::{self, Cells};
 use super::colour;
 use super::legend::Key;
 use super::panel::Panel;
-use super::svg::{Anchor, Svg, Type};
 
-/// A cloud of rows, and what the effect gives at each.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EffectFigure {
-    /// What was found.
+/// A cloud of rows, and the torque of the effect at each.
+pub(crate) struct EffectFigure {
     pub title: String,
     /// The finding in a sentence, for those who do not see the picture.
     pub description: String,
     /// Name and unit of the signal below.
     pub over: (String, String),
-    /// What stands at the left, and its unit.
+    /// Name and unit of the quantity at the left.
     pub of: (String, String),
     /// Signal, residual without the effect, torque of the effect.
     pub rows: Vec<[f64; 3]>,
@@ -52,11 +49,7 @@ impl EffectFigure {
         let picture = |(name, clouds): (&str, &[Cloud])| {
             let description = format!("{name}. {}", self.description);
             cell::cell(&self.title, &description, HEIGHT, |svg, frame| {
-                svg.text(
-                    [frame[0], frame[1] - 8.0],
-                    name,
-                    Type::new(11.5, Anchor::Start).bold(),
-                );
+                cell::name(svg, frame, name);
                 let (Some(signals), Some(torques)) = (signals, torques) else {
                     Panel::empty(svg, frame, "no rows");
                     return;
@@ -70,7 +63,8 @@ impl EffectFigure {
                     }
                 }
                 svg.end_clip();
-                self.axes(svg, &panel);
+                let [below, at_left] = [&self.over, &self.of].map(|(name, unit)| [&**name, unit]);
+                panel.axes(svg, 44.0, below, at_left);
             })
         };
         let key = [
@@ -80,23 +74,13 @@ impl EffectFigure {
         ];
         let pictures = ["without it", "with it"].into_iter().zip(clouds);
         Cells {
-            title: self.title.clone(),
-            key: cell::key(&key),
-            apart: false,
-            pictures: pictures.map(picture).collect(),
             words,
+            ..Cells::new(&self.title, &key, pictures.map(picture))
         }
-    }
-
-    fn axes(&self, svg: &mut Svg, panel: &Panel) {
-        panel.outline(svg);
-        panel.x_numbers(svg);
-        panel.x_title(svg, &self.over.0, &self.over.1);
-        panel.y_title(svg, 44.0, &self.of.0, &self.of.1);
     }
 }
 
-/// What of a row is drawn, in which colour, and how large the dots are [px].
+/// The value of a row that is drawn, in which colour, and how large the dots are [px].
 type Cloud<'a> = (&'a dyn Fn(&[f64; 3]) -> f64, &'static str, f64);
 
 #[cfg(test)]
@@ -104,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cloud_and_shape_are_drawn_beside_what_is_left_and_the_finding_is_told() {
+    fn cloud_and_shape_are_drawn_beside_the_rest_and_the_finding_is_said() {
         let row = |k: i32| [f64::from(k), f64::from(k % 7), f64::NAN];
         let mut figure = EffectFigure {
             title: "ripple of q1, 2.5 mm pitch".into(),

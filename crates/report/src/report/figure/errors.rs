@@ -6,27 +6,35 @@ use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
 use crate::report::usual::Usual;
 use cft_ident_core::number;
 
-/// An error and its 95 % confidence interval, as fractions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ErrorBar {
+/// An error and its 95 % confidence interval where that is known, as fractions.
+#[derive(Clone, Copy)]
+pub(crate) struct ErrorBar {
     pub error: f64,
-    /// None where it is not known.
     pub interval_95: Option<[f64; 2]>,
 }
 
-/// The errors of one joint.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointBars {
+impl From<f64> for ErrorBar {
+    fn from(error: f64) -> Self {
+        let interval_95 = None;
+        ErrorBar { error, interval_95 }
+    }
+}
+
+/// The error of one joint, and another that it is compared with.
+pub(crate) struct JointBars {
     pub joint: String,
-    /// What the error is compared with, where there is anything.
     pub before: Option<ErrorBar>,
     pub after: ErrorBar,
 }
 
+impl JointBars {
+    fn all(&self) -> impl Iterator<Item = ErrorBar> {
+        self.before.into_iter().chain([self.after])
+    }
+}
+
 /// A figure of a row per joint.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ErrorFigure {
-    /// Heading: what the errors are of.
+pub(crate) struct ErrorFigure {
     pub title: String,
     /// Names of the two bars of a joint: of models, or of data.
     pub names: [String; 2],
@@ -58,28 +66,19 @@ impl ErrorFigure {
         let bottom = top + pitch * self.joints.len() as f64;
         let height = bottom + 34.0;
         let mut svg = Svg::new(WIDTH, height, &self.title, &self.words());
-        svg.text(
-            [14.0, 22.0],
-            &self.title,
-            Type::new(14.0, Anchor::Start).bold(),
-        );
-        let mut keys = Vec::new();
-        if compared {
-            keys.push((Key::Patch(colour::VERMILLION), self.names[0].as_str()));
-            keys.push((Key::Patch(colour::BLUE), self.names[1].as_str()));
-        } else {
-            keys.push((Key::Patch(colour::BLUE), "error"));
-        }
+        let heading = Type::new(14.0, Anchor::Start).bold();
+        svg.text([14.0, 22.0], &self.title, heading);
+        let [before, after] = [colour::VERMILLION, colour::BLUE].map(Key::Patch);
+        let mut keys = match compared {
+            true => vec![(before, &*self.names[0]), (after, &*self.names[1])],
+            false => vec![(after, "error")],
+        };
         let whisker = Stroke::solid(colour::INK, 1.2);
-        let bars = self.joints.iter();
-        let mut bars = bars.flat_map(|joint| joint.before.into_iter().chain([joint.after]));
-        if bars.any(|bar| bar.interval_95.is_some()) {
+        if self.bars().any(|bar| bar.interval_95.is_some()) {
             keys.push((Key::Line(whisker), "95 % confidence interval"));
         }
         let wanted = Stroke::dashed(colour::INK, 1.2, "6 3");
-        if self.limit.is_some() {
-            keys.push((Key::Line(wanted), "limit"));
-        }
+        keys.extend(self.limit.map(|_| (Key::Line(wanted), "limit")));
         legend::draw(&mut svg, [14.0, 44.0], &keys);
 
         let names = self.joints.iter().map(|joint| width_of(&joint.joint, SIZE));
@@ -105,14 +104,9 @@ impl ErrorFigure {
             let name = fitted(&joint.joint, SIZE, left - 26.0);
             let middle = row_top + 0.5 * rows * BAR + 4.0;
             svg.text([left - 10.0, middle], &name, Type::new(SIZE, Anchor::End));
-            let bars = [
-                (joint.before, colour::VERMILLION),
-                (Some(joint.after), colour::BLUE),
-            ];
-            let bars = bars
-                .into_iter()
-                .filter_map(|(bar, fill)| Some((bar?, fill)));
-            for (row, (bar, fill)) in bars.enumerate() {
+            let fills = [colour::VERMILLION, colour::BLUE];
+            let fills = fills.into_iter().skip(usize::from(joint.before.is_none()));
+            for (row, (bar, fill)) in joint.all().zip(fills).enumerate() {
                 let y = row_top + BAR * row as f64;
                 svg.rect([left, y, x(bar.error) - left, BAR - 2.0], fill, None);
                 let mut end = x(bar.error);
@@ -126,10 +120,8 @@ impl ErrorFigure {
                 }
                 let (mut at, words) = (end + 6.0, in_words(bar));
                 // no number stands on the line of the limit
-                let limit = self.limit.map(x);
-                if let Some(line) =
-                    limit.filter(|x| (at - 4.0..at + width_of(&words, 10.5)).contains(x))
-                {
+                let room = at - 4.0..at + width_of(&words, 10.5);
+                if let Some(line) = self.limit.map(x).filter(|x| room.contains(x)) {
                     at = line + 6.0;
                 }
                 svg.text([at, y + 10.0], &words, Type::new(10.5, Anchor::Start));
@@ -143,53 +135,44 @@ impl ErrorFigure {
         svg.finish()
     }
 
+    fn bars(&self) -> impl Iterator<Item = ErrorBar> {
+        self.joints.iter().flat_map(JointBars::all)
+    }
+
     /// The largest number of the axis.
     fn most(&self) -> f64 {
-        let bars = self.joints.iter();
-        let bars = bars.flat_map(|joint| joint.before.into_iter().chain([joint.after]));
-        let ends = bars.flat_map(|bar| [Some(bar.error), bar.interval_95.map(|[_, high]| high)]);
+        let high = |bar: ErrorBar| bar.interval_95.map(|[_, high]| high);
+        let ends = self.bars().flat_map(|bar| [Some(bar.error), high(bar)]);
         let usual = self.usual.as_ref().map(|usual| usual.band[1]);
         let all = ends.flatten().chain(self.limit).chain(usual);
         let most = all.filter(|x| x.is_finite()).fold(0.0, f64::max);
         if most > 0.0 { 1.02 * most } else { 1.0 }
     }
 
-    /// What a screen reader says.
+    /// All of it for a screen reader.
     fn words(&self) -> String {
-        let joint = |joint: &JointBars| match joint.before {
-            Some(before) => format!(
-                "{} {} {}, {} {}",
-                joint.joint,
-                number::percent(before.error),
-                self.names[0],
-                in_words(joint.after),
-                self.names[1]
-            ),
-            None => format!("{} {}", joint.joint, in_words(joint.after)),
+        let [name_before, name_after] = &self.names;
+        let joint = |of: &JointBars| {
+            let (joint, after) = (&of.joint, in_words(of.after));
+            let before = of.before.map(|before| number::percent(before.error));
+            before.map_or(format!("{joint} {after}"), |before| {
+                format!("{joint} {before} {name_before}, {after} {name_after}")
+            })
         };
-        let joints: Vec<String> = self.joints.iter().map(joint).collect();
-        let limit = self.limit.map_or(String::new(), |limit| {
-            format!("; limit {}", number::percent(limit))
-        });
-        let usual = self
-            .usual
-            .as_ref()
-            .map(|usual| format!("; {}", usual.words));
-        let usual = usual.unwrap_or_default();
-        format!("Relative torque error: {}{limit}{usual}", joints.join("; "))
+        let mut words: Vec<String> = self.joints.iter().map(joint).collect();
+        let limit = self.limit.map(number::percent);
+        words.extend(limit.map(|limit| format!("limit {limit}")));
+        words.extend(self.usual.iter().map(|usual| usual.words.clone()));
+        format!("Relative torque error: {}", words.join("; "))
     }
 }
 
 /// `5.17 % (4.25..6.11)`.
 fn in_words(bar: ErrorBar) -> String {
+    let error = number::percent(bar.error);
     match bar.interval_95 {
-        Some([low, high]) => format!(
-            "{} ({}..{})",
-            number::percent(bar.error),
-            number::hundredths(low),
-            number::hundredths(high)
-        ),
-        None => number::percent(bar.error),
+        Some(ends) => format!("{error} ({})", ends.map(number::hundredths).join("..")),
+        None => error,
     }
 }
 
@@ -197,14 +180,11 @@ fn in_words(bar: ErrorBar) -> String {
 fn ticks(most: f64) -> Vec<(f64, String)> {
     let rough = most / 4.0;
     let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|x| x * power);
-    let step = step
-        .into_iter()
-        .find(|step| *step >= rough)
-        .unwrap_or(rough);
-    (0..=8)
-        .map(|k| f64::from(k) * step)
-        .take_while(|error| *error <= most)
+    let mut steps = [1.0, 2.0, 5.0, 10.0].into_iter().map(|x| x * power);
+    let step = steps.find(|step| *step >= rough).unwrap_or(rough);
+    let errors = (0..=8).map(|k| f64::from(k) * step);
+    let errors = errors.take_while(|error| *error <= most);
+    errors
         .map(|error| (error, number::percent(error)))
         .collect()
 }
@@ -235,20 +215,17 @@ mod tests {
     }
 
     #[test]
-    fn errors_before_and_after_are_drawn_and_told_with_their_intervals() {
+    fn errors_before_and_after_are_drawn_and_named_with_their_intervals() {
         let svg = figure(0.05).svg();
-        for part in [
-            "held-out error",
-            "q1",
-            "14.6 %",
-            "5.00 % (4.00..6.00)",
+        let words = ["held-out error", "q1", "14.6 %", "5.00 % (4.00..6.00)"];
+        let beside = [
             "limit 10",
             "usual: 3.1 to 13 %",
-        ] {
+            colour::VERMILLION,
+            colour::BLUE,
+        ];
+        for part in words.into_iter().chain(beside) {
             assert!(svg.contains(part), "{part}: {svg}");
-        }
-        for colour in [colour::VERMILLION, colour::BLUE] {
-            assert!(svg.contains(colour));
         }
     }
 

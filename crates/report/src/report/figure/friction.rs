@@ -4,10 +4,11 @@
 use super::axis;
 use super::cell::{self, Cells};
 use super::colour;
-use super::joint_grid::{self, Heading};
+use super::joint_grid;
 use super::legend::Key;
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use super::svg::{Stroke, Svg, fitted, width_of};
+use crate::report::words::listed;
 use cft_ident_core::friction::estimate::FrictionCurvePoint;
 use cft_ident_core::number;
 
@@ -15,11 +16,10 @@ use cft_ident_core::number;
 const WITHIN_95: f64 = 1.959_964;
 
 /// The friction of one joint.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct FrictionPanel {
-    /// Name of the joint.
     pub joint: String,
-    /// What the reader should know at once (`not converged`, ...); may be empty.
+    /// Words behind the name (`not converged`, ...); may be empty.
     pub note: String,
     /// `m/s` or `rad/s`.
     pub speed_unit: String,
@@ -43,9 +43,8 @@ pub struct FrictionPanel {
 /// A figure of one panel per joint, two beside each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrictionFigure {
-    /// Heading.
     pub title: String,
-    /// The joints in reading order.
+    /// In reading order.
     pub panels: Vec<FrictionPanel>,
 }
 
@@ -62,21 +61,12 @@ const TRUTH: Stroke = Stroke::dashed(colour::VERMILLION, 1.3, "7 2.5 1.5 2.5");
 impl FrictionFigure {
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
-        let names: Vec<&str> = self
-            .panels
-            .iter()
-            .map(|panel| panel.joint.as_str())
-            .collect();
         let description = format!(
             "Friction torque over velocity with its 95 % band, joints {}",
-            names.join(", ")
+            listed(self.panels.iter().map(|panel| &*panel.joint))
         );
-        let heading = Heading {
-            title: &self.title,
-            description: &description,
-            legend: &self.entries(),
-        };
-        joint_grid::draw(&heading, &self.panels, FrictionPanel::draw)
+        let titles = [&*self.title, &description];
+        joint_grid::draw(titles, &self.entries(), &self.panels, FrictionPanel::draw)
     }
 
     /// The panels as pictures of their own.
@@ -88,43 +78,35 @@ impl FrictionFigure {
             })
         };
         Cells {
-            title: self.title.clone(),
-            key: cell::key(&self.entries()),
-            pictures: self.panels.iter().map(cell).collect(),
             apart: true,
-            words: Vec::new(),
+            ..Cells::new(&self.title, &self.entries(), self.panels.iter().map(cell))
         }
     }
 
-    /// Only what is drawn is in the legend.
+    /// The legend of all that is drawn.
     fn entries(&self) -> Vec<(Key, &'static str)> {
         let any = |has: fn(&FrictionPanel) -> bool| self.panels.iter().any(has);
-        let mut entries = Vec::new();
-        if any(|panel| !panel.cloud.is_empty()) {
-            entries.push((Key::Spot(colour::VERMILLION), "measured, less all else"));
-        }
-        if any(|panel| panel.beyond_curve) {
-            entries.push((Key::Spot(colour::BLUE), "model with every effect"));
-        }
-        if any(|panel| !panel.beyond_curve) {
-            entries.push((Key::Band(CURVE), "estimated, 95 % band"));
-        }
         let beyond = |panel: &FrictionPanel| {
             !panel.beyond_curve && !lines(&panel.curve, |a, b| !panel.covers(a.v, b.v)).is_empty()
         };
-        if self.panels.iter().any(beyond) {
-            entries.push((Key::Line(BEYOND), "beyond these logs"));
-        }
-        if any(|panel| !panel.plateaus.is_empty()) {
-            entries.push((Key::Dot(colour::INK), "plateaus, 95 %"));
-        }
-        if any(|panel| !panel.truth.is_empty()) {
-            entries.push((Key::Line(TRUTH), "truth"));
-        }
-        if any(|panel| !panel.covered.is_empty()) {
-            entries.push((Key::Patch(colour::COVERED), "speeds in these logs"));
-        }
-        entries
+        let beyond = self.panels.iter().any(beyond);
+        let [curves, effects] = [any(|p| !p.beyond_curve), any(|p| p.beyond_curve)];
+        let clouds = any(|p| !p.cloud.is_empty());
+        let plateaus = any(|p| !p.plateaus.is_empty());
+        let [truths, covered] = [any(|p| !p.truth.is_empty()), any(|p| !p.covered.is_empty())];
+        let [red, blue] = [colour::VERMILLION, colour::BLUE].map(Key::Spot);
+        let patch = Key::Patch(colour::COVERED);
+        let entries = [
+            (clouds, red, "measured, less all else"),
+            (effects, blue, "model with every effect"),
+            (curves, Key::Band(CURVE), "estimated, 95 % band"),
+            (beyond, Key::Line(BEYOND), "beyond these logs"),
+            (plateaus, Key::Dot(colour::INK), "plateaus, 95 %"),
+            (truths, Key::Line(TRUTH), "truth"),
+            (covered, patch, "speeds in these logs"),
+        ];
+        let drawn = entries.into_iter().filter(|(drawn, ..)| *drawn);
+        drawn.map(|(_, key, name)| (key, name)).collect()
     }
 }
 
@@ -144,9 +126,8 @@ impl FrictionPanel {
             "" => String::new(),
             note => format!("\u{2003}{note}"),
         };
-        let style = Type::new(11.5, Anchor::Start);
         let note = fitted(&note, 11.5, width - width_of(&self.joint, 12.5));
-        svg.heading([left, top - 7.0], &self.joint, &note, style);
+        svg.heading([left, top - 7.0], &self.joint, &note);
         let (Some(speeds), Some(torques)) = (self.speeds(), self.torques()) else {
             Panel::empty(svg, frame, "no friction found");
             return;
@@ -164,46 +145,35 @@ impl FrictionPanel {
         let every = self.cloud.len().div_ceil(ROWS).max(1);
         let finite = |row: &&[f64; 3]| row.iter().all(|x| x.is_finite());
         let cloud = self.cloud.iter().step_by(every).filter(finite);
+        let place = |v: f64, torque: f64| [panel.x.px(v), panel.y.px(torque)];
         for [v, measured, _] in cloud.clone() {
-            svg.dot(
-                [panel.x.px(*v), panel.y.px(*measured)],
-                1.1,
-                colour::VERMILLION,
-            );
+            svg.dot(place(*v, *measured), 1.1, colour::VERMILLION);
         }
         if self.beyond_curve {
             for [v, _, model] in cloud {
-                svg.dot([panel.x.px(*v), panel.y.px(*model)], 1.5, colour::BLUE);
+                svg.dot(place(*v, *model), 1.5, colour::BLUE);
             }
-            svg.end_clip();
-            self.axes(svg, &panel);
-            return;
-        }
-        for run in runs(&self.curve, |point| point.std.is_finite()) {
-            svg.area(&band(&panel, &run), CURVE.colour, 0.22);
-        }
-        let curve = |inside: bool| {
-            let parts = lines(&self.curve, |a, b| self.covers(a.v, b.v) == inside);
-            panel.place(parts)
-        };
-        svg.curve(&curve(false), BEYOND);
-        svg.curve(&curve(true), CURVE);
-        svg.curve(&panel.place(vec![self.truth.clone()]), TRUTH);
-        for point in &self.plateaus {
-            plateau(svg, &panel, point);
+        } else {
+            for run in runs(&self.curve) {
+                svg.area(&band(&panel, run), CURVE.colour, 0.22);
+            }
+            let curve = |inside: bool| {
+                let parts = lines(&self.curve, |a, b| self.covers(a.v, b.v) == inside);
+                panel.place(parts)
+            };
+            svg.curve(&curve(false), BEYOND);
+            svg.curve(&curve(true), CURVE);
+            svg.curve(&panel.place(vec![self.truth.clone()]), TRUTH);
+            for point in &self.plateaus {
+                plateau(svg, &panel, point);
+            }
         }
         svg.end_clip();
-        self.axes(svg, &panel);
+        let torque = ["friction", &*self.torque_unit];
+        panel.axes(svg, 46.0, ["velocity", &self.speed_unit], torque);
     }
 
-    fn axes(&self, svg: &mut Svg, panel: &Panel) {
-        panel.outline(svg);
-        panel.x_numbers(svg);
-        panel.x_title(svg, "velocity", &self.speed_unit);
-        panel.y_title(svg, 46.0, "friction", &self.torque_unit);
-    }
-
-    /// What a screen reader says: friction at the lowest and at the highest speed that the data cover.
+    /// Friction at the lowest and at the highest speed that the data cover, for a screen reader.
     fn words(&self) -> String {
         let of_model = self.cloud.iter().map(|[v, _, model]| [*v, *model]);
         let of_curve = self.curve.iter().map(|point| [point.v, point.torque]);
@@ -211,26 +181,19 @@ impl FrictionPanel {
             true => of_model.collect(),
             false => of_curve.collect(),
         };
-        let forward = points
-            .iter()
-            .filter(|[v, torque]| *v > 0.0 && torque.is_finite());
+        let forward = points.iter();
+        let forward = forward.filter(|[v, torque]| *v > 0.0 && torque.is_finite());
         let by_speed = |a: &&[f64; 2], b: &&[f64; 2]| a[0].total_cmp(&b[0]);
-        let ends = forward
-            .clone()
-            .min_by(by_speed)
-            .zip(forward.max_by(by_speed));
-        let Some(([slow, at_rest], [fast, at_speed])) = ends else {
+        let slowest = forward.clone().min_by(by_speed);
+        let Some(ends) = slowest.zip(forward.max_by(by_speed)) else {
             return format!("no friction of {} is known", self.joint);
         };
         let shown = |x: f64, unit: &str| format!("{} {unit}", number::significant(x, 3));
-        format!(
-            "{}: {} at {}, {} at {}",
-            self.joint,
-            shown(*at_rest, &self.torque_unit),
-            shown(*slow, &self.speed_unit),
-            shown(*at_speed, &self.torque_unit),
-            shown(*fast, &self.speed_unit)
-        )
+        let [slow, fast] = [ends.0, ends.1].map(|[v, torque]| {
+            let torque = shown(*torque, &self.torque_unit);
+            format!("{torque} at {}", shown(*v, &self.speed_unit))
+        });
+        format!("{}: {slow}, {fast}", self.joint)
     }
 
     fn speeds(&self) -> Option<[f64; 2]> {
@@ -242,19 +205,13 @@ impl FrictionPanel {
 
     /// The band counts inside the speeds covered only: outside it may grow without bound.
     fn torques(&self) -> Option<[f64; 2]> {
-        let curve = self.curve.iter().flat_map(|point| {
-            let half = match point.std.is_finite() && self.covers(point.v, point.v) {
-                true => WITHIN_95 * point.std,
-                false => 0.0,
-            };
-            [point.torque - half, point.torque + half]
+        let curve = self.curve.iter().filter(|_| !self.beyond_curve);
+        let curve = curve.flat_map(|point| match self.covers(point.v, point.v) {
+            true => spread(point),
+            false => [point.torque; 2],
         });
-        let curve = curve.filter(|_| !self.beyond_curve);
-        let cloud = self
-            .cloud
-            .iter()
-            .flat_map(|[_, measured, model]| [*measured, *model]);
-        let curve = curve.chain(cloud);
+        let cloud = self.cloud.iter();
+        let curve = curve.chain(cloud.flat_map(|[_, measured, model]| [*measured, *model]));
         let plateaus = self.plateaus.iter().map(|point| point.torque);
         let truth = self.truth.iter().map(|[_, torque]| *torque);
         axis::interval(curve.chain(plateaus).chain(truth), 0.06)
@@ -265,16 +222,10 @@ fn finite(point: &FrictionCurvePoint) -> bool {
     point.v.is_finite() && point.torque.is_finite()
 }
 
-/// Stretches of consecutive finite points that `wanted` accepts.
-pub(super) fn runs(
-    curve: &[FrictionCurvePoint],
-    wanted: impl Fn(&FrictionCurvePoint) -> bool,
-) -> Vec<Vec<FrictionCurvePoint>> {
-    curve
-        .split(|point| !finite(point) || !wanted(point))
-        .filter(|run| run.len() > 1)
-        .map(<[FrictionCurvePoint]>::to_vec)
-        .collect()
+/// Stretches of consecutive points that are finite, and their deviations too.
+pub(super) fn runs(curve: &[FrictionCurvePoint]) -> impl Iterator<Item = &[FrictionCurvePoint]> {
+    let runs = curve.split(|point| !finite(point) || !point.std.is_finite());
+    runs.filter(|run| run.len() > 1)
 }
 
 /// Lines between consecutive finite points that `wanted` accepts in pairs.
@@ -309,13 +260,8 @@ pub(super) fn spread(point: &FrictionCurvePoint) -> [f64; 2] {
 
 /// The outline of curve plus and minus its 95 % [px].
 pub(super) fn band(panel: &Panel, run: &[FrictionCurvePoint]) -> Vec<[f64; 2]> {
-    let edge = |point: &FrictionCurvePoint, side: f64| {
-        let torque = point.torque + side * WITHIN_95 * point.std;
-        [panel.x.px(point.v), panel.y.px(torque)]
-    };
-    let upper = run.iter().map(|point| edge(point, 1.0));
-    let lower = run.iter().rev().map(|point| edge(point, -1.0));
-    upper.chain(lower).collect()
+    let rows = run.iter();
+    panel.band(rows.map(|point| [point.v, point.torque, WITHIN_95 * point.std]))
 }
 
 /// A dot with its 95 % bar, capped.
@@ -348,38 +294,31 @@ mod tests {
         };
         FrictionPanel {
             joint: "q1".into(),
-            note: String::new(),
             speed_unit: "m/s".into(),
             torque_unit: "N".into(),
             curve: [-2.0, -1.0, -0.5, 0.5, 1.0, 2.0].map(point).to_vec(),
             covered: vec![[-1.0, -0.5], [0.5, 1.0]],
-            plateaus: Vec::new(),
-            cloud: Vec::new(),
-            beyond_curve: false,
-            truth: Vec::new(),
+            ..FrictionPanel::default()
         }
+    }
+
+    fn figure(panels: Vec<FrictionPanel>) -> FrictionFigure {
+        let title = "t".into();
+        FrictionFigure { title, panels }
     }
 
     #[test]
     fn the_cloud_and_the_model_with_every_effect_stand_where_effects_are() {
-        let mut panel = panel();
-        panel.cloud = vec![[0.5, 9.0, 7.0], [1.0, f64::NAN, 2.0]];
-        let mut figure = FrictionFigure {
-            title: "t".into(),
-            panels: vec![panel],
-        };
+        let mut figure = figure(vec![panel()]);
+        figure.panels[0].cloud = vec![[0.5, 9.0, 7.0], [1.0, f64::NAN, 2.0]];
         let circles =
             |figure: &FrictionFigure| figure.cells().pictures[0].matches("<circle").count();
         assert_eq!(circles(&figure), 1);
         figure.panels[0].beyond_curve = true;
-        let cells = figure.cells();
+        let (cells, key) = (figure.cells(), figure.cells().key.concat());
         assert_eq!(circles(&figure), 2);
-        assert!(
-            cells.key.concat().contains("model with every effect"),
-            "{}",
-            cells.key.concat()
-        );
-        assert!(!cells.key.concat().contains("95 % band"));
+        assert!(key.contains("model with every effect"), "{key}");
+        assert!(!key.contains("95 % band"));
         assert!(cells.pictures[0].contains("q1: 7.00 N at 0.500 m/s, 2.00 N at 1.00 m/s"));
     }
 
@@ -397,21 +336,16 @@ mod tests {
 
     #[test]
     fn the_legend_names_what_is_drawn_and_nothing_else() {
-        let mut figure = FrictionFigure {
-            title: "t".into(),
-            panels: vec![panel()],
-        };
+        let mut figure = figure(vec![panel()]);
         let names = |figure: &FrictionFigure| -> Vec<&str> {
             figure.entries().iter().map(|(_, name)| *name).collect()
         };
-        assert_eq!(
-            names(&figure),
-            [
-                "estimated, 95 % band",
-                "beyond these logs",
-                "speeds in these logs"
-            ]
-        );
+        let expected = [
+            "estimated, 95 % band",
+            "beyond these logs",
+            "speeds in these logs",
+        ];
+        assert_eq!(names(&figure), expected);
         figure.panels[0].truth = vec![[0.0, 0.0], [1.0, 2.0]];
         figure.panels[0].plateaus = vec![figure.panels[0].curve[3]];
         assert_eq!(names(&figure)[2..4], ["plateaus, 95 %", "truth"]);
@@ -432,10 +366,7 @@ mod tests {
             covered: Vec::new(),
             ..panel()
         };
-        let figure = FrictionFigure {
-            title: "t".into(),
-            panels: vec![odd, nothing],
-        };
+        let figure = figure(vec![odd, nothing]);
         let svg = figure.svg();
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
         assert!(svg.contains("no friction found"));

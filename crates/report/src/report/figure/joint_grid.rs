@@ -2,7 +2,7 @@
 //! beside each other.
 
 use super::legend::{self, Key};
-use super::svg::{Anchor, Svg, Type, fitted};
+use super::svg::Svg;
 
 const WIDTH: f64 = 760.0;
 const LEFT: f64 = 64.0;
@@ -12,30 +12,17 @@ const NAME: f64 = 20.0;
 const PLOT: f64 = 206.0;
 const BELOW: f64 = 50.0;
 
-/// What stands above the panels.
-pub(super) struct Heading<'a> {
-    pub title: &'a str,
-    /// For those who cannot see the picture.
-    pub description: &'a str,
-    pub legend: &'a [(Key, &'a str)],
-}
-
-/// The SVG document; `draw` puts a panel into its frame: left, top, width, height \[px\].
+/// The SVG document with its title and description; `draw` puts a panel into its frame: left, top, width, height \[px\].
 pub(super) fn draw<P>(
-    heading: &Heading,
+    titles: [&str; 2],
+    entries: &[(Key, &str)],
     panels: &[P],
     draw: impl Fn(&P, &mut Svg, [f64; 4]),
 ) -> String {
     let columns = panels.len().clamp(1, 2);
     let row = NAME + PLOT + BELOW;
     let height = HEAD + row * panels.len().div_ceil(columns) as f64;
-    let mut svg = Svg::new(WIDTH, height, heading.title, heading.description);
-    svg.text(
-        [LEFT, 22.0],
-        &fitted(heading.title, 15.0, WIDTH - LEFT - RIGHT),
-        Type::new(14.0, Anchor::Start).bold(),
-    );
-    legend::draw(&mut svg, [LEFT, 44.0], heading.legend);
+    let mut svg = legend::headed([WIDTH, height], [LEFT, RIGHT], titles, entries);
     let column = WIDTH / columns as f64;
     for (k, panel) in panels.iter().enumerate() {
         let left = column * (k % columns) as f64;

@@ -1,9 +1,9 @@
 //! The legend: one line of samples and names, outside the data.
 
 use super::colour;
-use super::svg::{Anchor, Stroke, Svg, Type, width_of};
+use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
 
-/// What stands before a name.
+/// The mark before a name.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Key {
     Line(Stroke),
@@ -25,6 +25,20 @@ const SAMPLE: f64 = 26.0;
 const ROOM_BETWEEN_PX: f64 = 14.0;
 const LINE: f64 = 18.0;
 
+/// A figure with its title and its legend above the panels; beside them so much is free at the left and at the right.
+pub(super) fn headed(
+    [width, height]: [f64; 2],
+    [left, right]: [f64; 2],
+    [title, description]: [&str; 2],
+    entries: &[(Key, &str)],
+) -> Svg {
+    let mut svg = Svg::new(width, height, title, description);
+    let shown = fitted(title, 15.0, width - left - right);
+    svg.text([left, 22.0], &shown, Type::new(14.0, Anchor::Start).bold());
+    draw(&mut svg, [left, 44.0], entries);
+    svg
+}
+
 /// One entry as a picture of its own: a page sets as many beside each other as its width takes.
 pub(super) fn alone(entry: (Key, &str)) -> String {
     let (_, name) = entry;
@@ -34,8 +48,7 @@ pub(super) fn alone(entry: (Key, &str)) -> String {
     svg.finish()
 }
 
-/// Draws the legend from `x` rightwards, its baseline at `y`. The names are the figures' own, few
-/// and short enough for one line.
+/// Draws the legend from `x` rightwards, its baseline at `y`.
 pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
     let mut at = x;
     for (key, name) in entries {
@@ -45,12 +58,8 @@ pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
         match *key {
             Key::Line(stroke) => svg.line(sample, [at + SAMPLE, middle], stroke),
             Key::Band(stroke) => {
-                let outline = [
-                    [at, middle - 5.0],
-                    [at + SAMPLE, middle - 5.0],
-                    [at + SAMPLE, middle + 5.0],
-                    [at, middle + 5.0],
-                ];
+                let (end, top, bottom) = (at + SAMPLE, middle - 5.0, middle + 5.0);
+                let outline = [[at, top], [end, top], [end, bottom], [at, bottom]];
                 svg.area(&outline, stroke.colour, 0.22);
                 svg.line(sample, [at + SAMPLE, middle], stroke);
             }

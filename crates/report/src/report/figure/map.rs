@@ -49,38 +49,27 @@ impl MapFigure {
             format!("up to {end} {} above the model", self.unit),
             format!("up to {end} {} below", self.unit),
         ];
-        let [first, second] = &self.over;
-        let map = cell::cell(
-            &self.title,
-            &format!(
-                "mean over {} and {}. {}",
-                first.0, second.0, self.description
-            ),
-            HEIGHT,
-            |svg, frame| self.map(svg, frame, most),
-        );
-        let curve = cell::cell(
-            &self.title,
-            &format!("mean over {}. {}", first.0, self.description),
-            HEIGHT,
-            |svg, frame| self.line(svg, frame),
-        );
+        let ([first, second], finding) = (self.over.each_ref().map(|o| &o.0), &self.description);
+        let both = format!("mean over {first} and {second}. {finding}");
+        let one = format!("mean over {first}. {finding}");
+        let map = |svg: &mut Svg, frame| self.map(svg, frame, most);
+        let map = cell::cell(&self.title, &both, HEIGHT, map);
+        let curve = |svg: &mut Svg, frame| self.line(svg, frame);
+        let curve = cell::cell(&self.title, &one, HEIGHT, curve);
+        let key = [
+            (Key::Spot(colour::VERMILLION), &*above),
+            (Key::Spot(colour::BLUE), &below),
+            (Key::Hatch, "too few rows"),
+            (Key::Band(CURVE), "mean, 95 %"),
+        ];
         Cells {
-            title: self.title.clone(),
-            key: cell::key(&[
-                (Key::Spot(colour::VERMILLION), &above),
-                (Key::Spot(colour::BLUE), &below),
-                (Key::Hatch, "too few rows"),
-                (Key::Band(CURVE), "mean, 95 %"),
-            ]),
-            pictures: vec![map, curve],
-            apart: false,
             words,
+            ..Cells::new(&self.title, &key, [map, curve])
         }
     }
 
     fn map(&self, svg: &mut Svg, frame: [f64; 4], most: f64) {
-        name(svg, frame, "over both");
+        cell::name(svg, frame, "over both");
         if most <= 0.0 {
             Panel::empty(svg, frame, "no rows");
             return;
@@ -111,22 +100,20 @@ impl MapFigure {
         }
         svg.end_clip();
         self.bar(svg, bar, most);
-        self.axes(svg, &panel, &self.over[1]);
+        let [below, at_left] = self.over.each_ref().map(|(name, unit)| [&**name, unit]);
+        panel.axes(svg, 44.0, below, at_left);
     }
 
     /// The shades and the means that they stand for.
     fn bar(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4], most: f64) {
         let step = 0.5 * height / SHADES;
         svg.rect([left, top, width, height], colour::PAPER, None);
+        let middle = top + 0.5 * height;
         for k in 0..SHADES as usize {
             let shade = (k + 1) as f64 / SHADES;
-            for (fill, from) in [
-                (
-                    colour::VERMILLION,
-                    top + 0.5 * height - (k + 1) as f64 * step,
-                ),
-                (colour::BLUE, top + 0.5 * height + k as f64 * step),
-            ] {
+            let above = middle - (k + 1) as f64 * step;
+            let below = middle + k as f64 * step;
+            for (fill, from) in [(colour::VERMILLION, above), (colour::BLUE, below)] {
                 let (right, to) = (left + width, from + step);
                 let patch = [[left, from], [right, from], [right, to], [left, to]];
                 svg.area(&patch, fill, shade);
@@ -136,17 +123,16 @@ impl MapFigure {
         let end = number::significant(most, 2);
         for (y, text) in [
             (top + 7.0, format!("+{end}")),
-            (top + 0.5 * height + 3.5, "0".to_owned()),
+            (middle + 3.5, "0".to_owned()),
             (top + height, format!("\u{2212}{end}")),
         ] {
             svg.text([left + width + 4.0, y], &text, style);
         }
-        let unit = Type::new(10.0, Anchor::Start).muted();
-        svg.text([left, top - 6.0], &self.unit, unit);
+        svg.text([left, top - 6.0], &self.unit, style.muted());
     }
 
     fn line(&self, svg: &mut Svg, frame: [f64; 4]) {
-        name(svg, frame, &format!("over {}", self.over[0].0));
+        cell::name(svg, frame, &format!("over {}", self.over[0].0));
         let ends = |[_, mean, std]: &[f64; 3]| [mean - BAND * std, mean + BAND * std];
         let torques = axis::interval(self.curve.iter().flat_map(ends).chain([0.0]), 0.06);
         let Some(torques) = torques.filter(|_| self.curve.len() > 1) else {
@@ -156,31 +142,14 @@ impl MapFigure {
         let panel = Panel::new(frame, self.ends[0], torques, [5, 6]);
         panel.grid(svg);
         svg.clip(frame);
-        let place = |x: f64, y: f64| [panel.x.px(x), panel.y.px(y)];
-        let rows = || self.curve.iter();
-        let upper = rows().map(|[x, mean, std]| place(*x, mean + BAND * std));
-        let lower = rows()
-            .rev()
-            .map(|[x, mean, std]| place(*x, mean - BAND * std));
-        let band: Vec<[f64; 2]> = upper.chain(lower).collect();
-        svg.area(&band, CURVE.colour, 0.18);
-        svg.curve(
-            &[rows().map(|[x, mean, _]| place(*x, *mean)).collect()],
-            CURVE,
-        );
+        let rows = self.curve.iter();
+        let band = rows.map(|[x, mean, std]| [*x, *mean, BAND * std]);
+        svg.area(&panel.band(band), CURVE.colour, 0.18);
+        let curve = self.curve.iter().map(|[x, mean, _]| [*x, *mean]);
+        svg.curve(&panel.place(vec![curve.collect()]), CURVE);
         svg.end_clip();
-        self.axes(
-            svg,
-            &panel,
-            &("mean residual".to_owned(), self.unit.clone()),
-        );
-    }
-
-    fn axes(&self, svg: &mut Svg, panel: &Panel, left: &(String, String)) {
-        panel.outline(svg);
-        panel.x_numbers(svg);
-        panel.x_title(svg, &self.over[0].0, &self.over[0].1);
-        panel.y_title(svg, 44.0, &left.0, &left.1);
+        let (name, unit) = &self.over[0];
+        panel.axes(svg, 44.0, [name, unit], ["mean residual", &self.unit]);
     }
 }
 
@@ -189,17 +158,9 @@ fn hatch(svg: &mut Svg, [left, top, width, height]: [f64; 4]) {
     let lines = ((width + height) / HATCH) as usize;
     for k in 0..=lines {
         let x = left - height + HATCH * k as f64;
-        svg.line(
-            [x, top + height],
-            [x + height, top],
-            Stroke::solid(colour::ZERO, 0.8),
-        );
+        let stroke = Stroke::solid(colour::ZERO, 0.8);
+        svg.line([x, top + height], [x + height, top], stroke);
     }
-}
-
-fn name(svg: &mut Svg, frame: [f64; 4], name: &str) {
-    let style = Type::new(11.5, Anchor::Start).bold();
-    svg.text([frame[0], frame[1] - 8.0], name, style);
 }
 
 #[cfg(test)]

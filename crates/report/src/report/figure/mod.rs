@@ -25,9 +25,9 @@ mod svg;
 mod torque;
 
 pub use cell::Cells;
-pub use course::{CourseFigure, CoursePanel};
-pub use effect::EffectFigure;
-pub use errors::{ErrorBar, ErrorFigure, JointBars};
+pub(crate) use course::{CourseFigure, CoursePanel};
+pub(crate) use effect::EffectFigure;
+pub(crate) use errors::{ErrorBar, ErrorFigure, JointBars};
 pub use friction::{FrictionFigure, FrictionPanel};
 pub use map::MapFigure;
 pub use motion::{MotionFigure, MotionPanel};
@@ -35,7 +35,8 @@ pub use overlay::{OverlayFigure, OverlayPanel};
 pub use png::{PngError, png};
 pub use rate::{RateFigure, RatePanel};
 pub use residual::{ResidualFigure, ResidualPanel, When};
-pub use sketch::{Sketch, SketchJoint};
+pub(crate) use sketch::{Sketch, SketchJoint};
+pub(crate) use torque::parted;
 pub use torque::{JointTorque, TorqueFigure};
 
 /// Colours that stay apart for colour-blind readers and in grey print (Okabe and Ito 2008).

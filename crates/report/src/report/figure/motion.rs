@@ -5,15 +5,15 @@ use super::colour;
 use super::decimate::decimated;
 use super::legend::{self, Key};
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use super::svg::{Stroke, Svg, fitted, width_of};
+use crate::report::words::listed;
 use cft_ident_core::number;
 
 /// One quantity over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionPanel {
-    /// What it is: `position`, `speed`, `volts`.
+    /// `position`, `speed`, `volts`.
     pub quantity: String,
-    /// Unit.
     pub unit: String,
     /// One value per time of the figure.
     pub values: Vec<f64>,
@@ -55,19 +55,13 @@ impl MotionFigure {
     pub fn svg(&self) -> String {
         let row = NAME + PLOT + NUMBERS;
         let height = HEAD + row * self.rows.len() as f64 + FOOT;
-        let names: Vec<&str> = self.rows.iter().map(|(name, _)| name.as_str()).collect();
         let description = format!(
             "Positions, speeds and volts over time with their limits, coordinates {}",
-            names.join(", ")
-        );
-        let mut svg = Svg::new(WIDTH, height, &self.title, &description);
-        svg.text(
-            [LEFT, 22.0],
-            &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
-            Type::new(14.0, Anchor::Start).bold(),
+            listed(self.rows.iter().map(|(name, _)| &**name))
         );
         let entries = [(Key::Line(MOTION), "motion"), (Key::Line(LIMIT), "limit")];
-        legend::draw(&mut svg, [LEFT, 44.0], &entries);
+        let titles = [&*self.title, &description];
+        let mut svg = legend::headed([WIDTH, height], [LEFT, RIGHT], titles, &entries);
         let clock = axis::interval(self.t.iter().copied(), 0.0);
         for (k, (name, panels)) in self.rows.iter().enumerate() {
             let top = HEAD + row * k as f64;
@@ -75,8 +69,10 @@ impl MotionFigure {
             for (c, panel) in panels.iter().enumerate() {
                 let left = column * c as f64 + LEFT;
                 let frame = [left, top + NAME, column - LEFT - RIGHT, PLOT];
-                let last = k + 1 == self.rows.len();
-                panel.draw(&mut svg, frame, name, &self.t, clock, last);
+                let drawn = panel.draw(&mut svg, frame, name, (&self.t, clock));
+                if let Some(panel) = drawn.filter(|_| k + 1 == self.rows.len()) {
+                    panel.x_title(&mut svg, ["time", "s"]);
+                }
             }
         }
         svg.finish()
@@ -89,30 +85,22 @@ impl MotionPanel {
         svg: &mut Svg,
         frame: [f64; 4],
         name: &str,
-        t: &[f64],
-        clock: Option<[f64; 2]>,
-        last: bool,
-    ) {
+        (t, clock): (&[f64], Option<[f64; 2]>),
+    ) -> Option<Panel> {
         let [left, top, width, _] = frame;
         let used = self.used.map_or(String::new(), |used| {
             format!(", {} of its limit", number::percent(used))
         });
         let rest = format!("\u{2003}{}{used}", self.quantity);
         let rest = fitted(&rest, 11.5, width - width_of(name, 12.5));
-        svg.heading(
-            [left, top - 6.0],
-            name,
-            &rest,
-            Type::new(11.5, Anchor::Start),
-        );
-        let shown = self
-            .limits
-            .filter(|_| self.used.is_some_and(|u| u >= LIMIT_SHOWN_FROM));
+        svg.heading([left, top - 6.0], name, &rest);
+        let near = self.used.is_some_and(|used| used >= LIMIT_SHOWN_FROM);
+        let shown = self.limits.filter(|_| near);
         let values = self.values.iter().copied();
         let both = values.chain(shown.into_iter().flatten());
         let (Some(clock), Some(range)) = (clock, axis::interval(both, 0.06)) else {
             Panel::empty(svg, frame, "no samples");
-            return;
+            return None;
         };
         let panel = Panel::new(frame, clock, range, [5, 5]);
         panel.grid(svg);
@@ -124,11 +112,9 @@ impl MotionPanel {
         }
         svg.end_clip();
         panel.outline(svg);
-        panel.y_title(svg, 48.0, &self.quantity, &self.unit);
+        panel.y_title(svg, 48.0, [&self.quantity, &self.unit]);
         panel.x_numbers(svg);
-        if last {
-            panel.x_title(svg, "time", "s");
-        }
+        Some(panel)
     }
 }
 

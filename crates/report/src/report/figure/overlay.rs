@@ -4,16 +4,16 @@ use super::axis;
 use super::cell::{self, Cells};
 use super::colour;
 use super::friction::{band, lines, runs, spread};
-use super::joint_grid::{self, Heading};
+use super::joint_grid;
 use super::legend::Key;
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use super::svg::{Stroke, Svg, fitted};
+use crate::report::words::listed;
 use cft_ident_core::friction::estimate::FrictionCurvePoint;
 
 /// The friction of one joint by two models.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverlayPanel {
-    /// Name of the joint.
     pub joint: String,
     /// `m/s` or `rad/s`.
     pub speed_unit: String,
@@ -30,11 +30,10 @@ pub struct OverlayPanel {
 /// A figure of one panel per joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverlayFigure {
-    /// Heading.
     pub title: String,
-    /// What the legend calls the two models.
+    /// The two models in the legend.
     pub names: [String; 2],
-    /// The joints in reading order.
+    /// In reading order.
     pub panels: Vec<OverlayPanel>,
 }
 
@@ -65,37 +64,29 @@ impl OverlayFigure {
             .map(|(stroke, name)| (Key::Band(*stroke), name.as_str()))
             .collect();
         Cells {
-            title: self.title.clone(),
-            key: cell::key(&keys),
-            pictures: self.panels.iter().map(picture).collect(),
             apart: true,
-            words: Vec::new(),
+            ..Cells::new(&self.title, &keys, self.panels.iter().map(picture))
         }
     }
 
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
-        let joints: Vec<&str> = self.panels.iter().map(|p| p.joint.as_str()).collect();
         let description = format!(
             "Friction torque over velocity by two models with 95 % bands, joints {}",
-            joints.join(", ")
+            listed(self.panels.iter().map(|panel| &*panel.joint))
         );
-        let names = self.names.each_ref().map(|name| fitted(name, 11.0, LABEL));
+        let [first, second] = self.names.each_ref().map(|name| fitted(name, 11.0, LABEL));
         let keys = STROKES.map(Key::Band);
-        let heading = Heading {
-            title: &self.title,
-            description: &description,
-            legend: &[(keys[0], names[0].as_str()), (keys[1], names[1].as_str())],
-        };
-        joint_grid::draw(&heading, &self.panels, OverlayPanel::draw)
+        let entries = [(keys[0], &*first), (keys[1], &*second)];
+        let titles = [&*self.title, &description];
+        joint_grid::draw(titles, &entries, &self.panels, OverlayPanel::draw)
     }
 }
 
 impl OverlayPanel {
     fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
         let [left, top, ..] = frame;
-        let style = Type::new(11.5, Anchor::Start);
-        svg.heading([left, top - 7.0], &self.joint, "", style);
+        svg.heading([left, top - 7.0], &self.joint, "");
         let points = || self.curves.iter().flatten();
         let rows = || self.clouds.iter().flatten();
         let speeds = axis::interval(points().map(|p| p.v).chain(rows().map(|r| r[0])), 0.03);
@@ -109,8 +100,8 @@ impl OverlayPanel {
         panel.grid(svg);
         svg.clip(frame);
         for (curve, stroke) in self.curves.iter().zip(STROKES) {
-            for run in runs(curve, |point| point.std.is_finite()) {
-                svg.area(&band(&panel, &run), stroke.colour, 0.18);
+            for run in runs(curve) {
+                svg.area(&band(&panel, run), stroke.colour, 0.18);
             }
         }
         for (cloud, stroke) in self.clouds.iter().zip(STROKES) {
@@ -124,10 +115,8 @@ impl OverlayPanel {
             svg.curve(&panel.place(lines(curve, |_, _| true)), stroke);
         }
         svg.end_clip();
-        panel.outline(svg);
-        panel.x_numbers(svg);
-        panel.x_title(svg, "velocity", &self.speed_unit);
-        panel.y_title(svg, 46.0, "friction", &self.torque_unit);
+        let torque = ["friction", &*self.torque_unit];
+        panel.axes(svg, 46.0, ["velocity", &self.speed_unit], torque);
     }
 }
 
@@ -136,13 +125,13 @@ mod tests {
     use super::*;
 
     fn curve(height: f64, std: f64) -> Vec<FrictionCurvePoint> {
-        [-1.0, -0.5, 0.5, 1.0]
-            .map(|v: f64| FrictionCurvePoint {
-                v,
-                torque: height * v.signum(),
-                std,
-            })
-            .to_vec()
+        let torque = |v: f64| height * v.signum();
+        let point = |v| FrictionCurvePoint {
+            v,
+            torque: torque(v),
+            std,
+        };
+        [-1.0, -0.5, 0.5, 1.0].map(point).to_vec()
     }
 
     fn figure(curves: [Vec<FrictionCurvePoint>; 2]) -> OverlayFigure {
@@ -162,12 +151,8 @@ mod tests {
     #[test]
     fn both_curves_are_drawn_and_named() {
         let svg = figure([curve(1.0, 0.1), curve(2.0, 0.1)]).svg();
-        for part in [
-            "first.toml",
-            "second.toml",
-            STROKES[0].colour,
-            STROKES[1].colour,
-        ] {
+        let [first, second] = STROKES.map(|stroke| stroke.colour);
+        for part in ["first.toml", "second.toml", first, second] {
             assert!(svg.contains(part), "{part}");
         }
         assert!(svg.contains("stroke-dasharray"));

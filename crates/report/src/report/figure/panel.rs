@@ -40,32 +40,44 @@ impl Panel {
         runs
     }
 
+    /// The outline \[px\] of a band around a line, of rows of x, y and half the width of the band.
+    pub fn band(&self, rows: impl DoubleEndedIterator<Item = [f64; 3]> + Clone) -> Vec<[f64; 2]> {
+        let upper = rows
+            .clone()
+            .map(|[x, y, half]| [self.x.px(x), self.y.px(y + half)]);
+        let lower = rows
+            .rev()
+            .map(|[x, y, half]| [self.x.px(x), self.y.px(y - half)]);
+        upper.chain(lower).collect()
+    }
+
     /// Grid lines; the lines of 0 are darker.
     pub fn grid(&self, svg: &mut Svg) {
         let [left, top, width, height] = self.frame;
-        let shade = |value: f64| {
-            if value == 0.0 {
+        let stroke = |value: f64| {
+            let colour = if value == 0.0 {
                 colour::ZERO
             } else {
                 colour::GRID
-            }
+            };
+            Stroke::solid(colour, 0.8)
         };
         for &value in &self.x_ticks.values {
             let at = self.x.px(value);
-            svg.line(
-                [at, top],
-                [at, top + height],
-                Stroke::solid(shade(value), 0.8),
-            );
+            svg.line([at, top], [at, top + height], stroke(value));
         }
         for &value in &self.y_ticks.values {
             let at = self.y.px(value);
-            svg.line(
-                [left, at],
-                [left + width, at],
-                Stroke::solid(shade(value), 0.8),
-            );
+            svg.line([left, at], [left + width, at], stroke(value));
         }
+    }
+
+    /// The frame itself, and numbers and title of the lower and of the left axis: their names and units.
+    pub fn axes(&self, svg: &mut Svg, offset: f64, below: [&str; 2], at_left: [&str; 2]) {
+        self.outline(svg);
+        self.x_numbers(svg);
+        self.x_title(svg, below);
+        self.y_title(svg, offset, at_left);
     }
 
     /// The frame itself and the numbers at the left side.
@@ -76,11 +88,8 @@ impl Panel {
             let at = self.y.px(value);
             let mark = Stroke::solid(colour::FRAME, 0.9);
             svg.line([left - 4.0, at], [left, at], mark);
-            svg.text(
-                [left - 7.0, at + 0.35 * TICK],
-                text,
-                Type::new(TICK, Anchor::End),
-            );
+            let style = Type::new(TICK, Anchor::End);
+            svg.text([left - 7.0, at + 0.35 * TICK], text, style);
         }
     }
 
@@ -97,35 +106,26 @@ impl Panel {
     }
 
     /// The title of the lower axis, `name [unit]`.
-    pub(crate) fn x_title(&self, svg: &mut Svg, name: &str, unit: &str) {
+    pub(crate) fn x_title(&self, svg: &mut Svg, [name, unit]: [&str; 2]) {
         let [left, top, width, height] = self.frame;
         let title = format!("{name} [{}]", self.x_ticks.unit(unit));
-        svg.text(
-            [left + 0.5 * width, top + height + 31.0],
-            &title,
-            Type::new(LABEL, Anchor::Middle),
-        );
+        let at = [left + 0.5 * width, top + height + 31.0];
+        svg.text(at, &title, Type::new(LABEL, Anchor::Middle));
     }
 
     /// The title of the left axis, `name [unit]`, `offset` px left of the frame.
-    pub(crate) fn y_title(&self, svg: &mut Svg, offset: f64, name: &str, unit: &str) {
+    pub(crate) fn y_title(&self, svg: &mut Svg, offset: f64, [name, unit]: [&str; 2]) {
         let [left, top, _, height] = self.frame;
         let title = format!("{name} [{}]", self.y_ticks.unit(unit));
-        svg.upright(
-            [left - offset, top + 0.5 * height],
-            &title,
-            Type::new(LABEL, Anchor::Middle),
-        );
+        let at = [left - offset, top + 0.5 * height];
+        svg.upright(at, &title, Type::new(LABEL, Anchor::Middle));
     }
 
     /// An empty frame that says why it is empty.
     pub fn empty(svg: &mut Svg, frame: [f64; 4], reason: &str) {
         let [left, top, width, height] = frame;
         svg.rect(frame, "none", Some(Stroke::solid(colour::FRAME, 0.9)));
-        svg.text(
-            [left + 0.5 * width, top + 0.5 * height + 4.0],
-            reason,
-            Type::new(LABEL, Anchor::Middle).muted(),
-        );
+        let middle = [left + 0.5 * width, top + 0.5 * height + 4.0];
+        svg.text(middle, reason, Type::new(LABEL, Anchor::Middle).muted());
     }
 }

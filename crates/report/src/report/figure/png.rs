@@ -11,7 +11,7 @@ use resvg::usvg::{Options, Tree};
 const REGULAR_FONT: &[u8] = include_bytes!("font/DejaVuSans.ttf");
 const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
 
-/// Pixels of the picture for one px of the figure: 300 dots an inch where a figure of 760 px is printed 19 cm wide.
+/// Pixels for one px of the figure: 300 dots an inch where a figure of 760 px is printed 19 cm wide.
 const SCALE: f32 = 3.0;
 
 /// Why there is no picture.
@@ -54,14 +54,10 @@ pub fn png(svg: &str) -> Result<Vec<u8>, PngError> {
     let size = tree.size();
     let [width, height] = [size.width(), size.height()].map(|x| (x * SCALE).ceil() as u32);
     let mut pixels = Pixmap::new(width, height).ok_or(PngError::Size { width, height })?;
-    resvg::render(
-        &tree,
-        Transform::from_scale(SCALE, SCALE),
-        &mut pixels.as_mut(),
-    );
-    pixels
-        .encode_png()
-        .map_err(|e| PngError::Encoding(e.to_string()))
+    let scale = Transform::from_scale(SCALE, SCALE);
+    resvg::render(&tree, scale, &mut pixels.as_mut());
+    let encoded = pixels.encode_png();
+    encoded.map_err(|e| PngError::Encoding(e.to_string()))
 }
 
 #[cfg(test)]

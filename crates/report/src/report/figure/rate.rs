@@ -1,10 +1,10 @@
 //! How soon changes are found: the share of them over the logs since, a line for each size.
 
 use super::colour;
-use super::joint_grid::{self, Heading};
+use super::joint_grid;
 use super::legend::Key;
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use super::svg::{Stroke, Svg, fitted};
 
 /// Changes of one kind.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +18,7 @@ pub struct RatePanel {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RateFigure {
     pub title: String,
-    /// What the lines are of; four at most.
+    /// A name for each line; four at most.
     pub names: Vec<String>,
     pub panels: Vec<RatePanel>,
 }
@@ -39,16 +39,13 @@ impl RateFigure {
             .map(|(stroke, name)| (Key::Line(*stroke), name.as_str()))
             .collect();
         let panels: Vec<&str> = self.panels.iter().map(|p| p.name.as_str()).collect();
-        let heading = Heading {
-            title: &self.title,
-            description: &format!(
-                "Share of changes found over the logs since, of {}; {}",
-                self.names.join(", "),
-                panels.join("; ")
-            ),
-            legend: &legend,
-        };
-        joint_grid::draw(&heading, &self.panels, RatePanel::draw)
+        let description = format!(
+            "Share of changes found over the logs since, of {}; {}",
+            self.names.join(", "),
+            panels.join("; ")
+        );
+        let titles = [&*self.title, &description];
+        joint_grid::draw(titles, &legend, &self.panels, RatePanel::draw)
     }
 }
 
@@ -56,7 +53,7 @@ impl RatePanel {
     fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
         let [left, top, width, _] = frame;
         let name = fitted(&self.name, 11.5, width);
-        svg.heading([left, top - 7.0], &name, "", Type::new(11.5, Anchor::Start));
+        svg.heading([left, top - 7.0], &name, "");
         let longest = self.lines.iter().map(Vec::len).max().unwrap_or_default();
         if longest < 2 {
             Panel::empty(svg, frame, "no changes");
@@ -69,10 +66,7 @@ impl RatePanel {
             let points = points.map(|(k, share)| [k as f64, 100.0 * share]);
             svg.curve(&panel.place(vec![points.collect()]), stroke);
         }
-        panel.outline(svg);
-        panel.x_numbers(svg);
-        panel.x_title(svg, "since the change", "logs");
-        panel.y_title(svg, 46.0, "found", "%");
+        panel.axes(svg, 46.0, ["since the change", "logs"], ["found", "%"]);
     }
 }
 
@@ -82,19 +76,15 @@ mod tests {
 
     #[test]
     fn each_size_has_a_line_of_its_own() {
+        let panel = |name: &str, lines| RatePanel {
+            name: name.into(),
+            lines,
+        };
+        let lines = vec![vec![0.0, 0.5, 0.9], vec![0.0, 1.0, 1.0]];
         let figure = RateFigure {
             title: "found".into(),
             names: vec!["10 %".into(), "20 %".into()],
-            panels: vec![
-                RatePanel {
-                    name: "step".into(),
-                    lines: vec![vec![0.0, 0.5, 0.9], vec![0.0, 1.0, 1.0]],
-                },
-                RatePanel {
-                    name: "ramp".into(),
-                    lines: Vec::new(),
-                },
-            ],
+            panels: vec![panel("step", lines), panel("ramp", Vec::new())],
         };
         let svg = figure.svg();
         assert!(svg.contains("20 %") && svg.contains("no changes") && !svg.contains("NaN"));

@@ -1,5 +1,5 @@
-//! What a residual depends on, before and after: over position, velocity, load and time, forward and
-//! backward apart, and its spectra over order and frequency.
+//! A residual before and after: over position, velocity, load and time, forward and backward apart, and its spectra
+//! over order and frequency.
 
 use super::axis;
 use super::cell::{self, Cells};
@@ -7,19 +7,20 @@ use super::colour;
 use super::decimate::decimated;
 use super::legend::{self, Key};
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use super::svg::{Anchor, Stroke, Svg, Type, width_of};
+use crate::report::words::listed;
 use cft_ident_core::number;
 
 /// One panel: a quantity below, and lines before and after.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualPanel {
-    /// What stands below, and its unit.
+    /// Name and unit of the quantity below.
     pub over: (String, String),
-    /// What stands at the left, and its unit.
+    /// Name and unit of the quantity at the left.
     pub of: (String, String),
     /// Lines of (x, y); a y that is not finite parts a line.
     pub lines: Vec<(When, Vec<[f64; 2]>)>,
-    /// Places below that are marked, with what stands there.
+    /// Places below that are marked, with their names.
     pub marks: Vec<(f64, String)>,
 }
 
@@ -65,30 +66,20 @@ impl When {
 impl ResidualFigure {
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
-        let rows = |panels: usize| panels.div_ceil(COLUMNS) as f64;
-        let height: f64 = HEAD
-            + self
-                .joints
-                .iter()
-                .map(|(_, p)| NAME + rows(p.len()) * (PLOT + NUMBERS))
-                .sum::<f64>();
-        let names: Vec<&str> = self.joints.iter().map(|(name, _)| name.as_str()).collect();
+        let room = |panels: &[ResidualPanel]| {
+            NAME + panels.len().div_ceil(COLUMNS) as f64 * (PLOT + NUMBERS)
+        };
+        let height = HEAD + self.joints.iter().map(|(_, p)| room(p)).sum::<f64>();
         let description = format!(
             "Torque residual over position, velocity, load, time, order and frequency, joints {}",
-            names.join(", ")
+            listed(self.joints.iter().map(|(name, _)| &**name))
         );
-        let mut svg = Svg::new(WIDTH, height, &self.title, &description);
-        svg.text(
-            [LEFT, 22.0],
-            &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
-            Type::new(14.0, Anchor::Start).bold(),
-        );
-        let entries = self.entries();
-        legend::draw(&mut svg, [LEFT, 44.0], &entries);
+        let titles = [&*self.title, &description];
+        let mut svg = legend::headed([WIDTH, height], [LEFT, RIGHT], titles, &self.entries());
         let column = WIDTH / COLUMNS as f64;
         let mut top = HEAD;
         for (name, panels) in &self.joints {
-            svg.heading([LEFT, top + 13.0], name, "", Type::new(11.5, Anchor::Start));
+            svg.heading([LEFT, top + 13.0], name, "");
             for (i, panel) in panels.iter().enumerate() {
                 let (row, at) = (i / COLUMNS, i % COLUMNS);
                 let frame = [
@@ -99,7 +90,7 @@ impl ResidualFigure {
                 ];
                 panel.draw(&mut svg, frame);
             }
-            top += NAME + rows(panels.len()) * (PLOT + NUMBERS);
+            top += room(panels);
         }
         svg.finish()
     }
@@ -110,46 +101,42 @@ impl ResidualFigure {
         let of_joint = |(name, panels): &(String, Vec<ResidualPanel>)| {
             let picture = |panel: &ResidualPanel| {
                 let title = format!("residual of {name} over {}", panel.over.0);
-                cell::nameless(&title, &panel.words(name), PLOT, |svg, frame| {
+                let titles = [&*title, &panel.words(name)];
+                cell::below(cell::MARKS, titles, PLOT, |svg, frame| {
                     panel.draw(svg, frame)
                 })
             };
-            Cells {
-                title: format!("{}, {name}", self.title),
-                key: cell::key(&entries),
-                pictures: panels.iter().map(picture).collect(),
-                apart: false,
-                words: Vec::new(),
-            }
+            let title = format!("{}, {name}", self.title);
+            Cells::new(&title, &entries, panels.iter().map(picture))
         };
         self.joints.iter().map(of_joint).collect()
     }
 
-    /// Only what is drawn is in the legend; a residual that nothing came after is not `before`.
+    /// The legend of all that is drawn; a residual that nothing came after is not `before`.
     fn entries(&self) -> Vec<(Key, &'static str)> {
         let drawn = |when: When| {
             let mut panels = self.joints.iter().flat_map(|(_, panels)| panels);
             panels.any(|panel| panel.lines.iter().any(|(w, _)| *w == when))
         };
         let alone = !drawn(When::After) && !drawn(When::AfterBackward);
+        let [before, backward] = match alone {
+            true => ["residual", "residual, backward"],
+            false => ["as given", "as given, backward"],
+        };
         let names = [
-            (When::Before, ["as given", "residual"]),
-            (
-                When::BeforeBackward,
-                ["as given, backward", "residual, backward"],
-            ),
-            (When::After, ["after", ""]),
-            (When::AfterBackward, ["after, backward", ""]),
+            (When::Before, before),
+            (When::BeforeBackward, backward),
+            (When::After, "after"),
+            (When::AfterBackward, "after, backward"),
         ];
         let there = names.into_iter().filter(|(when, _)| drawn(*when));
-        there
-            .map(|(when, names)| (Key::Line(when.stroke()), names[usize::from(alone)]))
-            .collect()
+        let entries = there.map(|(when, name)| (Key::Line(when.stroke()), name));
+        entries.collect()
     }
 }
 
 impl ResidualPanel {
-    /// What a screen reader says: the greatest of each line.
+    /// The greatest of each line, for a screen reader.
     fn words(&self, joint: &str) -> String {
         let most = |wanted: [When; 2]| {
             let lines = self.lines.iter().filter(|(when, _)| wanted.contains(when));
@@ -192,21 +179,19 @@ impl ResidualPanel {
         svg.end_clip();
         self.mark(svg, &panel);
         panel.outline(svg);
-        panel.y_title(svg, 46.0, &self.of.0, &self.of.1);
+        panel.y_title(svg, 46.0, [&self.of.0, &self.of.1]);
         panel.x_numbers(svg);
-        panel.x_title(svg, &self.over.0, &self.over.1);
+        panel.x_title(svg, [&self.over.0, &self.over.1]);
     }
-}
 
-impl ResidualPanel {
     /// Marks, with their names above the frame where these do not meet.
     fn mark(&self, svg: &mut Svg, panel: &Panel) {
         let [_, top, _, height] = panel.frame;
         let mut marks: Vec<&(f64, String)> = self.marks.iter().collect();
         marks.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut free = f64::NEG_INFINITY;
-        let within = |x: f64| panel.x.from <= x && x <= panel.x.to;
-        for (x, name) in marks.into_iter().filter(|(x, _)| within(*x)) {
+        let [from, to] = panel.x.data;
+        for (x, name) in marks.into_iter().filter(|(x, _)| (from..=to).contains(x)) {
             let at = panel.x.px(*x);
             let line = Stroke::dashed(colour::INK, 0.9, "2 2");
             svg.line([at, top], [at, top + height], line);
@@ -231,29 +216,23 @@ mod tests {
             lines: vec![(When::Before, line.clone()), (When::AfterBackward, line)],
             marks: vec![(1.0, "1.00".into()), (9.0, "9.00".into())],
         };
+        let panels = vec![
+            panel(vec![[0.0, 1.0], [1.0, 2.0], [2.0, 1.5]]),
+            panel(vec![]),
+        ];
         let figure = ResidualFigure {
             title: "a<b".into(),
-            joints: vec![(
-                "q<1".into(),
-                vec![
-                    panel(vec![[0.0, 1.0], [1.0, 2.0], [2.0, 1.5]]),
-                    panel(vec![]),
-                ],
-            )],
+            joints: vec![("q<1".into(), panels)],
         };
         let svg = figure.svg();
         assert!(svg.contains("velocity [rad/s]") && svg.contains("residual [Nm]"));
         assert!(svg.contains("not enough motion"));
         assert!(svg.contains("q&lt;1") && !svg.contains("NaN"));
-        // what lies beyond the axis is not marked
+        // a mark beyond the axis is left out
         assert!(svg.contains(">1.00</text>") && !svg.contains(">9.00</text>"));
-        let cells = figure.cells();
-        assert_eq!(cells[0].pictures.len(), 2);
+        let pictures = &figure.cells()[0].pictures;
+        assert_eq!(pictures.len(), 2);
         let shown = "greatest residual of q&lt;1 over velocity: 2.00 Nm as given, 2.00 Nm after";
-        assert!(
-            cells[0].pictures[0].contains(shown),
-            "{}",
-            cells[0].pictures[0]
-        );
+        assert!(pictures[0].contains(shown), "{}", pictures[0]);
     }
 }

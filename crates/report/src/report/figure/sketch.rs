@@ -8,8 +8,7 @@ use super::svg::{Anchor, Stroke, Svg, Type, fitted};
 use cft_ident_core::number;
 
 /// One joint of the sketch.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SketchJoint {
+pub(crate) struct SketchJoint {
     pub name: String,
     /// Relative torque error, a fraction; not a number where it is not known.
     pub error: f64,
@@ -18,8 +17,7 @@ pub struct SketchJoint {
 }
 
 /// Poses of a tree of links, in a frame whose third axis points upwards.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sketch {
+pub(crate) struct Sketch {
     pub title: String,
     pub joints: Vec<SketchJoint>,
     /// Points that each point of a pose is joined with; none for the base.
@@ -55,11 +53,7 @@ impl Sketch {
         let views = [("side view", [0, 2]), ("top view", [0, 1])];
         let picture = |(name, axes): (&str, [usize; 2])| {
             cell::cell(name, &self.words(), HEIGHT, |svg, frame| {
-                svg.text(
-                    [frame[0], frame[1] - 8.0],
-                    name,
-                    Type::new(11.5, Anchor::Start).bold(),
-                );
+                cell::name(svg, frame, name);
                 self.draw(svg, frame, axes);
             })
         };
@@ -69,27 +63,21 @@ impl Sketch {
             (Key::Line(WAY), "path of the last joint"),
         ];
         let key: Vec<(Key, &str)> = classes.into_iter().chain(lines).collect();
-        Cells {
-            title: self.title.clone(),
-            key: cell::key(&key),
-            apart: false,
-            pictures: views.into_iter().map(picture).collect(),
-            words: Vec::new(),
-        }
+        Cells::new(&self.title, &key, views.into_iter().map(picture))
     }
 
-    /// What a screen reader says.
+    /// The joint of the largest error, for a screen reader.
     fn words(&self) -> String {
         let known = self.joints.iter().filter(|joint| joint.error.is_finite());
         let worst = known.max_by(|a, b| a.error.total_cmp(&b.error));
-        match worst {
-            Some(worst) => format!(
-                "The robot along its motion; the largest relative torque error is that of {}, {}",
-                worst.name,
-                number::percent(worst.error)
-            ),
-            None => "The robot along its motion".to_owned(),
-        }
+        let worst = worst.map(|worst| {
+            let error = number::percent(worst.error);
+            format!(
+                "; the largest relative torque error is that of {}, {error}",
+                worst.name
+            )
+        });
+        format!("The robot along its motion{}", worst.unwrap_or_default())
     }
 
     fn draw(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4], axes: [usize; 2]) {
@@ -98,9 +86,8 @@ impl Sketch {
         let room = [width - NAMES, height];
         // the base stands at the origin
         let bounds = |axis: usize| {
-            all()
-                .map(|p| p[axis])
-                .fold([0.0f64, 0.0f64], |[a, b], x| [a.min(x), b.max(x)])
+            let along = all().map(|p| p[axis]);
+            along.fold([0.0f64; 2], |[a, b], x| [a.min(x), b.max(x)])
         };
         let (across, up) = (bounds(0), bounds(1));
         let spans = [across[1] - across[0], up[1] - up[0]];
@@ -108,18 +95,12 @@ impl Sketch {
         if metres <= 0.0 || !metres.is_finite() {
             return;
         }
-        let middle = [0.5 * (across[0] + across[1]), 0.5 * (up[0] + up[1])];
-        let half = [0.5 * metres * room[0], 0.5 * metres * room[1]];
-        let x = Scale::new(
-            [middle[0] - half[0], middle[0] + half[0]],
-            left,
-            left + room[0],
-        );
-        let y = Scale::new(
-            [middle[1] - half[1], middle[1] + half[1]],
-            top + height,
-            top,
-        );
+        let around = |[from, to]: [f64; 2], room: f64| {
+            let (middle, half) = (0.5 * (from + to), 0.5 * metres * room);
+            [middle - half, middle + half]
+        };
+        let x = Scale::new(around(across, room[0]), left, left + room[0]);
+        let y = Scale::new(around(up, room[1]), top + height, top);
         let px = |point: &[f64; 3]| {
             let [a, b] = flat(point);
             [x.px(a), y.px(b)]
@@ -135,11 +116,8 @@ impl Sketch {
                 svg.line(from, px(point), stroke);
             }
         }
-        svg.rect(
-            [base[0] - 9.0, base[1] - 3.0, 18.0, 6.0],
-            colour::MUTED,
-            None,
-        );
+        let foot = [base[0] - 9.0, base[1] - 3.0, 18.0, 6.0];
+        svg.rect(foot, colour::MUTED, None);
         self.named(svg, &px, last, [left + room[0] + 12.0, top, height]);
         scale_bar(svg, [left, top + height + 16.0], metres, room[0]);
     }
@@ -152,11 +130,9 @@ impl Sketch {
         pose: &[[f64; 3]],
         [left, top, height]: [f64; 3],
     ) {
-        let mut places: Vec<(&SketchJoint, [f64; 2])> = self
-            .joints
-            .iter()
-            .filter_map(|joint| Some((joint, px(pose.get(joint.point)?))))
-            .collect();
+        let joints = self.joints.iter();
+        let places = joints.filter_map(|joint| Some((joint, px(pose.get(joint.point)?))));
+        let mut places: Vec<(&SketchJoint, [f64; 2])> = places.collect();
         places.sort_by(|a, b| a.1[1].total_cmp(&b.1[1]));
         let mut next = top + 8.0;
         let mut lines: Vec<f64> = Vec::new();
@@ -166,9 +142,7 @@ impl Sketch {
             let line = at[1].max(next).min(lowest.max(next));
             lines.push(line);
             next = line + NAME_DISTANCE_PX;
-        }
-        for ((_, at), line) in places.iter().zip(&lines) {
-            svg.line(*at, [left - 3.0, *line - 3.5], LEADER);
+            svg.line(*at, [left - 3.0, line - 3.5], LEADER);
         }
         for (joint, at) in &places {
             let ring = Stroke::solid(colour::PAPER, 1.2);
@@ -205,11 +179,8 @@ fn scale_bar(svg: &mut Svg, [left, top]: [f64; 2], metres: f64, width: f64) {
         svg.line([x, top - 3.0], [x, top + 3.0], bar);
     }
     let text = format!("{} m", number::significant(length, 1));
-    svg.text(
-        [end + 6.0, top + 3.5],
-        &text,
-        Type::new(10.5, Anchor::Start),
-    );
+    let style = Type::new(10.5, Anchor::Start);
+    svg.text([end + 6.0, top + 3.5], &text, style);
 }
 
 #[cfg(test)]
@@ -235,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn joints_are_coloured_by_their_errors_and_the_worst_is_told() {
+    fn joints_are_coloured_by_their_errors_and_the_worst_is_named() {
         let cells = sketch([0.01, 0.03, 0.12]).cells();
         assert_eq!(cells.pictures.len(), 2);
         for (picture, view) in cells.pictures.iter().zip(["side view", "top view"]) {

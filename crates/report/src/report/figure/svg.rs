@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::colour;
+use crate::report::encode::without_markup;
 use cft_ident_logs::log::is_hidden;
 
 /// Fonts that are likely to be there; all measures leave room for the widest of them.
@@ -19,11 +20,7 @@ pub(super) struct Stroke {
 
 impl Stroke {
     pub(crate) const fn solid(colour: &'static str, width: f64) -> Self {
-        Stroke {
-            colour,
-            width,
-            dash: "",
-        }
+        Stroke::dashed(colour, width, "")
     }
 
     pub(crate) const fn dashed(colour: &'static str, width: f64, dash: &'static str) -> Self {
@@ -84,7 +81,7 @@ pub(super) struct Svg {
 }
 
 impl Svg {
-    /// `title` and `description` are what a screen reader says.
+    /// A screen reader says `title` and `description`.
     pub fn new(width: f64, height: f64, title: &str, description: &str) -> Self {
         Svg {
             width,
@@ -95,115 +92,70 @@ impl Svg {
         }
     }
 
-    pub(crate) fn rect(
-        &mut self,
-        [x, y, width, height]: [f64; 4],
-        fill: &str,
-        stroke: Option<Stroke>,
-    ) {
-        let _ = write!(
-            self.body,
-            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{fill}\"",
-            px(x),
-            px(y),
-            px(width),
-            px(height)
-        );
-        if let Some(stroke) = stroke {
-            self.stroke(stroke);
-        }
-        self.body.push_str("/>\n");
+    pub(crate) fn rect(&mut self, frame: [f64; 4], fill: &str, stroke: Option<Stroke>) {
+        let [x, y, width, height] = frame.map(px);
+        let rect = format!("rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");
+        self.shape(&format!("{rect} fill=\"{fill}\""), stroke);
     }
 
-    pub fn line(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], stroke: Stroke) {
-        let _ = write!(
-            self.body,
-            "<path d=\"M{} {}L{} {}\" fill=\"none\"",
-            px(x1),
-            px(y1),
-            px(x2),
-            px(y2)
-        );
-        self.stroke(stroke);
-        self.body.push_str("/>\n");
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: Stroke) {
+        let path = steps(&[from, to]);
+        self.shape(&format!("path d=\"{path}\" fill=\"none\""), Some(stroke));
     }
 
     /// Several runs of points as one path, so that one dash pattern and one colour hold for them.
     pub fn curve(&mut self, runs: &[Vec<[f64; 2]>], stroke: Stroke) {
-        if runs.iter().all(|run| run.len() < 2) {
-            return;
+        let runs = runs.iter().filter(|run| run.len() > 1);
+        let path: String = runs.map(|run| steps(run)).collect();
+        if !path.is_empty() {
+            let path = format!("path d=\"{path}\" fill=\"none\" stroke-linejoin=\"round\"");
+            self.shape(&path, Some(stroke));
         }
-        self.body.push_str("<path d=\"");
-        for run in runs.iter().filter(|run| run.len() > 1) {
-            self.steps(run);
-        }
-        self.body
-            .push_str("\" fill=\"none\" stroke-linejoin=\"round\"");
-        self.stroke(stroke);
-        self.body.push_str("/>\n");
     }
 
     /// A filled shape, `opacity` 0..1.
     pub(crate) fn area(&mut self, outline: &[[f64; 2]], fill: &str, opacity: f64) {
-        if outline.len() < 3 {
-            return;
+        if outline.len() > 2 {
+            let (path, opacity) = (steps(outline), px(opacity));
+            let path = format!("path d=\"{path}Z\" fill=\"{fill}\" fill-opacity=\"{opacity}\"");
+            self.shape(&path, None);
         }
-        self.body.push_str("<path d=\"");
-        self.steps(outline);
-        let _ = writeln!(
-            self.body,
-            "Z\" fill=\"{fill}\" fill-opacity=\"{}\"/>",
-            px(opacity)
-        );
     }
 
-    pub fn dot(&mut self, [x, y]: [f64; 2], radius: f64, fill: &str) {
-        let _ = writeln!(
-            self.body,
-            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{fill}\"/>",
-            px(x),
-            px(y),
-            px(radius)
-        );
+    pub fn dot(&mut self, at: [f64; 2], radius: f64, fill: &str) {
+        self.circle(at, radius, fill, None);
     }
 
     /// A dot with a ring around it.
-    pub(crate) fn ringed(&mut self, [x, y]: [f64; 2], radius: f64, fill: &str, ring: Stroke) {
-        let (x, y, radius) = (px(x), px(y), px(radius));
-        let _ = write!(
-            self.body,
-            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{fill}\""
-        );
-        self.stroke(ring);
-        self.body.push_str("/>\n");
+    pub(crate) fn ringed(&mut self, at: [f64; 2], radius: f64, fill: &str, ring: Stroke) {
+        self.circle(at, radius, fill, Some(ring));
+    }
+
+    fn circle(&mut self, [x, y]: [f64; 2], radius: f64, fill: &str, ring: Option<Stroke>) {
+        let [x, y, radius] = [x, y, radius].map(px);
+        let circle = format!("circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{fill}\"");
+        self.shape(&circle, ring);
     }
 
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, style: Type) {
-        let _ = write!(self.body, "<text x=\"{}\" y=\"{}\"", px(x), px(y));
-        self.set("", text, style);
+        self.set(&format!("x=\"{}\" y=\"{}\"", px(x), px(y)), "", text, style);
     }
 
-    /// A line that begins with a bold name.
-    pub fn heading(&mut self, [x, y]: [f64; 2], name: &str, rest: &str, style: Type) {
-        let _ = write!(self.body, "<text x=\"{}\" y=\"{}\"", px(x), px(y));
-        self.set(name, rest, style);
+    /// The line above a panel: a bold name, and more about it.
+    pub fn heading(&mut self, [x, y]: [f64; 2], name: &str, rest: &str) {
+        let place = format!("x=\"{}\" y=\"{}\"", px(x), px(y));
+        self.set(&place, name, rest, Type::new(11.5, Anchor::Start));
     }
 
     /// Text that reads upwards, anchored at its middle.
     pub fn upright(&mut self, [x, y]: [f64; 2], text: &str, style: Type) {
-        let _ = write!(
-            self.body,
-            "<text transform=\"translate({} {}) rotate(-90)\"",
-            px(x),
-            px(y)
-        );
-        self.set("", text, style);
+        let place = format!("transform=\"translate({} {}) rotate(-90)\"", px(x), px(y));
+        self.set(&place, "", text, style);
     }
 
-    /// Begins a group that is cut at a rectangle; end it with [`Svg::end_clip`]. A nested picture
-    /// does it without an id, so that several figures may stand in one page.
-    pub(crate) fn clip(&mut self, [x, y, width, height]: [f64; 4]) {
-        let (x, y, width, height) = (px(x), px(y), px(width), px(height));
+    /// Begins a group that is cut at a rectangle, until [`Svg::end_clip`]; a nested picture needs no id in the page.
+    pub(crate) fn clip(&mut self, frame: [f64; 4]) {
+        let [x, y, width, height] = frame.map(px);
         let _ = writeln!(
             self.body,
             "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
@@ -230,30 +182,25 @@ impl Svg {
         )
     }
 
-    fn steps(&mut self, points: &[[f64; 2]]) {
-        for (k, [x, y]) in points.iter().enumerate() {
-            let step = if k == 0 { 'M' } else { 'L' };
-            let _ = write!(self.body, "{step}{} {}", px(*x), px(*y));
-        }
-    }
-
-    fn stroke(&mut self, stroke: Stroke) {
-        let Stroke {
+    /// An element by its name and attributes.
+    fn shape(&mut self, element: &str, stroke: Option<Stroke>) {
+        let _ = write!(self.body, "<{element}");
+        if let Some(Stroke {
             colour,
             width,
             dash,
-        } = stroke;
-        let _ = write!(
-            self.body,
-            " stroke=\"{colour}\" stroke-width=\"{}\"",
-            px(width)
-        );
-        if !dash.is_empty() {
-            let _ = write!(self.body, " stroke-dasharray=\"{dash}\"");
+        }) = stroke
+        {
+            let width = px(width);
+            let _ = write!(self.body, " stroke=\"{colour}\" stroke-width=\"{width}\"");
+            if !dash.is_empty() {
+                let _ = write!(self.body, " stroke-dasharray=\"{dash}\"");
+            }
         }
+        self.body.push_str("/>\n");
     }
 
-    fn set(&mut self, bold: &str, text: &str, style: Type) {
+    fn set(&mut self, place: &str, bold: &str, text: &str, style: Type) {
         let anchor = match style.anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
@@ -264,21 +211,27 @@ impl Svg {
         } else {
             ""
         };
-        let _ = write!(
+        let bold = match bold {
+            "" => String::new(),
+            bold => format!("<tspan font-weight=\"bold\">{}</tspan>", escaped(bold)),
+        };
+        let _ = writeln!(
             self.body,
-            " font-size=\"{}\" fill=\"{}\" text-anchor=\"{anchor}\"{weight}>",
+            "<text {place} font-size=\"{}\" fill=\"{}\" text-anchor=\"{anchor}\"{weight}>{bold}{}</text>",
             px(style.size),
-            style.colour
+            style.colour,
+            escaped(text)
         );
-        if !bold.is_empty() {
-            let _ = write!(
-                self.body,
-                "<tspan font-weight=\"bold\">{}</tspan>",
-                escaped(bold)
-            );
-        }
-        let _ = writeln!(self.body, "{}</text>", escaped(text));
     }
+}
+
+/// A path from point to point.
+fn steps(points: &[[f64; 2]]) -> String {
+    let step = |(k, [x, y]): (usize, &[f64; 2])| {
+        let step = if k == 0 { 'M' } else { 'L' };
+        format!("{step}{} {}", px(*x), px(*y))
+    };
+    points.iter().enumerate().map(step).collect()
 }
 
 /// Width that a text of `size` px takes in the widest of the fonts (DejaVu Sans), about [px].
@@ -309,8 +262,7 @@ pub(super) fn fitted(text: &str, size: f64, width: f64) -> String {
     cut
 }
 
-/// A coordinate with at most two decimals. Values that no screen has are clamped to its edge, and a
-/// number that is none at 0: the callers split their data before.
+/// A coordinate with at most two decimals; clamped to values that a screen has.
 fn px(value: f64) -> String {
     let value = if value.is_nan() { 0.0 } else { value };
     let rounded = (value.clamp(-1e6, 1e6) * 100.0).round() / 100.0;
@@ -318,20 +270,10 @@ fn px(value: f64) -> String {
     format!("{}", rounded + 0.0)
 }
 
-/// Text inside an element: markup is escaped, control characters (which XML forbids) and what forges text are dropped.
+/// Text inside an element, without control characters (which XML forbids) and those that forge text.
 fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c if is_hidden(c) || matches!(c, '\u{fffe}' | '\u{ffff}') => {}
-            c => out.push(c),
-        }
-    }
-    out
+    let shown = |c: &char| !is_hidden(*c) && !matches!(c, '\u{fffe}' | '\u{ffff}');
+    without_markup(text.chars().filter(shown))
 }
 
 #[cfg(test)]

@@ -6,14 +6,14 @@ use super::colour;
 use super::decimate::{POINTS, decimated};
 use super::legend::{self, Key};
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use super::svg::{Stroke, Svg};
+use crate::report::words::{listed, torque_or_force};
 use cft_ident_core::number;
 
 /// The torque of one joint over time. A row that is not finite splits the lines: put one between
 /// logs and across gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointTorque {
-    /// Name of the joint.
     pub joint: String,
     /// Unit of its torque, `N` or `Nm`.
     pub unit: String,
@@ -27,6 +27,15 @@ pub struct JointTorque {
     pub relative_error: f64,
     /// Root mean square of the residual [unit]; not finite where unknown.
     pub rmse: f64,
+}
+
+/// Values with one that is not finite before each break, to part the lines there.
+pub(crate) fn parted(values: impl IntoIterator<Item = f64>, breaks: &[usize]) -> Vec<f64> {
+    let gap = |k: usize| (k > 0 && breaks.contains(&k)).then_some(f64::NAN);
+    let values = values.into_iter().enumerate();
+    values
+        .flat_map(|(k, value)| gap(k).into_iter().chain([value]))
+        .collect()
 }
 
 /// A figure of two panels per joint, the joints below each other.
@@ -73,21 +82,14 @@ impl TorqueFigure {
             "Measured and reconstructed torque over time and their difference: {}",
             shown.join("; ")
         );
-        let mut svg = Svg::new(WIDTH, height, &self.title, &description);
-        svg.text(
-            [LEFT, 22.0],
-            &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
-            Type::new(14.0, Anchor::Start).bold(),
-        );
         let entries = [
-            (Key::Line(MEASURED), "measured"),
-            (Key::Line(RECONSTRUCTED), "reconstructed"),
-            (
-                Key::Line(DIFFERENCE),
-                "residual (measured \u{2212} reconstructed)",
-            ),
+            (MEASURED, "measured"),
+            (RECONSTRUCTED, "reconstructed"),
+            (DIFFERENCE, "residual (measured \u{2212} reconstructed)"),
         ];
-        legend::draw(&mut svg, [LEFT, 44.0], &entries);
+        let entries = entries.map(|(stroke, name)| (Key::Line(stroke), name));
+        let titles = [&*self.title, &description];
+        let mut svg = legend::headed([WIDTH, height], [LEFT, RIGHT], titles, &entries);
         let clock = Clock::of(&self.joints);
         for (k, joint) in self.joints.iter().enumerate() {
             let top = HEAD + group * k as f64;
@@ -109,11 +111,8 @@ impl Clock {
     fn of(joints: &[JointTorque]) -> Option<Self> {
         let times = joints.iter().flat_map(|joint| joint.t.iter().copied());
         let [from, to] = axis::interval(times, 0.0)?;
-        let start = if from.abs() > 100.0 * (to - from) {
-            from.floor()
-        } else {
-            0.0
-        };
+        let late = from.abs() > 100.0 * (to - from);
+        let start = if late { from.floor() } else { 0.0 };
         Some(Clock {
             interval: [from - start, to - start],
             start,
@@ -121,43 +120,29 @@ impl Clock {
     }
 
     fn name(&self) -> String {
-        if self.start == 0.0 {
-            "time".into()
-        } else {
-            format!("time after {} s", self.start)
+        match self.start {
+            0.0 => "time".into(),
+            start => format!("time after {start} s"),
         }
     }
 }
 
 impl JointTorque {
     fn draw(&self, svg: &mut Svg, top: f64, clock: Option<&Clock>, last: bool) {
-        svg.heading(
-            [LEFT, top + 13.0],
-            &self.joint,
-            &self.figures(),
-            Type::new(11.5, Anchor::Start),
-        );
+        svg.heading([LEFT, top + 13.0], &self.joint, &self.figures());
         let width = WIDTH - LEFT - RIGHT;
         let upper = [LEFT, top + NAME, width, TORQUE];
         let lower = [LEFT, top + NAME + TORQUE + BETWEEN, width, RESIDUAL];
         let both = self.measured.iter().chain(&self.reconstructed).copied();
-        let residual: Vec<f64> = self
-            .measured
-            .iter()
-            .zip(&self.reconstructed)
-            .map(|(measured, reconstructed)| measured - reconstructed)
-            .collect();
-        let around_zero = residual.iter().flat_map(|&r| [r, -r]);
-        let (Some(clock), Some(range), Some(spread)) = (
-            clock,
-            axis::interval(both, 0.06),
-            axis::interval(around_zero, 0.08),
-        ) else {
+        let pairs = self.measured.iter().zip(&self.reconstructed);
+        let residual: Vec<f64> = pairs.map(|(measured, hat)| measured - hat).collect();
+        let range = axis::interval(both, 0.06);
+        let spread = axis::interval(residual.iter().flat_map(|&r| [r, -r]), 0.08);
+        let (Some(clock), Some(range), Some(spread)) = (clock, range, spread) else {
             Panel::empty(svg, upper, "no samples");
             Panel::empty(svg, lower, "no samples");
             return;
         };
-        let quantity = if self.unit == "N" { "force" } else { "torque" };
         let panel = Panel::new(upper, clock.interval, range, [9, 5]);
         panel.grid(svg);
         svg.clip(upper);
@@ -167,35 +152,31 @@ impl JointTorque {
         svg.curve(&panel.place(line(&self.measured)), MEASURED);
         svg.end_clip();
         panel.outline(svg);
-        panel.y_title(svg, 52.0, quantity, &self.unit);
+        panel.y_title(svg, 52.0, [torque_or_force(&self.unit), &self.unit]);
         let panel = Panel::new(lower, clock.interval, spread, [9, 3]);
         panel.grid(svg);
         svg.clip(lower);
         svg.curve(&panel.place(line(&residual)), DIFFERENCE);
         svg.end_clip();
         panel.outline(svg);
-        panel.y_title(svg, 52.0, "residual", &self.unit);
+        panel.y_title(svg, 52.0, ["residual", &self.unit]);
         panel.x_numbers(svg);
         if last {
-            panel.x_title(svg, &clock.name(), "s");
+            panel.x_title(svg, [&clock.name(), "s"]);
         }
     }
 
-    /// What stands behind the joint's name.
+    /// The errors that are known, to stand behind the joint's name.
     fn figures(&self) -> String {
-        let mut text = String::new();
-        if self.relative_error.is_finite() {
-            text.push_str("\u{2003}relative error ");
-            text.push_str(&number::percent(self.relative_error));
+        let relative = format!("relative error {}", number::percent(self.relative_error));
+        let rms = format!("rms {} {}", number::significant(self.rmse, 3), self.unit);
+        let both = [(self.relative_error, relative), (self.rmse, rms)];
+        let known = both.into_iter().filter(|(error, _)| error.is_finite());
+        let known = listed(known.map(|(_, words)| words));
+        match known.is_empty() {
+            true => known,
+            false => format!("\u{2003}{known}"),
         }
-        if self.rmse.is_finite() {
-            text.push_str(if text.is_empty() { "\u{2003}" } else { ", " });
-            text.push_str("rms ");
-            text.push_str(&number::significant(self.rmse, 3));
-            text.push(' ');
-            text.push_str(&self.unit);
-        }
-        text
     }
 }
 
@@ -256,9 +237,7 @@ mod tests {
     #[test]
     fn clock_time_is_counted_from_a_round_second() {
         let mut late = figure(1000);
-        for t in &mut late.joints[0].t {
-            *t += 1.7e9;
-        }
+        late.joints[0].t.iter_mut().for_each(|t| *t += 1.7e9);
         let svg = late.svg();
         assert!(svg.contains("time after 1700000000 s [s]"), "{svg}");
         assert!(svg.contains(">0.5</text>"));

@@ -5,8 +5,6 @@
 //! of their still picture and can be zoomed. The page's policy allows that one script, by its checksum,
 //! and nothing from anywhere else.
 
-use std::fmt::Write;
-
 use super::encode;
 use super::figure::Cells;
 use super::table::Table;
@@ -37,27 +35,23 @@ impl Report {
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
              <title>{title}</title><style>\n{STYLE}</style></head><body>\n<h1>{title}</h1>\n{opening}",
             fingerprint(),
-            title = escaped(self.title()),
+            title = escaped(&self.title),
         );
+        let numbered = || (1..).zip(&sections);
         if sections.len() > 2 {
-            out.push_str("<nav aria-label=\"sections\">");
-            for (k, (heading, _)) in sections.iter().enumerate() {
-                let _ = write!(out, "<a href=\"#s{}\">{heading}</a> ", k + 1);
-            }
-            out.push_str("</nav>\n");
+            let link = |(k, (heading, _)): (u32, &(String, _))| {
+                format!("<a href=\"#s{k}\">{heading}</a> ")
+            };
+            let links: String = numbered().map(link).collect();
+            out += &format!("<nav aria-label=\"sections\">{links}</nav>\n");
         }
-        for (k, (heading, body)) in sections.iter().enumerate() {
-            let _ = write!(
-                out,
-                "<section><h2 id=\"s{}\">{heading}</h2>\n{body}</section>\n",
-                k + 1
-            );
+        for (k, (heading, body)) in numbered() {
+            out += &format!("<section><h2 id=\"s{k}\">{heading}</h2>\n{body}</section>\n");
         }
         if scripted {
-            let _ = writeln!(out, "<script>{VIEWER}</script>");
+            out += &format!("<script>{VIEWER}</script>\n");
         }
-        out.push_str("</body></html>\n");
-        out
+        out + "</body></html>\n"
     }
 }
 
@@ -103,47 +97,36 @@ fn shown(part: &Part) -> String {
     }
 }
 
-/// Small pictures beside each other, with their title, what the colours mean, and what is said of them.
+/// Small pictures beside each other, with their title, their legend and the sentences below them.
 fn figures(cells: &Cells) -> String {
-    let mut out = format!(
-        "<figure class=\"{}\"><figcaption>{}</figcaption>",
-        match (cells.apart, cells.pictures.len() > 2) {
-            (true, _) => "card apart",
-            (false, true) => "card many",
-            (false, false) => "card",
-        },
-        escaped(&capital(&cells.title))
-    );
-    if !cells.key.is_empty() {
-        out.push_str("<div class=\"legend\">");
-        for entry in &cells.key {
-            out.push_str(inline(entry));
-        }
-        out.push_str("</div>");
-    }
-    out.push_str("<div class=\"still cells\">");
-    for picture in &cells.pictures {
-        out.push_str(inline(picture));
-    }
-    out.push_str("</div>");
-    for words in &cells.words {
-        let _ = write!(out, "<p>{}</p>", prose(words));
-    }
-    out.push_str("</figure>\n");
-    out
+    let class = match (cells.apart, cells.pictures.len() > 2) {
+        (true, _) => "card apart",
+        (false, true) => "card many",
+        (false, false) => "card",
+    };
+    let inline = |all: &[String]| all.iter().map(|svg| inline(svg)).collect::<String>();
+    let words = cells.words.iter();
+    let words: String = words
+        .map(|words| format!("<p>{}</p>", prose(words)))
+        .collect();
+    format!(
+        "<figure class=\"{class}\"><figcaption>{}</figcaption><div class=\"legend\">{}</div>\
+         <div class=\"still cells\">{}</div>{words}</figure>\n",
+        escaped(&capital(&cells.title)),
+        inline(&cells.key),
+        inline(&cells.pictures)
+    )
 }
 
 /// A title with a capital letter, unless its first word is no plain one.
 fn capital(title: &str) -> String {
     let first = title.split(' ').next().unwrap_or("");
-    match first.chars().all(char::is_alphabetic) {
-        true => {
-            let mut chars = title.chars();
-            let initial = chars.next().map(char::to_uppercase).into_iter().flatten();
-            initial.chain(chars).collect()
-        }
-        false => title.to_owned(),
+    if !first.chars().all(char::is_alphabetic) {
+        return title.to_owned();
     }
+    let mut chars = title.chars();
+    let initial = chars.next().map(char::to_uppercase).into_iter().flatten();
+    initial.chain(chars).collect()
 }
 
 /// A command, whose words a line end does not part where a line holds them.
@@ -156,15 +139,15 @@ fn whole_words(text: &str) -> String {
 /// A table; the first column holds names. A column of words is set to the left.
 fn table_of(table: &Table) -> String {
     let (caption, _, rows) = table.parts();
-    match rows.len() > FOLDED_FROM_ROWS {
-        true => format!(
-            "<details class=\"table\"><summary>{} ({} rows)</summary>{}</details>\n",
-            escaped(if caption.is_empty() { "table" } else { caption }),
-            rows.len(),
-            open_table(table)
-        ),
-        false => open_table(table),
+    if rows.len() <= FOLDED_FROM_ROWS {
+        return open_table(table);
     }
+    format!(
+        "<details class=\"table\"><summary>{} ({} rows)</summary>{}</details>\n",
+        escaped(if caption.is_empty() { "table" } else { caption }),
+        rows.len(),
+        open_table(table)
+    )
 }
 
 /// Rows from which on a table is folded.
@@ -172,36 +155,31 @@ const FOLDED_FROM_ROWS: usize = 24;
 
 fn open_table(table: &Table) -> String {
     let (caption, head, rows) = table.parts();
-    let columns: Vec<Column> = (0..head.len())
-        .map(|c| Column::of(c, rows.iter().filter_map(|row| row.get(c))))
-        .collect();
-    let class = |c: usize| columns.get(c).map_or("", |column| column.class());
+    let class = |c: usize| class(c, rows.iter().map(|row| &row[c]));
+    let classes: Vec<&str> = (0..head.len()).map(class).collect();
     let cards = needs(&head, rows) > PHONE;
-    let mut out = String::from("<div class=\"wide\" tabindex=\"0\" role=\"region\"");
-    let _ = write!(
-        out,
-        " aria-label=\"{0}\"><table{1}><caption>{0}</caption><thead><tr>",
+    let columns = || head.iter().zip(&classes);
+    let heads =
+        columns().map(|(name, class)| format!("<th scope=\"col\"{class}>{}</th>", escaped(name)));
+    let row = |row: &Vec<String>| {
+        let cells = row.iter().zip(columns()).enumerate();
+        let cells = cells.map(|(c, (cell, (name, class)))| {
+            let name = match cards && c > 0 {
+                true => format!(" data-of=\"{}\"", bound(&escaped(name))),
+                false => String::new(),
+            };
+            format!("<td{class}{name}>{}</td>", bound(&escaped(cell)))
+        });
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    format!(
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table{1}>\
+         <caption>{0}</caption><thead><tr>{2}</tr></thead><tbody>\n{3}</tbody></table></div>\n",
         escaped(caption),
-        if cards { " class=\"cards\"" } else { "" }
-    );
-    for (c, name) in head.iter().enumerate() {
-        let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(c), escaped(name));
-    }
-    out.push_str("</tr></thead><tbody>\n");
-    for row in rows {
-        out.push_str("<tr>");
-        for (c, cell) in row.iter().enumerate() {
-            let name = head.get(c).filter(|_| cards && c > 0);
-            let name = name.map_or(String::new(), |n| {
-                format!(" data-of=\"{}\"", bound(&escaped(n)))
-            });
-            let cell = bound(&escaped(cell));
-            let _ = write!(out, "<td{}{name}>{cell}</td>", class(c));
-        }
-        out.push_str("</tr>\n");
-    }
-    out.push_str("</tbody></table></div>\n");
-    out
+        if cards { " class=\"cards\"" } else { "" },
+        heads.collect::<String>(),
+        rows.iter().map(row).collect::<String>()
+    )
 }
 
 /// Characters beside each other that a phone has room for.
@@ -211,60 +189,29 @@ const PHONE: usize = 34;
 fn needs(head: &[&str], rows: &[Vec<String>]) -> usize {
     let width = |text: &str| text.chars().count();
     let column = |c: usize| {
-        let cells = rows
-            .iter()
-            .filter_map(|row| row.get(c))
-            .map(|cell| width(cell));
+        let cells = rows.iter().map(|row| width(&row[c]));
         let name = head[c].split(' ').map(width).max();
         cells.chain(name).max().unwrap_or(0) + 2
     };
     (0..head.len()).map(column).sum()
 }
 
-/// What a column of a table holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Column {
-    Numbers,
-    Words,
-    /// Sentences, which are broken into lines.
-    Long,
-    /// Checksums, which break anywhere.
-    Code,
-}
-
 /// Longest cell that stays on one line.
 const MAX_CELL_CHARACTERS: usize = 28;
 
-impl Column {
-    fn of<'a>(c: usize, mut cells: impl Iterator<Item = &'a String> + Clone) -> Self {
-        let checksum = |cell: &String| cell.len() == 64 && !cell.contains(' ');
-        if cells.clone().any(checksum) {
-            Column::Code
-        } else if cells
-            .clone()
-            .any(|cell| cell.chars().count() > MAX_CELL_CHARACTERS)
-        {
-            Column::Long
-        } else if c == 0 || cells.any(|cell| wordy(cell)) {
-            Column::Words
-        } else {
-            Column::Numbers
-        }
+/// The class of a column: checksums break anywhere, long sentences into lines; words, and numbers.
+fn class<'a>(c: usize, mut cells: impl Iterator<Item = &'a String> + Clone) -> &'static str {
+    let checksum = |cell: &String| cell.len() == 64 && !cell.contains(' ');
+    let long = |cell: &String| cell.chars().count() > MAX_CELL_CHARACTERS;
+    // a cell of words, and not a number with its unit
+    let wordy = |cell: &String| cell.starts_with(|c: char| c.is_alphabetic());
+    match c {
+        _ if cells.clone().any(checksum) => " class=\"code\"",
+        _ if cells.clone().any(long) => " class=\"long\"",
+        0 => " class=\"text\"",
+        _ if cells.any(wordy) => " class=\"text\"",
+        _ => "",
     }
-
-    fn class(self) -> &'static str {
-        match self {
-            Column::Numbers => "",
-            Column::Words => " class=\"text\"",
-            Column::Long => " class=\"long\"",
-            Column::Code => " class=\"code\"",
-        }
-    }
-}
-
-/// Whether a cell holds words and not a number with its unit.
-fn wordy(cell: &str) -> bool {
-    cell.starts_with(|c: char| c.is_alphabetic())
 }
 
 /// Inside HTML the XML declaration is not wanted.
@@ -275,34 +222,22 @@ fn inline(svg: &str) -> &str {
 /// The script's checksum as a content security policy names it.
 fn fingerprint() -> String {
     let hex = Provenance::of_text("", VIEWER).sha256;
-    let digit = |c: u8| char::from(c).to_digit(16).unwrap_or(0) as u8;
-    let bytes: Vec<u8> = hex
-        .as_bytes()
-        .chunks(2)
-        .map(|pair| pair.iter().fold(0, |byte, c| byte << 4 | digit(*c)))
-        .collect();
-    format!("sha256-{}", encode::base64(&bytes))
+    let digit = |c: &u8| char::from(*c).to_digit(16).unwrap_or(0) as u8;
+    let bytes = hex.as_bytes().chunks(2);
+    let bytes = bytes.map(|pair| pair.iter().fold(0, |byte, c| byte << 4 | digit(c)));
+    format!("sha256-{}", encode::base64(&bytes.collect::<Vec<u8>>()))
 }
 
-/// Sentences as HTML: what stands between two backticks is code, and no line ends between a number and its percent sign.
+/// Sentences as HTML: text between two backticks is code, and no line ends between a number and its percent sign.
 fn prose(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
     let parts: Vec<&str> = text.split('`').collect();
-    for (k, part) in parts.iter().enumerate() {
-        let safe = escaped(part);
-        match (k % 2 == 1, k + 1 < parts.len()) {
-            (true, true) => {
-                let _ = write!(out, "<code>{safe}</code>");
-            }
-            // a backtick without another
-            (true, false) => {
-                out.push('`');
-                out.push_str(&safe);
-            }
-            (false, _) => out.push_str(&bound(&safe)),
-        }
-    }
-    out
+    let part = |(k, part): (usize, &&str)| match (k % 2 == 1, k + 1 < parts.len()) {
+        (true, true) => format!("<code>{}</code>", escaped(part)),
+        // a backtick without another
+        (true, false) => format!("`{}", escaped(part)),
+        (false, _) => bound(&escaped(part)),
+    };
+    parts.iter().enumerate().map(part).collect()
 }
 
 /// No line ends between a number and its percent sign.
@@ -312,25 +247,18 @@ fn bound(safe: &str) -> String {
 
 /// Text as HTML may hold it.
 fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            c if is_hidden(c) && c != '\n' => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
+    let shown = |c: char| match is_hidden(c) && c != '\n' {
+        true => '\u{fffd}',
+        false => c,
+    };
+    encode::without_markup(text.chars().map(shown)).replace('\'', "&#39;")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::Traces;
+    use crate::report::table::Columns;
+    use crate::report::traces::Traces;
 
     #[test]
     fn nothing_that_is_given_becomes_markup() {
@@ -344,8 +272,8 @@ mod tests {
         page.paragraph(evil);
         page.list([evil]);
         page.details(evil, evil);
-        page.table(Table::of_words(evil, &[evil], vec![vec![evil.to_owned()]]));
-        page.traces(&Traces::sample(evil), "<svg></svg>");
+        page.table(Columns::new(evil, [()]).words(evil, |()| evil));
+        page.traces(&Traces::sample(evil), "<svg></svg>".to_owned());
         let html = report.html();
         // the data of the traces and the viewer
         assert_eq!(html.matches("<script").count(), 2);
@@ -366,7 +294,7 @@ mod tests {
     fn the_page_asks_for_nothing_from_anywhere() {
         let mut report = Report::new("t");
         let mut page = report.page();
-        page.traces(&Traces::sample("q1"), "<svg></svg>");
+        page.traces(&Traces::sample("q1"), "<svg></svg>".to_owned());
         let html = report.html();
         for word in [
             "http:", "https:", "src=", "@import", "url(", "fetch(", "import(",
@@ -379,8 +307,6 @@ mod tests {
 
     #[test]
     fn the_policy_names_the_script_by_its_checksum() {
-        // of an empty script, from the definition of SHA-256
-        assert_eq!(encode::base64(&[0xe3, 0xb0, 0xc4, 0x42]), "47DEQg==");
         let fingerprint = fingerprint();
         assert_eq!(fingerprint.len(), "sha256-".len() + 44);
         assert!(Report::new("t").html().contains(&fingerprint));
@@ -398,26 +324,26 @@ mod tests {
 
     #[test]
     fn a_long_table_is_folded_with_its_number_of_rows() {
-        let rows = |n: usize| vec![vec!["cell".to_owned()]; n];
-        let short = table_of(&Table::of_words("short", &["a"], rows(FOLDED_FROM_ROWS)));
+        let table = |name: &str, rows: usize| {
+            let columns = Columns::new(name, vec![(); rows]).words("a", |()| "cell");
+            table_of(&columns.into())
+        };
+        let short = table("short", FOLDED_FROM_ROWS);
         assert!(!short.contains("<details"), "{short}");
-        let long = table_of(&Table::of_words("long", &["a"], rows(58)));
+        let long = table("long", 58);
         assert!(long.starts_with("<details"), "{long}");
         assert!(long.contains("<summary>long (58 rows)</summary>"), "{long}");
         assert_eq!(long.matches("<td").count(), 58);
     }
 
     #[test]
-    fn a_column_of_words_is_told_from_a_column_of_numbers() {
-        let cells = |text: &[&str]| text.iter().map(|t| (*t).to_owned()).collect::<Vec<_>>();
-        assert_eq!(
-            Column::of(1, cells(&["1.2 N", "-"]).iter()),
-            Column::Numbers
-        );
-        assert_eq!(Column::of(1, cells(&["-", "weak"]).iter()), Column::Words);
-        assert_eq!(
-            Column::of(3, cells(&[&"0".repeat(64)]).iter()),
-            Column::Code
-        );
+    fn columns_of_words_numbers_and_checksums_have_classes_of_their_own() {
+        for (c, cells, expected) in [
+            (1, ["1.2 N", "-"], ""),
+            (1, ["-", "weak"], " class=\"text\""),
+            (3, ["-", &*"0".repeat(64)], " class=\"code\""),
+        ] {
+            assert_eq!(class(c, cells.map(str::to_owned).iter()), expected);
+        }
     }
 }

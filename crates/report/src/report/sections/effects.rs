@@ -1,53 +1,37 @@
-//! One card per effect that was added: what it is, the residual without it over the signal on which it depends with
-//! the torque that it adds, what is left with it, and what to do about it.
+//! One card per effect that was added: the residual without it over the signal on which it depends with the torque that
+//! it adds, the residual with it, and the remedy.
 
 use crate::report::Writer;
 use crate::report::figure::EffectFigure;
+use crate::report::words::{scaled, torque_or_force};
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::number::{self, MILLIMETRES};
+use cft_ident_core::number;
 use cft_ident_stages::identify::LoggedRobot;
 use cft_ident_stages::replay::EffectRows;
-
-/// What a card says besides its picture.
-pub struct Said {
-    pub title: String,
-    pub words: Vec<String>,
-    /// Why nothing is gained by the effect, where that is so.
-    pub no_gain: Option<String>,
-}
 
 /// Part of the residual's rms that an effect takes away at least, where its card is not folded.
 const GAIN: f64 = 0.01;
 
-/// The card of an effect of `model`, over logs that are called `data`; folded away where these logs gain little by it.
+/// The card of an effect with its sentences; folded away where `no_gain` says why, or where `data` gain little by it.
 pub fn card(
     page: &mut Writer,
     (machine, model): (&LoggedRobot, &AugmentedModel),
     of: &EffectRows,
-    Said {
-        title,
-        words: said,
-        no_gain,
-    }: Said,
+    (title, said, no_gain): (String, Vec<String>, Option<String>),
     data: &str,
 ) {
     let effect = &model.effects[of.effect];
-    let robot = &machine.robot;
-    let joint = &robot.joint_names()[of.joint];
+    let joint = &machine.robot.joint_names()[of.joint];
     let unit = machine.file.torque_unit(of.joint);
     let [rms_without, rms_with] = of.rms;
-    let [without, with] = of
-        .rms
-        .map(|rms| format!("{} {unit}", number::significant(rms, 3)));
-    let torque = if unit == "N" { "force" } else { "torque" };
+    let shown = |rms| format!("{} {unit}", number::significant(rms, 3));
+    let [without, with] = of.rms.map(shown);
+    let torque = torque_or_force(unit);
     let description = format!(
         "The residual of {joint} on {data} is {without} rms with this {torque} left out and the rest as it is, and {with} with it."
     );
-    let small = of.over.1 == "m" && of.rows.iter().all(|row| row[0].abs() < MILLIMETRES);
-    let (scale, over) = match small {
-        true => (1e3, (of.over.0.clone(), "mm".to_owned())),
-        false => (1.0, of.over.clone()),
-    };
+    let (name, over_unit) = &of.over;
+    let (scale, over_unit) = scaled(over_unit, of.rows.iter().map(|row| row[0]));
     let along = match of.along_motion {
         true => ", along the motion",
         false => "",
@@ -55,23 +39,23 @@ pub fn card(
     let figure = EffectFigure {
         title: title.clone(),
         description: description.clone(),
-        over,
+        over: (name.clone(), over_unit.to_owned()),
         of: (format!("{torque}{along}"), unit.to_owned()),
         rows: (of.rows.iter())
             .map(|[x, without, added]| [scale * x, *without, *added])
             .collect(),
     };
-    let mut words = vec![description];
-    words.push(format!("What to do: {}.", effect.law.entry.remedy));
-    words.extend(said);
+    let remedy = format!("What to do: {}.", effect.law.entry.remedy);
+    let words = [description, remedy].into_iter().chain(said).collect();
     let cells = figure.cells(words);
-    let little = match rms_with < rms_without {
-        true => format!("little gained on {data} ({without} without it, {with} with it)"),
-        false => format!("nothing gained on {data} ({without} without it, {with} with it)"),
+    let gained = match rms_with < rms_without {
+        true => "little",
+        false => "nothing",
     };
+    let little = format!("{gained} gained on {data} ({without} without it, {with} with it)");
     let little = (rms_with > (1.0 - GAIN) * rms_without).then_some(little);
     match no_gain.or(little) {
-        Some(why) => page.folded(&format!("{title}: {why}"), &cells),
-        None => page.figures(&cells),
+        Some(why) => page.folded(format!("{title}: {why}"), cells),
+        None => page.figures(cells),
     }
 }

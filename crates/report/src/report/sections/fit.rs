@@ -1,9 +1,10 @@
-//! How certain the parameters are together: condition, and what the data hardly distinguish.
+//! How certain the parameters are together: condition, and directions that the data hardly distinguish.
 
-use crate::report::Writer;
+use crate::report::table::Columns;
+use crate::report::{Writer, words};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
-use cft_ident_stages::identify::{IdentifiedDynamics, WeakestPart};
+use cft_ident_stages::identify::IdentifiedDynamics;
 
 /// Correlation of two errors from which on a pair is reported.
 const MIN_CORRELATION: f64 = 0.9;
@@ -14,52 +15,34 @@ const MAX_SHOWN: usize = 8;
 pub fn section(page: &mut Writer, found: &IdentifiedDynamics, model: &ModelFile) {
     page.heading("Condition and weakest directions");
     let fit = &found.fit;
-    let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
-    page.rows(
-        "the stacked regressor of the fit",
-        &["what", "value"],
-        vec![
-            vec![
-                "condition as it stands".into(),
-                condition(fit.condition.raw),
-            ],
-            vec![
-                "condition, columns scaled to norm 1".into(),
-                condition(fit.condition.normalised),
-            ],
-            vec![
-                "rank".into(),
-                format!("{} of {}", fit.rank, found.unknowns.len()),
-            ],
-            vec!["rows per joint".into(), fit.rows.to_string()],
-            vec![
-                "effective sample size".into(),
-                number::significant(fit.effective_rows, 3),
-            ],
-        ],
-    );
-    weakest(page, found);
+    let values = [
+        (
+            "condition as it stands",
+            words::condition(fit.condition.raw),
+        ),
+        (
+            "condition, columns scaled to norm 1",
+            words::condition(fit.condition.normalised),
+        ),
+        ("rank", format!("{} of {}", fit.rank, found.unknowns.len())),
+        ("rows per joint", fit.rows.to_string()),
+        (
+            "effective sample size",
+            number::significant(fit.effective_rows, 3),
+        ),
+    ];
+    let columns = Columns::new("the stacked regressor of the fit", &values)
+        .words("what", |(what, _)| what)
+        .words("value", |(_, value)| value);
+    page.table(columns);
+    let weakest = found.weakest_direction.iter().take(MAX_SHOWN);
+    let caption = "weakest direction: the combination of the columns, scaled to norm 1, that is least certain";
+    let columns = Columns::new(caption, weakest)
+        .words("parameter", |part| &part.parameter)
+        .words("joint", |part| part.joint.as_deref().unwrap_or(""))
+        .words("part", |part| format!("{:+.2}", part.part));
+    page.table_if_any(columns);
     pairs(page, model);
-}
-
-/// The combination of scaled columns with the largest variance.
-fn weakest(page: &mut Writer, found: &IdentifiedDynamics) {
-    if found.weakest_direction.is_empty() {
-        return;
-    }
-    let parts = found.weakest_direction.iter().take(MAX_SHOWN);
-    let row = |part: &WeakestPart| {
-        vec![
-            part.parameter.clone(),
-            part.joint.clone().unwrap_or_default(),
-            format!("{:+.2}", part.part),
-        ]
-    };
-    page.rows(
-        "weakest direction: the combination of the columns, scaled to norm 1, that is least certain",
-        &["parameter", "joint", "part"],
-        parts.map(row).collect(),
-    );
 }
 
 /// Parameters of a model whose estimates are correlated.
@@ -68,24 +51,23 @@ pub fn pairs(page: &mut Writer, model: &ModelFile) {
         return;
     };
     let found = covariance.correlated(MIN_CORRELATION);
-    let count = found.len();
-    let rows: Vec<Vec<String>> = found
-        .into_iter()
-        .take(MAX_SHOWN)
-        .map(|([a, b], correlation)| vec![a.to_owned(), b.to_owned(), format!("{correlation:+.3}")])
-        .collect();
-    if rows.is_empty() {
+    if found.is_empty() {
         page.paragraph(&format!(
             "No two estimates are correlated by {MIN_CORRELATION} or more."
         ));
         return;
     }
-    page.rows(
-        &format!(
-            "most correlated estimates, {} of {count} pairs beyond {MIN_CORRELATION}",
-            rows.len()
-        ),
-        &["parameter", "and", "correlation"],
-        rows,
+    let shown = &found[..found.len().min(MAX_SHOWN)];
+    let caption = format!(
+        "most correlated estimates, {} of {} pairs beyond {MIN_CORRELATION}",
+        shown.len(),
+        found.len()
     );
+    let columns = Columns::new(&caption, shown)
+        .words("parameter", |([a, _], _)| *a)
+        .words("and", |([_, b], _)| *b)
+        .words("correlation", |(_, correlation)| {
+            format!("{correlation:+.3}")
+        });
+    page.table(columns);
 }

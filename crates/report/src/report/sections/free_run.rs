@@ -1,11 +1,11 @@
 //! The motion that a model makes of measured torques.
 
-use crate::report::Writer;
-use crate::report::table::{Align, Table};
+use crate::report::table::{Align, Columns};
+use crate::report::{Writer, words};
 use cft_ident_core::number;
-use cft_ident_stages::open_loop::{FreeRun, PositionError, PositionErrorChange};
+use cft_ident_stages::open_loop::{FreeRun, PositionErrorChange};
 
-/// What a free run found, where there is one; nothing where every window went astray, but for a sentence.
+/// The errors of a free run, where there is one; a sentence alone where every window went astray.
 pub fn section(writer: &mut Writer, found: Option<&FreeRun>) {
     let Some(found) = found else {
         return;
@@ -15,75 +15,43 @@ pub fn section(writer: &mut Writer, found: Option<&FreeRun>) {
         writer.paragraph("No motion follows from this model: its inertia matrix is not that of bodies that can exist.");
         return;
     }
-    match found.joints.iter().any(|joint| joint.after.is_some()) {
-        true => writer.table(compared(found)),
-        false => writer.table(growing(found)),
+    let caption = format!(
+        "free run: rms error of the positions that the model makes of the measured torques, {} windows of {} s",
+        found.windows,
+        number::significant(found.window_s, 2)
+    );
+    let mut table = Columns::new(&caption, &found.joints).words("joint", |j| &j.joint);
+    if found.joints.iter().any(|joint| joint.after.is_some()) {
+        // two models beside each other
+        let shown = |rms| words::significant(rms, 3);
+        let interval =
+            |c: &PositionErrorChange| c.interval_95.map(|x| number::significant(x, 2)).join("..");
+        table = table
+            .numbers("as given", |j| shown(Some(j.given.rms)))
+            .numbers("after", |j| shown(j.after.as_ref().map(|after| after.rms)))
+            .column(Align::Right, "95 % CI of the change", |j| {
+                j.change.as_ref().map_or(number::ABSENT.into(), interval)
+            })
+            .words("unit", |j| j.unit)
+            .words("change", |j| j.change.as_ref().map_or("", direction));
+    } else {
+        // how the error grows in a window
+        let growth = found.joints.first().map_or(&[][..], |j| &j.given.growth);
+        for (k, at) in growth.iter().enumerate() {
+            let head = format!("at {:.2} s", at.after_s);
+            table = table.digits(&head, 3, |j| j.given.growth.get(k).map(|at| at.rms));
+        }
+        table = table
+            .percent("of the way", |j| j.given.relative)
+            .words("unit", |j| j.unit);
     }
+    writer.table(table);
     if found.astray > 0 {
         writer.paragraph(&format!(
             "{} of {} windows went astray and are not counted.",
             found.astray, found.windows
         ));
     }
-}
-
-fn caption(found: &FreeRun) -> String {
-    format!(
-        "free run: rms error of the positions that the model makes of the measured torques, {} windows of {} s",
-        found.windows,
-        number::significant(found.window_s, 2)
-    )
-}
-
-/// How the error grows in a window.
-fn growing(found: &FreeRun) -> Table {
-    let growth = found.joints.first().map_or(&[][..], |j| &j.given.growth);
-    let heads = growth.iter().map(|at| format!("at {:.2} s", at.after_s));
-    let heads: Vec<String> = heads.collect();
-    let mut columns = vec![("joint", Align::Left)];
-    columns.extend(heads.iter().map(|head| (head.as_str(), Align::Decimal)));
-    columns.extend([("of the way", Align::Decimal), ("unit", Align::Left)]);
-    let mut table = Table::new(&columns).caption(&caption(found));
-    for joint in &found.joints {
-        let mut row = vec![joint.joint.clone()];
-        let growth = joint.given.growth.iter();
-        row.extend(growth.map(|at| number::significant(at.rms, 3)));
-        row.push(number::percent(joint.given.relative));
-        row.push(joint.unit.to_owned());
-        table.row(row);
-    }
-    table
-}
-
-/// Two models beside each other.
-fn compared(found: &FreeRun) -> Table {
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("as given", Align::Decimal),
-        ("after", Align::Decimal),
-        ("95 % CI of the change", Align::Right),
-        ("unit", Align::Left),
-        ("change", Align::Left),
-    ])
-    .caption(&caption(found));
-    let rms = |error: &PositionError| number::significant(error.rms, 3);
-    let interval = |c: &PositionErrorChange| {
-        let [low, high] = c.interval_95.map(|x| number::significant(x, 2));
-        format!("{low}..{high}")
-    };
-    for joint in &found.joints {
-        let after = joint.after.as_ref().map(rms);
-        let change = joint.change.as_ref().map(interval);
-        table.row([
-            joint.joint.as_str(),
-            &rms(&joint.given),
-            after.as_deref().unwrap_or(number::ABSENT),
-            change.as_deref().unwrap_or(number::ABSENT),
-            joint.unit,
-            joint.change.as_ref().map_or("", direction),
-        ]);
-    }
-    table
 }
 
 /// Which way a change goes, where its interval leaves out 0.

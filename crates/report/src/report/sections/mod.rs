@@ -1,25 +1,12 @@
-//! What several reports say alike, section by section.
+//! Sections that several reports share.
 
-pub mod effects;
-pub mod fit;
-pub mod free_run;
-pub mod friction;
-pub mod parameters;
+pub(crate) mod effects;
+pub(crate) mod fit;
+pub(crate) mod free_run;
+pub(crate) mod friction;
+pub(crate) mod parameters;
 pub mod provenance;
 pub mod quality;
 pub mod residual;
-pub mod sketch;
-pub mod torque;
-
-/// The first few of many names.
-fn first_of(names: &[String]) -> String {
-    const MAX_NAMES: usize = 3;
-    match names.len() > MAX_NAMES {
-        true => format!(
-            "{} and {} more",
-            names[..MAX_NAMES].join(", "),
-            names.len() - MAX_NAMES
-        ),
-        false => names.join(", "),
-    }
-}
+pub(crate) mod sketch;
+pub(crate) mod torque;

@@ -1,11 +1,19 @@
-//! Parameters with their standard deviations and what the data say of them.
+//! Parameters with their standard deviations and verdicts.
 
-use super::first_of;
 use crate::report::Writer;
+use crate::report::table::{Align, Columns, Table};
+use crate::report::words::first_of;
 use cft_ident_core::number;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
+
+/// The true value of a parameter, where it is known.
+type Truth<'a> = &'a dyn Fn(&Parameter) -> Option<f64>;
+
+fn is_open(p: &Parameter) -> bool {
+    p.verdict == Some(Verdict::NotIdentifiable)
+}
 
 /// How many parameters have which verdict, in words, and whether all are identified or negligible.
 pub fn tally(model: &ModelFile) -> (String, bool) {
@@ -22,20 +30,15 @@ pub fn tally(model: &ModelFile) -> (String, bool) {
         (Verdict::LowerBound, "known to one side only"),
         (Verdict::NotIdentifiable, "not determined by these data"),
     ];
-    for (verdict, word) in others {
-        match count(verdict) {
-            0 => {}
-            n => words.push(format!("{n} {word}")),
-        }
-    }
-    let known = |p: &&Parameter| p.verdict != Some(Verdict::NotIdentifiable);
-    let negative: Vec<String> = (rated().filter(known))
-        .filter(|p| p.is_below_zero())
-        .map(|p| match &p.joint {
-            Some(joint) => format!("{} of {joint}", p.name),
-            None => p.name.clone(),
-        })
-        .collect();
+    let others = others.map(|(verdict, word)| (count(verdict), word));
+    let there = others.iter().filter(|(count, _)| *count > 0);
+    words.extend(there.map(|(count, word)| format!("{count} {word}")));
+    let negative = rated().filter(|p| !is_open(p) && p.is_below_zero());
+    let negative = negative.map(|p| match &p.joint {
+        Some(joint) => format!("{} of {joint}", p.name),
+        None => p.name.clone(),
+    });
+    let negative: Vec<String> = negative.collect();
     if !negative.is_empty() {
         words[0] += &format!(
             " ({} of the known negative, which no machine has: {})",
@@ -50,73 +53,84 @@ pub fn tally(model: &ModelFile) -> (String, bool) {
     (words.join(", "), good)
 }
 
-/// The section; `truth` gives the true value of a parameter where it is known.
-pub fn section(page: &mut Writer, model: &ModelFile, truth: &dyn Fn(&Parameter) -> Option<f64>) {
+/// How many standard deviations a value is off its truth, where both are known.
+fn off(value: f64, truth: Option<f64>, std: f64) -> Option<String> {
+    let off = (value - truth?) / std;
+    off.is_finite().then(|| format!("{off:+.1}"))
+}
+
+fn joint(p: &Parameter) -> &str {
+    p.joint.as_deref().unwrap_or("")
+}
+
+/// Every parameter for a terminal, beside its truth; columns without an entry are left out.
+pub fn beside_truth(all: &[Parameter], truth: Truth) -> Table {
+    let any = |has: &dyn Fn(&Parameter) -> bool| all.iter().any(has);
+    let known = |p: &Parameter, x: f64| if is_open(p) { f64::NAN } else { x };
+    let std = |p: &Parameter| known(p, p.std.unwrap_or(f64::NAN));
+    let theta = |p: &Parameter| p.theta.map_or(number::ABSENT.to_owned(), |t| t.to_string());
+    let true_value = |p: &Parameter| truth(p).unwrap_or(f64::NAN);
+    let off = |p: &Parameter| off(known(p, p.value), truth(p), std(p));
+    Columns::new("identified parameters", all)
+        .when(any(&|p| p.joint.is_some()), |t| t.words("joint", joint))
+        .words("parameter", |p| &p.name)
+        .when(any(&|p| p.theta.is_some()), |t| {
+            t.column(Align::Right, "theta", theta)
+        })
+        .estimates(["value", "std"], |p| (known(p, p.value), std(p)))
+        .when(any(&|p| truth(p).is_some()), |t| {
+            t.numbers("truth", |p| number::value_and_std(true_value(p), std(p)).0)
+                .numbers("off [std]", |p| off(p).unwrap_or(number::ABSENT.into()))
+        })
+        .words("unit", |p| &p.unit)
+        .words("verdict", |p| p.verdict_word())
+        .into()
+}
+
+/// The section of a page.
+pub fn section(page: &mut Writer, model: &ModelFile, truth: Truth) {
     page.heading("Parameters");
-    let truths = model.parameters.iter().any(|p| truth(p).is_some());
+    let all = &model.parameters;
+    let std = |p: &Parameter| p.std.unwrap_or(f64::NAN);
+    let below_zero = |p: &Parameter| p.is_below_zero() && !is_open(p);
     // theta_1 needs no column that says 1
     let named = |p: &Parameter| {
         p.theta
             .is_none_or(|theta| p.name == format!("theta_{theta}"))
     };
-    let thetas = !model.parameters.iter().all(named);
-    let mut head = vec!["parameter", "joint"];
-    if thetas {
-        head.push("theta");
-    }
-    head.extend(["value", "std", "relative std"]);
-    if truths {
-        head.extend(["truth", "off by"]);
-    }
-    head.extend(["unit", "verdict", "meaning"]);
-    let rows: Vec<Vec<String>> = model
-        .parameters
-        .iter()
-        .map(|p| {
-            let unknown = p.verdict == Some(Verdict::NotIdentifiable);
-            let std = p.std.unwrap_or(f64::NAN);
-            let (value, deviation) = match unknown {
-                true => number::value_and_std(f64::NAN, f64::NAN),
-                false => number::value_and_std(p.value, std),
-            };
-            let relative = match unknown {
-                true => number::ABSENT.to_owned(),
-                false => number::percent(std / p.value.abs()),
-            };
-            let mut row = vec![p.name.clone(), p.joint.clone().unwrap_or_default()];
-            if thetas {
-                row.push(p.theta.map_or(String::new(), |theta| theta.to_string()));
-            }
-            row.extend([value, deviation, relative]);
-            if truths {
-                let truth = truth(p).unwrap_or(f64::NAN);
-                row.push(number::value_and_std(truth, std).0);
-                let off = (p.value - truth) / std;
-                row.push(match off.is_finite() {
-                    true => format!("{off:+.1} std"),
-                    false => number::ABSENT.to_owned(),
-                });
-            }
-            let verdict = match p.is_below_zero() && !unknown {
-                true => format!("{}, below zero", p.verdict_word()),
-                false => p.verdict_word().to_owned(),
-            };
-            row.extend([p.unit.clone(), verdict, p.meaning.clone()]);
-            row
+    let columns = Columns::new("value and standard deviation (std) in the unit named", all)
+        .words("parameter", |p| &p.name)
+        .words("joint", joint)
+        .when(!all.iter().all(named), |t| {
+            t.words("theta", |p| {
+                p.theta.map_or(String::new(), |theta| theta.to_string())
+            })
         })
-        .collect();
-    page.rows(
-        "value and standard deviation (std) in the unit named",
-        &head,
-        rows,
-    );
-    let known = |p: &&Parameter| p.verdict != Some(Verdict::NotIdentifiable);
-    if model
-        .parameters
-        .iter()
-        .filter(known)
-        .any(Parameter::is_below_zero)
-    {
+        .estimates(["value", "std"], |p| match is_open(p) {
+            true => (f64::NAN, f64::NAN),
+            false => (p.value, std(p)),
+        })
+        .words("relative std", |p| match is_open(p) {
+            true => number::ABSENT.to_owned(),
+            false => number::percent(std(p) / p.value.abs()),
+        })
+        .when(all.iter().any(|p| truth(p).is_some()), |t| {
+            t.words("truth", |p| {
+                number::value_and_std(truth(p).unwrap_or(f64::NAN), std(p)).0
+            })
+            .words("off by", |p| match off(p.value, truth(p), std(p)) {
+                Some(off) => off + " std",
+                None => number::ABSENT.to_owned(),
+            })
+        })
+        .words("unit", |p| &p.unit)
+        .words("verdict", |p| match below_zero(p) {
+            true => format!("{}, below zero", p.verdict_word()),
+            false => p.verdict_word().to_owned(),
+        })
+        .words("meaning", |p| &p.meaning);
+    page.table(columns);
+    if all.iter().any(below_zero) {
         page.paragraph(
             "Below zero: friction and inertia are positive in every machine. The cause may be a torque that \
              the model lacks, or a motion that does not separate these parameters from others. Torques are \
@@ -128,25 +142,42 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: &dyn Fn(&Parameter) 
 
 /// Effects that the model has beyond the declared structure.
 fn effects(page: &mut Writer, model: &ModelFile) {
-    let rows: Vec<Vec<String>> = model
-        .effects
-        .iter()
-        .flat_map(|effect| {
-            effect.parameters.iter().map(|(key, p)| {
-                let (value, std) = number::value_and_std(p.value, p.std.unwrap_or(f64::NAN));
-                vec![
-                    effect.name.clone(),
-                    effect.joint.clone().unwrap_or_default(),
-                    key.clone(),
-                    value,
-                    std,
-                    p.unit.clone(),
-                ]
-            })
+    let each = model.effects.iter();
+    let each = each.flat_map(|e| e.parameters.iter().map(move |(key, p)| (e, key, p)));
+    let columns = Columns::new("effects that were added to the declared model", each)
+        .words("effect", |(effect, ..)| &effect.name)
+        .words("joint", |(effect, ..)| {
+            effect.joint.as_deref().unwrap_or("")
         })
-        .collect();
-    if !rows.is_empty() {
-        let head = ["effect", "joint", "parameter", "value", "std", "unit"];
-        page.rows("effects that were added to the declared model", &head, rows);
+        .words("parameter", |(_, key, _)| key)
+        .estimates(["value", "std"], |(.., p)| (p.value, p.std))
+        .words("unit", |(.., p)| &p.unit);
+    page.table_if_any(columns);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_stand_beside_their_truth_in_80_columns() {
+        let viscous = "name = 'viscous'\njoint = 'q1'\ntheta = 13\nvalue = 52.4127\nstd = 0.31\nunit = 'N s/m'\n\
+            verdict = 'identified'";
+        let slope = "name = 'slope_1'\njoint = 'q1'\ntheta = 16\nvalue = 812.0\nunit = 's/m'\nverdict = 'lower-bound'";
+        let mut both = [viscous, slope].map(|text| toml::from_str::<Parameter>(text).unwrap());
+        let truth = |p: &Parameter| p.std.map(|_| 52.1);
+        let expected = "\
+identified parameters
+joint  parameter  theta   value   std  truth  off [std]  unit   verdict
+-----  ---------  -----  ------  ----  -----  ---------  -----  -----------
+q1     viscous       13   52.41  0.31  52.10       +1.0  N s/m  identified
+q1     slope_1       16  812.00     -      -          -  s/m    lower-bound
+";
+        assert_eq!(beside_truth(&both, &truth).to_string(), expected);
+        for p in &mut both {
+            (p.joint, p.theta) = (None, None);
+        }
+        let text = beside_truth(&both, &|_| None).to_string();
+        assert!(!text.contains("truth") && !text.contains("joint") && !text.contains("theta"));
     }
 }

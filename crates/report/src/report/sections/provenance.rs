@@ -1,6 +1,7 @@
 //! Where a page came from, so that the run can be repeated.
 
 use crate::report::Writer;
+use crate::report::table::Columns;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::number;
 use cft_ident_files::config::RobotFile;
@@ -8,49 +9,35 @@ use cft_ident_logs::log::{DataRole, Provenance, escape};
 
 /// Files by name, span and checksum.
 fn files(page: &mut Writer, caption: &str, inputs: &[Provenance]) {
-    let rows: Vec<Vec<String>> = inputs
-        .iter()
-        .map(|i| {
-            let log = i.samples > 0;
-            let only = |text: String| if log { text } else { String::new() };
-            vec![
-                escape(&i.name),
-                only(i.span.clone().unwrap_or_else(|| "whole".to_owned())),
-                only(i.samples.to_string()),
-                only(number::significant(i.duration_s, 5)),
-                only(i.role.map_or("", DataRole::word).to_owned()),
-                i.sha256.clone(),
-            ]
+    let of_log = |i: &Provenance, text: String| if i.samples > 0 { text } else { String::new() };
+    let span = |i: &Provenance| i.span.clone().unwrap_or_else(|| "whole".to_owned());
+    let columns = Columns::new(caption, inputs)
+        .words("file", |i| escape(&i.name))
+        .words("span", |i| of_log(i, span(i)))
+        .words("samples", |i| of_log(i, i.samples.to_string()))
+        .words("duration [s]", |i| {
+            of_log(i, number::significant(i.duration_s, 5))
         })
-        .collect();
-    if !rows.is_empty() {
-        let head = [
-            "file",
-            "span",
-            "samples",
-            "duration [s]",
-            "used as",
-            "SHA-256",
-        ];
-        page.rows(caption, &head, rows);
-    }
+        .words("used as", |i| {
+            of_log(i, i.role.map_or("", DataRole::word).to_owned())
+        })
+        .words("SHA-256", |i| &i.sha256);
+    page.table_if_any(columns);
 }
 
 /// Files that the run was given.
-pub fn inputs(page: &mut Writer, inputs: &[Provenance]) {
+pub(crate) fn inputs(page: &mut Writer, inputs: &[Provenance]) {
     files(page, "inputs of this run", inputs);
 }
 
 /// Version and command.
-pub fn called(page: &mut Writer, command: &str) {
-    page.paragraph(&format!(
-        "cft-ident {}, called as:",
-        env!("CARGO_PKG_VERSION")
-    ));
+pub(crate) fn called(page: &mut Writer, command: &str) {
+    let version = env!("CARGO_PKG_VERSION");
+    page.paragraph(&format!("cft-ident {version}, called as:"));
     page.code(command);
 }
 
-/// The section: inputs, what the model was made from, processing, command and configuration.
+/// The section: inputs, files that the model was made from, processing, command and configuration.
 pub fn section(
     page: &mut Writer,
     robot: &RobotFile,
@@ -63,17 +50,15 @@ pub fn section(
     self::inputs(page, inputs);
     files(page, "what the model was made from", model_inputs);
     if let Some(s) = summary {
+        let hertz = |f: f64| format!("{} Hz", number::significant(f, 4));
         page.paragraph(&format!(
-            "Parallel filter {} Hz, {}; position filter {}.",
-            number::significant(s.cutoff_hz, 4),
+            "Parallel filter {}, {}; position filter {}.",
+            hertz(s.cutoff_hz),
             match s.decimation {
                 1 => "every sample".to_owned(),
                 many => format!("one in {many} samples"),
             },
-            s.q_cutoff_hz.map_or("none".to_owned(), |f| format!(
-                "{} Hz",
-                number::significant(f, 4)
-            )),
+            s.q_cutoff_hz.map_or("none".to_owned(), hertz),
         ));
     }
     called(page, command);

@@ -1,14 +1,23 @@
-//! What the logs hold and what is wrong with them.
+//! The contents of the logs and their faults.
 
 use crate::report::Writer;
-use cft_ident_core::number;
+use crate::report::table::Columns;
 use cft_ident_logs::inspect::{Findings, Severity};
 use cft_ident_logs::log::escape;
 
 /// Faults that are reported; a log with more of them has one cause.
 const MAX_FAULTS: usize = 30;
 
-/// Cells of a fault's row that may differ where the fault is the same.
+/// Cells of a fault's row, and those that may differ where the fault is the same.
+const HEADS: [&str; 7] = [
+    "log",
+    "severity",
+    "fault",
+    "channel",
+    "when",
+    "what it is",
+    "remedy",
+];
 const CHANNEL: usize = 3;
 const SPAN: usize = 4;
 
@@ -35,7 +44,7 @@ pub struct Inspected {
 /// The section: every log once, and its faults, the worst first.
 pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
     page.heading("Data quality");
-    let (mut rows, mut faults) = (Vec::new(), Vec::<Vec<String>>::new());
+    let (mut inspected, mut faults) = (Vec::new(), Vec::<Vec<String>>::new());
     let mut hidden = 0;
     for log in logs {
         let name = escape(&log.name);
@@ -46,19 +55,7 @@ pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
                 continue;
             }
         };
-        let count = |severity| found.of(severity).count().to_string();
-        let absent = f64::NAN;
-        rows.push(vec![
-            name.clone(),
-            found.rows.to_string(),
-            number::significant(found.duration_s, 5),
-            number::significant(found.rate_hz.unwrap_or(absent), 5),
-            number::percent(found.jitter.unwrap_or(absent)),
-            found.gaps.len().to_string(),
-            count(Severity::Error),
-            count(Severity::Warning),
-            count(Severity::Info),
-        ]);
+        inspected.push((name.clone(), found));
         for fault in &found.faults {
             let row = vec![
                 name.clone(),
@@ -80,37 +77,26 @@ pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
             }
         }
     }
-    page.rows(
-        "logs",
-        &[
-            "log",
-            "rows",
-            "duration [s]",
-            "rate [Hz]",
-            "jitter",
-            "gaps",
-            "errors",
-            "warnings",
-            "notes",
-        ],
-        rows,
-    );
-    match faults.is_empty() {
-        true => page.paragraph("No fault was found in the logs."),
-        false => page.rows(
-            "faults, the worst of each log first",
-            &[
-                "log",
-                "severity",
-                "fault",
-                "channel",
-                "when",
-                "what it is",
-                "remedy",
-            ],
-            faults,
-        ),
+    let count = |found: &Findings, severity| found.of(severity).count().to_string();
+    let columns = Columns::new("logs", &inspected)
+        .words("log", |(name, _)| name)
+        .words("rows", |(_, of)| of.rows.to_string())
+        .digits("duration [s]", 5, |(_, of)| of.duration_s)
+        .digits("rate [Hz]", 5, |(_, of)| of.rate_hz)
+        .percent("jitter", |(_, of)| of.jitter)
+        .words("gaps", |(_, of)| of.gaps.len().to_string())
+        .words("errors", |(_, of)| count(of, Severity::Error))
+        .words("warnings", |(_, of)| count(of, Severity::Warning))
+        .words("notes", |(_, of)| count(of, Severity::Info));
+    page.table(columns);
+    if faults.is_empty() {
+        page.paragraph("No fault was found in the logs.");
     }
+    let mut columns = Columns::new("faults, the worst of each log first", &faults);
+    for (cell, name) in HEADS.into_iter().enumerate() {
+        columns = columns.words(name, |row| &row[cell]);
+    }
+    page.table_if_any(columns);
     if hidden > 0 {
         page.paragraph(&format!("`cft-ident inspect` lists {hidden} more."));
     }
@@ -126,12 +112,11 @@ mod tests {
 
     #[test]
     fn one_fault_on_several_channels_is_one_row() {
-        let row = |channel: &str, effect: &str| -> Vec<String> {
-            [
+        let row = |channel: &str, effect: &str| {
+            let cells = [
                 "a.csv", "info", "kind", channel, "0..1 s", effect, "mend it",
-            ]
-            .map(String::from)
-            .to_vec()
+            ];
+            cells.map(String::from)
         };
         let (mut first, second) = (row("q1", "noise"), row("q2", "noise"));
         assert!(alike(&first, &second) && !alike(&first, &row("q1", "gap")));

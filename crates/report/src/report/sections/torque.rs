@@ -2,8 +2,10 @@
 
 use std::borrow::Cow;
 
-use crate::report::figure::{JointTorque, TorqueFigure};
-use crate::report::{Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
+use crate::report::Writer;
+use crate::report::figure::{JointTorque, TorqueFigure, parted};
+use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
+use crate::report::words::torque_or_force;
 use cft_ident_core::number;
 use cft_ident_stages::identify::LoggedRobot;
 use cft_ident_stages::replay::{JointSeries, TorqueSeries};
@@ -54,26 +56,22 @@ fn trace(machine: &LoggedRobot, of: &TorqueSeries, models: &[Drawn], name: Strin
     let joints = machine.robot.joint_names().iter().zip(&of.joints);
     for (j, (joint, series)) in joints.enumerate() {
         let unit = machine.file.torque_unit(j).to_owned();
-        let mut lines = vec![TraceLine {
-            name: "measured".into(),
-            style: TraceStyle::Measured,
-            values: series.measured.clone(),
-        }];
+        let line = |name: &str, style, values| TraceLine {
+            name: name.to_owned(),
+            style,
+            values,
+        };
+        let measured = series.measured.clone();
+        let mut lines = vec![line("measured", TraceStyle::Measured, measured)];
         let mut differences = Vec::new();
         for (drawn, hat) in models.iter().zip(&series.reconstructed) {
-            lines.push(TraceLine {
-                name: drawn.names[0].to_string(),
-                style: drawn.styles[0],
-                values: hat.clone(),
-            });
-            let apart = series.measured.iter().zip(hat);
-            differences.push(TraceLine {
-                name: drawn.names[1].to_string(),
-                style: drawn.styles[1],
-                values: apart.map(|(a, b)| a - b).collect(),
-            });
+            let apart = series.measured.iter().zip(hat).map(|(a, b)| a - b);
+            let [(model, as_model), (left, as_left)] =
+                [0, 1].map(|k| (&drawn.names[k], drawn.styles[k]));
+            lines.push(line(model, as_model, hat.clone()));
+            differences.push(line(left, as_left, apart.collect()));
         }
-        let quantity = if unit == "N" { "force" } else { "torque" };
+        let quantity = torque_or_force(&unit);
         let panel = |small, name: &str, quantity: &str, lines| TracePanel {
             name: name.to_owned(),
             quantity: quantity.to_owned(),
@@ -95,17 +93,7 @@ fn trace(machine: &LoggedRobot, of: &TorqueSeries, models: &[Drawn], name: Strin
 
 /// The still picture of a log, by the last of its models.
 fn still(machine: &LoggedRobot, of: &TorqueSeries, title: &str) -> TorqueFigure {
-    let whole = |values: &[f64]| -> Vec<f64> {
-        let mut out = Vec::with_capacity(values.len() + of.breaks.len());
-        for (k, v) in values.iter().enumerate() {
-            if k > 0 && of.breaks.contains(&k) {
-                // a row that is not finite parts the lines at a gap
-                out.push(f64::NAN);
-            }
-            out.push(*v);
-        }
-        out
-    };
+    let whole = |values: &[f64]| parted(values.iter().copied(), &of.breaks);
     let joint = |(j, (name, series)): (usize, (&String, &JointSeries))| {
         Some(JointTorque {
             joint: name.clone(),
@@ -145,5 +133,5 @@ pub fn section(
         };
         still(machine, first, &title).by_joint()
     });
-    page.traces(&traces(machine, of, models), &figure);
+    page.traces(&traces(machine, of, models), figure);
 }

@@ -1,16 +1,16 @@
 //! The report of `compare`.
 
-use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, OverlayFigure, OverlayPanel};
+use crate::report::figure::{ErrorFigure, JointBars, OverlayFigure, OverlayPanel};
 use crate::report::sections::provenance;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::{self, Drawn};
-use crate::report::table::{Align, Table};
-use crate::report::{Report, TraceStyle, Writer, usual};
+use crate::report::table::{Align, Columns, Table};
+use crate::report::traces::TraceStyle;
+use crate::report::words::{listed, of_joint};
+use crate::report::{Report, Writer, usual};
 use cft_ident_core::number;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::compare::{
-    Apart, Difference, ParameterEstimate, ParameterPair, Reason, SideBySide,
-};
+use cft_ident_stages::compare::{Apart, Difference, ParameterPair, Reason, SideBySide};
 use cft_ident_stages::identify::{Compared, Curves, DIFFERENT, TriedOnLogs};
 use cft_ident_stages::replay::{ReplayedPair, is_beyond_curve, speeds};
 
@@ -23,44 +23,29 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
     let mut report = Report::new(&format!("Comparison of {title}"));
     let (names, letters) = (labels(of), LETTERS.map(str::to_owned));
     let legend = format!("A is {}, B is {}; ", names[0], names[1]);
-    let apart = || apart_tables(&of.table, &names);
-    let all = &of.table.parameters;
-    let table = |heads: &[String; 2], legend: &str| {
-        (!all.is_empty()).then(|| parameter_table(all.iter(), heads, legend))
-    };
-    let parameters = table(&letters, &legend);
-    report
-        .everywhere()
-        .verdict(&words(of), of.warnings.is_empty());
-    if let Some(table) = parameters
-        .clone()
-        .filter(|_| of.table.parameters.len() > MAX_PARAMETERS_ON_SCREEN)
-    {
-        report.detail().line("");
-        report.detail().table(table);
-        let differ = of.different();
+    let all: Vec<&ParameterPair> = of.table.parameters.iter().collect();
+    let parameters = parameter_table(&all, &letters, &legend);
+    let mut everywhere = report.everywhere();
+    everywhere.verdict(&words(of), of.warnings.is_empty());
+    if all.len() > MAX_PARAMETERS_ON_SCREEN {
+        report.detail().table_apart(parameters);
+        let mut differ = of.different();
         if !differ.is_empty() {
-            let table = parameter_table(
-                differ.into_iter().take(MAX_PARAMETERS_ON_SCREEN),
-                &letters,
-                &legend,
-            );
-            report.terminal().line("");
-            report.terminal().table(table);
+            differ.truncate(MAX_PARAMETERS_ON_SCREEN);
+            let table = parameter_table(&differ, &letters, &legend);
+            report.terminal().table_apart(table);
         }
-    } else if let Some(table) = parameters.clone() {
-        report.terminal().line("");
-        report.terminal().table(table);
+    } else if !all.is_empty() {
+        report.terminal().table_apart(parameters);
     }
-    for table in apart() {
-        report.detail().line("");
-        report.detail().table(table);
+    for table in apart_tables(&of.table, &names) {
+        report.detail().table_apart(table);
     }
     if let Some(tried) = &of.tried {
-        report.terminal().line("");
-        report.terminal().table(error_table(tried, logs, &letters));
+        let mut terminal = report.terminal();
+        terminal.table_apart(error_table(tried, logs, &letters));
         let mut page = report.page();
-        page.figure(&bars(of, tried, &names).svg());
+        page.figure(bars(of, tried, &names).svg());
         page.list(&of.warnings);
         page.table(error_table(tried, logs, &names));
         used_before(&mut page, of, &tried.in_memory.inputs);
@@ -69,13 +54,14 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
     }
     let mut page = report.page();
     page.heading("Parameters");
-    for table in table(&names, "").into_iter().chain(apart()) {
+    page.table_if_any(parameter_table(&all, &names, ""));
+    for table in apart_tables(&of.table, &names) {
         page.table(table);
     }
     report
 }
 
-/// What a page has room for besides; `read` are both model files and the logs, `replayed` is absent where
+/// Further parts of the page; `read` are both model files and the logs, `replayed` is absent where
 /// no log is given.
 pub fn pictures(
     page: &mut Writer,
@@ -87,7 +73,7 @@ pub fn pictures(
 ) {
     if !of.curves.is_empty() {
         page.heading("Friction");
-        page.figures(&figure(of, replayed).cells());
+        page.figures(figure(of, replayed).cells());
     }
     if let Some(replayed) = replayed {
         let [a, b] = labels(of);
@@ -101,9 +87,10 @@ pub fn pictures(
         quality::section(page, quality, &[]);
     }
     let summary = of.tried.as_ref().map(|tried| &tried.in_memory.summary);
-    let made_from = of.sides.iter();
-    let made_from = made_from.flat_map(|side| side.given.file.provenance.inputs.iter().cloned());
-    let mut made_from: Vec<Provenance> = made_from.collect();
+    let inputs = of.sides.each_ref();
+    let mut made_from = inputs
+        .map(|side| &*side.given.file.provenance.inputs)
+        .concat();
     made_from.dedup();
     provenance::section(page, &of.machine.file, read, &made_from, summary, command);
 }
@@ -172,7 +159,7 @@ fn words(of: &Compared) -> String {
         text += &format!(
             "; the most by {} of {}",
             number::significant(most.deviation.unwrap_or(f64::NAN).abs(), 3),
-            key(&most.name, most.joint.as_deref())
+            of_joint(&most.name, most.joint.as_deref())
         );
     }
     text.push('.');
@@ -182,34 +169,28 @@ fn words(of: &Compared) -> String {
 /// Which model is closer on the logs, in a sentence.
 fn closer(tried: &TriedOnLogs, names: &[String; 2]) -> String {
     let error = |k: usize| number::percent(tried.validations[k].errors.overall.mean_relative_error);
-    let both = |first: usize| {
-        let second = 1 - first;
-        format!(
-            "{} misses {} of the torque (rms over the joints), {} {}",
-            names[first],
-            error(first),
-            names[second],
-            error(second)
-        )
+    let sign = tried.differences.overall.sign();
+    let [first, second] = if sign == -1 { [1, 0] } else { [0, 1] };
+    let closer = match sign {
+        0 => "These logs do not show which model is closer".to_owned(),
+        _ => format!("{} is closer on these logs", names[first]),
     };
-    match tried.differences.overall.sign() {
-        -1 => format!("{} is closer on these logs: {}.", names[1], both(1)),
-        1 => format!("{} is closer on these logs: {}.", names[0], both(0)),
-        _ => format!("These logs do not show which model is closer: {}.", both(0)),
-    }
+    format!(
+        "{closer}: {} misses {} of the torque (rms over the joints), {} {}.",
+        names[first],
+        error(first),
+        names[second],
+        error(second)
+    )
 }
 
 /// Errors of both joint by joint as bars.
 fn bars(of: &Compared, tried: &TriedOnLogs, names: &[String; 2]) -> ErrorFigure {
     let [a, b] = tried.validations.each_ref().map(|v| &v.errors.joints);
-    let bar = |error: f64| ErrorBar {
-        error,
-        interval_95: None,
-    };
     let joints = a.iter().zip(b).map(|(a, b)| JointBars {
         joint: a.joint.clone(),
-        before: Some(bar(a.relative_error)),
-        after: bar(b.relative_error),
+        before: Some(a.relative_error.into()),
+        after: b.relative_error.into(),
     });
     ErrorFigure {
         title: "Relative torque error on these logs".to_owned(),
@@ -231,167 +212,115 @@ fn labels(of: &Compared) -> [String; 2] {
 
 pub(super) const LETTERS: [&str; 2] = ["A", "B"];
 
-pub(super) fn key(name: &str, joint: Option<&str>) -> String {
-    match joint {
-        Some(joint) => format!("{} of {}", escape(name), escape(joint)),
-        None => escape(name),
-    }
-}
-
 /// Parameters that both have under the `heads` of both, which `legend` explains.
-pub(super) fn parameter_table<'a>(
-    parameters: impl Iterator<Item = &'a ParameterPair> + Clone,
+pub(super) fn parameter_table(
+    parameters: &[&ParameterPair],
     [a, b]: &[String; 2],
     legend: &str,
 ) -> Table {
     let difference = format!("{b} - {a}");
-    let joints = parameters.clone().any(|p| p.joint.is_some());
-    let mut columns = vec![("parameter", Align::Left)];
-    if joints {
-        columns.insert(0, ("joint", Align::Left));
-    }
-    columns.extend([
-        (a.as_str(), Align::Decimal),
-        ("std", Align::Decimal),
-        (b.as_str(), Align::Decimal),
-        ("std", Align::Decimal),
-        (difference.as_str(), Align::Decimal),
-        ("unit", Align::Left),
-    ]);
-    let mut table = Table::new(&columns).caption(&format!(
-        "parameters: {legend}{difference} in standard deviations of the difference"
-    ));
-    for p in parameters {
-        let cells = |e: &ParameterEstimate| {
-            let (value, std) = number::value_and_std(e.value, e.std.unwrap_or(f64::NAN));
-            [value, std]
-        };
-        let mut row = vec![p.name.clone()];
-        if joints {
-            row.insert(0, p.joint.clone().unwrap_or_default());
-        }
-        row.extend(cells(&p.a));
-        row.extend(cells(&p.b));
-        row.push(match p.deviation {
+    let caption =
+        format!("parameters: {legend}{difference} in standard deviations of the difference");
+    let joints = parameters.iter().any(|p| p.joint.is_some());
+    Columns::new(&caption, parameters)
+        .when(joints, |t| {
+            t.words("joint", |p| p.joint.as_deref().unwrap_or(""))
+        })
+        .words("parameter", |p| &p.name)
+        .estimates([a, "std"], |p| (p.a.value, p.a.std))
+        .estimates([b, "std"], |p| (p.b.value, p.b.std))
+        .numbers(&difference, |p| match p.deviation {
             Some(d) if d.abs() < 1000.0 => format!("{d:+.1}"),
             Some(d) => format!("{d:+.1e}"),
             None => number::ABSENT.into(),
-        });
-        row.push(p.unit.clone());
-        table.row(row);
-    }
-    table
+        })
+        .words("unit", |p| &p.unit)
+        .into()
 }
 
 /// Parameters that one side has alone, a table of each side that has some.
 pub(super) fn apart_tables(of: &SideBySide, names: &[String; 2]) -> impl Iterator<Item = Table> {
-    let only = [&of.only_in_a, &of.only_in_b];
-    let sides = names.iter().zip(only);
-    let tables = sides.filter_map(|(name, only)| apart_table(only, name));
-    tables.collect::<Vec<_>>().into_iter()
+    let sides = names.iter().zip([&of.only_in_a, &of.only_in_b]);
+    let sides = sides.filter(|(_, only)| !only.is_empty());
+    sides.map(|(name, only)| apart_table(only, name))
 }
 
-fn apart_table(only: &[Apart], name: &str) -> Option<Table> {
-    if only.is_empty() {
-        return None;
-    }
-    let caption = format!("only in {name}");
-    let mut columns = vec![
-        ("joint", Align::Left),
-        ("parameter", Align::Left),
-        ("value", Align::Decimal),
-        ("std", Align::Decimal),
-        ("unit", Align::Left),
-    ];
+fn apart_table(only: &[Apart], name: &str) -> Table {
     let reasons = only.iter().any(|p| p.reason != Reason::Absent);
-    if reasons {
-        columns.push(("in the other", Align::Left));
-    }
-    let mut table = Table::new(&columns).caption(&caption);
-    for p in only {
-        let (value, std) = number::value_and_std(p.value, p.std.unwrap_or(f64::NAN));
-        let reason = match p.reason {
-            Reason::Absent => "absent",
-            Reason::OtherUnit => "in another unit",
-            Reason::OtherMeaning => "of another meaning",
-        };
-        let joint = p.joint.as_deref().unwrap_or("");
-        // a table takes as many cells as it has columns
-        table.row([joint, &p.name, &value, &std, &p.unit, reason]);
-    }
-    Some(table)
+    Columns::new(&format!("only in {name}"), only)
+        .words("joint", |p| p.joint.as_deref().unwrap_or(""))
+        .words("parameter", |p| &p.name)
+        .estimates(["value", "std"], |p| (p.value, p.std))
+        .words("unit", |p| &p.unit)
+        .when(reasons, |t| {
+            t.words("in the other", |p| match p.reason {
+                Reason::Absent => "absent",
+                Reason::OtherUnit => "in another unit",
+                Reason::OtherMeaning => "of another meaning",
+            })
+        })
+        .into()
+}
+
+/// Errors of a joint, or of all, by both models.
+struct BothErrors<'a> {
+    joint: &'a str,
+    relative: [f64; 2],
+    difference: &'a Difference,
+    rms: [String; 2],
+    unit: &'static str,
 }
 
 /// Errors of both on the same logs, under the heads of both.
 fn error_table(tried: &TriedOnLogs, logs: &str, [head_a, head_b]: &[String; 2]) -> Table {
-    let difference = format!("{head_b} - {head_a}");
-    let rms = [head_a, head_b].map(|head| format!("rms {head}"));
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        (head_a, Align::Decimal),
-        (head_b, Align::Decimal),
-        (&difference, Align::Decimal),
-        ("95 % CI", Align::Right),
-        (&rms[0], Align::Decimal),
-        (&rms[1], Align::Decimal),
-        ("unit", Align::Left),
-        ("closer", Align::Left),
-    ])
-    .caption(&format!("relative torque error of {logs} [%], and its rms"));
-    let hundred = number::hundredths;
-    let cells = |a: f64, b: f64, d: &Difference| {
-        let interval = d
-            .interval_95
-            .map_or(number::ABSENT.to_owned(), |[low, high]| {
-                format!("{}..{}", hundred(low), hundred(high))
-            });
-        [hundred(a), hundred(b), hundred(d.difference), interval]
-    };
-    let closer = |d: &Difference| match d.sign() {
-        -1 => head_b.as_str(),
-        1 => head_a.as_str(),
-        _ => number::ABSENT,
-    };
     let [a, b] = tried.validations.each_ref().map(|v| &v.errors);
-    let described = a
+    let joints = a
         .joints
         .iter()
         .zip(&b.joints)
         .zip(&tried.differences.joints);
-    for ((a, b), d) in described {
-        let [ours, theirs, difference, interval] = cells(a.relative_error, b.relative_error, d);
-        let rms = [a.rmse, b.rmse].map(|e| number::significant(e, 3));
-        let unit = a.unit;
-        let row = [
-            &a.joint,
-            &ours,
-            &theirs,
-            &difference,
-            &interval,
-            &rms[0],
-            &rms[1],
-            unit,
-            closer(d),
-        ];
-        table.row(row);
-    }
-    if a.joints.len() > 1 {
-        let d = &tried.differences.overall;
-        let [a, b] = [a, b].map(|v| v.overall.mean_relative_error);
-        let [ours, theirs, difference, interval] = cells(a, b, d);
-        table.row([
-            "all",
-            &ours,
-            &theirs,
-            &difference,
-            &interval,
-            "",
-            "",
-            "",
-            closer(d),
-        ]);
-    }
-    table
+    let joints = joints.map(|((a, b), difference)| BothErrors {
+        joint: &a.joint,
+        relative: [a.relative_error, b.relative_error],
+        difference,
+        rms: [a.rmse, b.rmse].map(|e| number::significant(e, 3)),
+        unit: a.unit,
+    });
+    let overall = BothErrors {
+        joint: "all",
+        relative: [a, b].map(|errors| errors.overall.mean_relative_error),
+        difference: &tried.differences.overall,
+        rms: [String::new(), String::new()],
+        unit: "",
+    };
+    let overall = Some(overall).filter(|_| a.joints.len() > 1);
+    let rows: Vec<BothErrors> = joints.chain(overall).collect();
+    let hundred = number::hundredths;
+    Columns::new(
+        &format!("relative torque error of {logs} [%], and its rms"),
+        &rows,
+    )
+    .words("joint", |of| of.joint)
+    .numbers(head_a, |of| hundred(of.relative[0]))
+    .numbers(head_b, |of| hundred(of.relative[1]))
+    .numbers(&format!("{head_b} - {head_a}"), |of| {
+        hundred(of.difference.difference)
+    })
+    .column(Align::Right, "95 % CI", |of| {
+        match of.difference.interval_95 {
+            Some([low, high]) => format!("{}..{}", hundred(low), hundred(high)),
+            None => number::ABSENT.to_owned(),
+        }
+    })
+    .numbers(&format!("rms {head_a}"), |of| &of.rms[0])
+    .numbers(&format!("rms {head_b}"), |of| &of.rms[1])
+    .words("unit", |of| of.unit)
+    .words("closer", |of| match of.difference.sign() {
+        -1 => head_b,
+        1 => head_a,
+        _ => number::ABSENT,
+    })
+    .into()
 }
 
 /// A log that one of the models was made from favours that model.
@@ -402,19 +331,10 @@ fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
             let mut made = made_from.iter().filter(|m| m.made());
             made.any(|m| m.shares_rows(i))
         };
-        let names: Vec<String> = inputs
-            .iter()
-            .filter(known)
-            .map(|i| escape(&i.name))
-            .collect();
+        let names = listed(inputs.iter().filter(known).map(|i| escape(&i.name)));
         if !names.is_empty() {
-            page.verdict(
-                &format!(
-                    "{} was used to make {name}: it favours {name}.",
-                    names.join(", ")
-                ),
-                false,
-            );
+            let text = format!("{names} was used to make {name}: it favours {name}.");
+            page.verdict(&text, false);
         }
     }
 }

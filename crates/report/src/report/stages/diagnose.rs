@@ -1,7 +1,6 @@
 //! The report of `diagnose`.
 
-use super::diagnose_words::errors as errors_of;
-pub use super::diagnose_words::words;
+use super::diagnose_words::{errors as errors_of, words};
 use super::step_words::{agreement, alternatives, grade, in_words, worsened};
 use super::{first_screen, formulas, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
@@ -9,8 +8,10 @@ use crate::report::sections::torque::Drawn;
 use crate::report::sections::{
     fit, free_run, friction, parameters, provenance, residual, sketch, torque,
 };
-use crate::report::table::{Align, Table};
-use crate::report::{Report, TraceStyle, Writer, summary};
+use crate::report::table::{Align, Columns, Table};
+use crate::report::traces::TraceStyle;
+use crate::report::words::listed;
+use crate::report::{Report, Writer, summary};
 use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, LeftCandidate, SplitErrors};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
@@ -22,10 +23,10 @@ use cft_ident_stages::replay::ReplayedDiagnosis;
 const MAX_CANDIDATES: usize = 20;
 /// Changes of friction that a screen has room for.
 const MAX_CHANGES_ON_SCREEN: usize = 2;
-/// Margin of what a terminal says of an effect.
+/// Margin of the lines on an effect on a terminal.
 const MARGIN: &str = "     ";
 
-/// What the report is made from.
+/// The parts of the report.
 pub struct Diagnose<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
@@ -39,7 +40,7 @@ pub struct Diagnose<'a> {
     pub logs: &'a str,
 }
 
-/// The effects, their numbers, what is left, and the errors before and after.
+/// The effects, their numbers, the residual that is left, and the errors before and after.
 pub fn diagnose(of: &Diagnose) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
     let (text, good) = words(of.machine, of.found);
@@ -54,7 +55,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
     report
 }
 
-/// What a page has room for besides.
+/// Further parts of the page.
 pub fn pictures(
     page: &mut Writer,
     of: &Diagnose,
@@ -79,26 +80,22 @@ pub fn pictures(
 /// Where the data are at fault, which comes before any physics.
 pub fn data_fault(fault: &DataFault, given: &Provenance) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&given.name)));
-    fault_told(&mut report.terminal(), fault);
+    let mut terminal = report.terminal();
+    terminal.line(&at_fault(fault));
+    terminal.line(&format!("  {}", fault.remedy));
     let mut page = report.page();
     page.verdict(&at_fault(fault), false);
     page.paragraph(&format!("What to do: {}.", fault.remedy));
     report
 }
 
-/// A fault of the data for a terminal.
-pub(crate) fn fault_told(terminal: &mut Writer, fault: &DataFault) {
-    terminal.line(&at_fault(fault));
-    terminal.line(&format!("  {}", fault.remedy));
-}
-
-/// The same in a sentence.
+/// A fault of the data in a sentence.
 pub fn at_fault(fault: &DataFault) -> String {
     format!("The data are at fault ({}): {}.", fault.kind, fault.effect)
 }
 
-/// The errors and what to do next for a terminal; the effects one by one where it shows everything.
-pub fn diagnosed(
+/// The errors and the next step for a terminal; the effects one by one where it shows everything.
+pub(super) fn diagnosed(
     report: &mut Report,
     (machine, found): (&LoggedRobot, &Diagnosed),
     (file, path, logs): (&ModelFile, &str, &str),
@@ -112,20 +109,14 @@ pub fn diagnosed(
         detail.line("");
     }
     for (i, step) in d.steps.iter().enumerate() {
-        step_told(&mut detail, machine, (i + 1, step));
+        numbered(&mut detail, machine, (i + 1, step));
     }
     free_run::section(&mut detail, found.free_run.as_ref());
     detail.list(doubts(machine, found));
-    report.terminal().list(
-        changes(machine, found)
-            .into_iter()
-            .take(MAX_CHANGES_ON_SCREEN),
-    );
-    report.detail().list(
-        changes(machine, found)
-            .into_iter()
-            .skip(MAX_CHANGES_ON_SCREEN),
-    );
+    let changes = changes(machine, found);
+    let (on_screen, more) = changes.split_at(changes.len().min(MAX_CHANGES_ON_SCREEN));
+    report.terminal().list(on_screen);
+    report.detail().list(more);
     formulas::in_short(&mut report.usual(), machine, found);
     formulas::write(&mut report.detail(), machine, found);
     formulas::candidates(&mut report.detail(), machine, found);
@@ -141,30 +132,22 @@ fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
     let (_, before) = errors_of(&d.before);
     let (data, after) = errors_of(d.errors_now());
     let changed = d.written().next().is_some();
-    let mut columns = vec![
-        ("joint", Align::Left),
-        ("now", Align::Decimal),
-        ("95 % CI", Align::Right),
-    ];
-    if changed {
-        columns.insert(1, ("as given", Align::Decimal));
-    } else {
-        columns[1].0 = "error";
-    }
-    let mut table =
-        Table::new(&columns).caption(&format!("relative torque error [%] of each joint, {data}"));
+    let hundred = number::hundredths;
     let relative: Vec<f64> = after.joints.iter().map(|e| e.relative_error).collect();
     let (joints, more) = summary::most_wrong(&relative);
-    for j in joints {
-        let [low, high] = after.joints[j].interval_95.map(number::hundredths);
-        let mut row = vec![machine.robot.joint_names()[j].clone()];
-        if changed {
-            row.push(number::hundredths(before.joints[j].relative_error));
-        }
-        row.extend([number::hundredths(relative[j]), format!("{low}..{high}")]);
-        table.row(row);
-    }
-    usual.table(table);
+    let caption = format!("relative torque error [%] of each joint, {data}");
+    let columns = Columns::new(&caption, joints)
+        .words("joint", |j| &machine.robot.joint_names()[j])
+        .when(changed, |t| {
+            t.numbers("as given", |j| hundred(before.joints[j].relative_error))
+        })
+        .numbers(if changed { "now" } else { "error" }, |j| {
+            hundred(relative[j])
+        })
+        .column(Align::Right, "95 % CI", |j| {
+            after.joints[j].interval_95.map(hundred).join("..")
+        });
+    usual.table(columns);
     if let Some(more) = more {
         usual.line(&more);
     }
@@ -189,7 +172,7 @@ fn changes(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
 }
 
 /// One effect that was found, for a terminal.
-fn step_told(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usize, &FoundEffect)) {
+fn numbered(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usize, &FoundEffect)) {
     let effect = &step.estimate;
     let name = format!(
         "{} ({}): {}",
@@ -198,83 +181,62 @@ fn step_told(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usiz
         in_words(machine, step)
     );
     terminal.note(&format!("{number:>3}. "), &name, 7);
-    let shown = format!("{}: {}", grade(step), agreement(step));
-    terminal.note(MARGIN, &shown, 7);
-    let shown = format!(
+    let gain = format!(
         "takes {} off the squared error of blocks left out ({} standard errors)",
         number::percent(step.share),
         number::significant(step.gain.value / step.gain.se.max(f64::MIN_POSITIVE), 2)
     );
-    terminal.note(MARGIN, &shown, 7);
-    if let Some([before, after]) = step.holdout {
-        let shown = format!(
-            "held-out data, the others kept and refitted: {} without it, {} with it{}",
-            number::percent(before),
-            number::percent(after),
-            worsened(step)
-        );
-        terminal.note(MARGIN, &shown, 7);
-    }
-    if let Some(shown) = alternatives(machine, step) {
-        terminal.note(MARGIN, &shown, 7);
+    let unseen = step.holdout.map(|errors| {
+        let [before, after] = errors.map(number::percent);
+        let worse = worsened(step);
+        format!("held-out data, the others kept and refitted: {before} without it, {after} with it{worse}")
+    });
+    let lines = [format!("{}: {}", grade(step), agreement(step)), gain];
+    let more = unseen.into_iter().chain(alternatives(machine, step));
+    for line in lines.into_iter().chain(more) {
+        terminal.note(MARGIN, &line, 7);
     }
 }
 
 /// Relative errors joint by joint.
 fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("fitted", Align::Decimal),
-        ("after", Align::Decimal),
-        ("held-out", Align::Decimal),
-        ("after", Align::Decimal),
-        ("95 % CI", Align::Right),
-        ("above noise", Align::Decimal),
-    ])
-    .caption(
-        "relative torque error [%] on fitted and held-out data, as given and after; above noise: residual power beyond \
-         the noise, over the torque's [%]",
-    );
+    let caption = "relative torque error [%] on fitted and held-out data, as given and after; above noise: residual power beyond \
+         the noise, over the torque's [%]";
     let hundred = number::hundredths;
-    let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
-    let now = d.errors_now();
-    for (j, joint) in machine.robot.joint_names().iter().enumerate() {
-        let of = |errors: &Errors| errors.joints[j].relative_error;
-        let unseen = |p: &SplitErrors| p.holdout.as_ref().map(of);
-        let interval = now.holdout.as_ref().map(|e| {
-            let [low, high] = e.joints[j].interval_95;
-            format!("{}..{}", hundred(low), hundred(high))
-        });
-        table.row([
-            joint.as_str(),
-            &hundred(of(&d.before.train)),
-            &hundred(of(&now.train)),
-            &known(unseen(&d.before)),
-            &known(unseen(now)),
-            interval.as_deref().unwrap_or(number::ABSENT),
-            &hundred(d.left.unexplained[j].share),
-        ]);
-    }
-    table
+    let fitted = |errors: &SplitErrors, j: usize| hundred(errors.train.joints[j].relative_error);
+    let unseen = |errors: &SplitErrors, j: usize| match &errors.holdout {
+        Some(errors) => hundred(errors.joints[j].relative_error),
+        None => number::ABSENT.to_owned(),
+    };
+    let (names, now) = (machine.robot.joint_names(), d.errors_now());
+    Columns::new(caption, 0..names.len())
+        .words("joint", |j| &names[j])
+        .numbers("fitted", |j| fitted(&d.before, j))
+        .numbers("after", |j| fitted(now, j))
+        .numbers("held-out", |j| unseen(&d.before, j))
+        .numbers("after", |j| unseen(now, j))
+        .column(Align::Right, "95 % CI", |j| match &now.holdout {
+            Some(errors) => errors.joints[j].interval_95.map(hundred).join(".."),
+            None => number::ABSENT.to_owned(),
+        })
+        .numbers("above noise", |j| hundred(d.left.unexplained[j].share))
+        .into()
 }
 
-/// Why what was found is an approximation; nothing where only noise is left.
+/// Why the effects found are an approximation; nothing where only noise is left.
 fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
-    let robot = &machine.robot;
-    let open: Vec<String> = d
-        .structured_joints()
-        .map(|j| match d.left.unexplained[j].over_floor {
-            Some(over) => {
-                let times = match over < 100.0 {
-                    true => number::significant(over, 2),
-                    false => "more than 100".to_owned(),
-                };
-                format!("{} ({times} times the noise)", robot.joint_names()[j])
+    let open = d.structured_joints().map(|j| {
+        let times = match d.left.unexplained[j].over_floor {
+            Some(over) if over < 100.0 => {
+                format!(" ({} times the noise)", number::significant(over, 2))
             }
-            None => robot.joint_names()[j].clone(),
-        })
-        .collect();
+            Some(_) => " (more than 100 times the noise)".to_owned(),
+            None => String::new(),
+        };
+        format!("{}{times}", machine.robot.joint_names()[j])
+    });
+    let open = listed(open);
     let mut out = Vec::new();
     if let Some(share) = explained(d).filter(|_| d.written().next().is_some()) {
         out.push(format!(
@@ -284,9 +246,8 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     }
     if !open.is_empty() && d.written().next().is_some() {
         out.push(format!(
-            "the residual of {} is not noise yet: treat the effects found as approximations, for the cause may be \
-             one that no known effect describes",
-            open.join(", ")
+            "the residual of {open} is not noise yet: treat the effects found as approximations, for the cause may be \
+             one that no known effect describes"
         ));
     }
     out.extend(what_is_left::sentences(machine, found));
@@ -300,36 +261,33 @@ fn explained(d: &Diagnosis) -> Option<f64> {
     let (left, all) = known.fold((0.0, 0.0), |(left, all), (u, part)| {
         (left + u.share, all + u.share / part)
     });
-    (all > 0.0)
-        .then(|| 1.0 - left / all)
-        .filter(|share| *share > 0.0)
+    let share = (all > 0.0).then(|| 1.0 - left / all);
+    share.filter(|share| *share > 0.0)
 }
 
-/// What was added, the torque and the residual before and after, and what was not added.
-pub fn sections(
+/// The effects that were added, the torque and the residual before and after, and the effects that were not added.
+pub(super) fn sections(
     page: &mut Writer,
     machine: &LoggedRobot,
     found: &Diagnosed,
     replayed: &ReplayedDiagnosis,
 ) {
     let d = &found.diagnosis;
-    let (_, errors) = errors_of(d.errors_now());
-    let errors: Vec<f64> = errors.joints.iter().map(|e| e.relative_error).collect();
     if !d.steps.is_empty() {
         page.heading("What the model lacks");
     }
     page.list(doubts(machine, found));
     found_effects::show(page, machine, found, replayed);
     page.list(changes(machine, found));
-    sketch::section(page, machine, replayed.poses.as_ref(), &errors);
-    let after = Drawn {
-        names: ["after", "residual after"].map(Into::into),
-        styles: [TraceStyle::Model, TraceStyle::After],
+    let errors = errors_of(d.errors_now()).1.joints.iter();
+    let errors = errors.map(|e| e.relative_error);
+    sketch::section(page, machine, replayed.poses.as_ref(), errors);
+    let drawn = |name: &'static str, styles| Drawn {
+        names: [name.into(), format!("residual {name}").into()],
+        styles,
     };
-    let before = Drawn {
-        names: ["as given", "residual as given"].map(Into::into),
-        styles: [TraceStyle::Before, TraceStyle::Before],
-    };
+    let before = drawn("as given", [TraceStyle::Before, TraceStyle::Before]);
+    let after = drawn("after", [TraceStyle::Model, TraceStyle::After]);
     let models = match d.written().next() {
         None => vec![torque::ONLY],
         Some(_) => vec![before, after],
@@ -337,7 +295,7 @@ pub fn sections(
     let title = replayed.logs.join(", ");
     torque::section(page, machine, &replayed.torque, &models, &title);
     what_is_left::section(page, machine, found);
-    residual::section(page, &residual::figure(machine, &replayed.residual));
+    residual::section(page, machine, &replayed.residual);
     candidates(page, machine, found);
 }
 
@@ -345,64 +303,59 @@ fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let all = found.diagnosis.candidates.iter();
     let mut rest: Vec<(&LeftCandidate, f64)> = all.filter_map(|c| Some((c, c.score?))).collect();
     rest.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let row = |(c, score): &(&LeftCandidate, f64)| {
-        let effect = c.effect.as_ref();
-        vec![
-            effect.map_or(c.law.entry.name.to_owned(), |e| e.title(&machine.robot)),
-            effect
-                .map_or(c.law.entry.family(), |e| e.family())
-                .name()
-                .to_owned(),
-            number::percent(*score),
-            c.reason.clone(),
-        ]
-    };
-    let rows: Vec<Vec<String>> = rest.iter().take(MAX_CANDIDATES).map(row).collect();
-    if rows.is_empty() {
+    rest.truncate(MAX_CANDIDATES);
+    if rest.is_empty() {
         return;
     }
     page.heading("Candidates that were not chosen");
-    page.rows(
-        "the best of them beside those that were",
-        &["effect", "family", "gain on blocks left out", "why not"],
-        rows,
-    );
+    let name = |c: &LeftCandidate| match &c.effect {
+        Some(effect) => effect.title(&machine.robot),
+        None => c.law.entry.name.to_owned(),
+    };
+    let family = |c: &LeftCandidate| match &c.effect {
+        Some(effect) => effect.family().name(),
+        None => c.law.entry.family().name(),
+    };
+    let columns = Columns::new("the best of them beside those that were", &rest)
+        .words("effect", |(c, _)| name(c))
+        .words("family", |(c, _)| family(c))
+        .percent("gain on blocks left out", |(_, score)| *score)
+        .words("why not", |(c, _)| &c.reason);
+    page.table(columns);
 }
 
-/// Errors of every joint, on the logs that were fitted and on those that were not: before and after where the model that
-/// is written is another one.
-pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+/// Errors of every joint on fitted and held-out logs; before and after where another model is written.
+pub(super) fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
     let now = d.errors_now();
     let sides: Vec<(&str, &SplitErrors)> = match d.written().next() {
         Some(_) => vec![(", as given", &d.before), (", after", now)],
         None => vec![("", now)],
     };
-    let held_out = now.holdout.is_some();
-    let mut head = vec!["joint".to_owned()];
-    head.extend(sides.iter().map(|(side, _)| format!("fitted{side}")));
-    if held_out {
-        head.extend(sides.iter().map(|(side, _)| format!("held-out{side}")));
-        head.push("95 % CI".to_owned());
+    let names = machine.robot.joint_names();
+    let percent = |e: &Errors, j: usize| number::percent(e.joints[j].relative_error);
+    let mut columns =
+        Columns::new("relative torque error", 0..names.len()).words("joint", |j| &names[j]);
+    for (side, errors) in &sides {
+        columns = columns.words(&format!("fitted{side}"), |j| percent(&errors.train, j));
     }
-    head.push("rms".to_owned());
-    head.push("residual with a pattern, of torque power".to_owned());
-    let row = |(j, joint): (usize, &String)| {
-        let percent = |e: &Errors| number::percent(e.joints[j].relative_error);
-        let mut row = vec![joint.clone()];
-        row.extend(sides.iter().map(|(_, errors)| percent(&errors.train)));
-        let unseen = sides.iter().filter_map(|(_, e)| e.holdout.as_ref());
-        row.extend(unseen.map(percent));
-        if let Some(errors) = &now.holdout {
-            let [low, high] = errors.joints[j].interval_95.map(number::percent);
-            row.push(format!("{low} to {high}"));
+    for (side, errors) in &sides {
+        if let Some(errors) = &errors.holdout {
+            columns = columns.words(&format!("held-out{side}"), |j| percent(errors, j));
         }
-        let rms = number::significant(errors_of(now).1.joints[j].rmse, 3);
-        row.push(format!("{rms} {}", machine.file.torque_unit(j)));
-        row.push(number::percent(d.left.unexplained[j].share));
-        row
-    };
-    let rows = machine.robot.joint_names().iter().enumerate().map(row);
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    page.rows("relative torque error", &head, rows.collect());
+    }
+    if let Some(errors) = &now.holdout {
+        let ends = |j: usize| errors.joints[j].interval_95.map(number::percent);
+        columns = columns.words("95 % CI", |j| ends(j).join(" to "));
+    }
+    let counted = errors_of(now).1;
+    let columns = columns
+        .words("rms", |j| {
+            let rms = number::significant(counted.joints[j].rmse, 3);
+            format!("{rms} {}", machine.file.torque_unit(j))
+        })
+        .percent("residual with a pattern, of torque power", |j| {
+            d.left.unexplained[j].share
+        });
+    page.table(columns);
 }

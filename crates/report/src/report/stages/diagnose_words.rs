@@ -1,8 +1,9 @@
-//! The verdict of a diagnosis in a breath: what was confirmed and what that bought, how good the model now is, and
-//! where most is left.
+//! The verdict of a diagnosis in a breath: the effects that were confirmed and their gain, how good the model now is,
+//! and where most is left.
 
 use super::step_words::titled;
 use crate::report::usual;
+use crate::report::words::listed;
 use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
@@ -12,7 +13,7 @@ use cft_ident_stages::open_loop::JointFreeRun;
 const NAMED: usize = 3;
 
 /// The verdict in words, and whether nothing calls for attention.
-pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
+pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     let d = &found.diagnosis;
     let lacking = found.verdict();
     let mut text = match lacking {
@@ -35,11 +36,8 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             .to_owned(),
     };
     if !matches!(lacking, DiagnosisVerdict::EffectsFound) && not_written(d).next().is_some() {
-        text += &format!(
-            " {} (`--accept` writes it)",
-            added(machine, d).trim_end_matches('.')
-        );
-        text += ".";
+        let added = added(machine, d);
+        text += &format!(" {} (`--accept` writes it).", added.trim_end_matches('.'));
     }
     let (bought, gains_nothing) = bought(d);
     text += &format!(" {bought}");
@@ -59,8 +57,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     if !worse.is_empty() {
         text += &format!(
             " Use it for feed-forward and not to simulate: driven by the measured torques, it moves worse than the \
-             given model at {}.",
-            worse.join(", ")
+             given model at {worse}."
         );
     }
     let good = !gains_nothing
@@ -71,26 +68,23 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
 }
 
 /// Joints that move worse, driven by the measured torques, where the model moves worse over all joints.
-fn runs_worse(found: &Diagnosed) -> Vec<&str> {
+fn runs_worse(found: &Diagnosed) -> String {
     let Some(run) = &found.free_run else {
-        return Vec::new();
+        return String::new();
     };
     let grows = |joint: &JointFreeRun| Some((joint.after.as_ref()?.rms / joint.given.rms).ln());
     let change: f64 = run.joints.iter().filter_map(grows).sum();
     let worse = run.worse().filter(|_| change > 0.0);
-    worse.map(|joint| joint.joint.as_str()).collect()
+    listed(worse.map(|joint| joint.joint.as_str()))
 }
 
 /// Whether the error is so small that no published figure is of use beside it.
 pub(super) fn is_exact(d: &Diagnosis) -> bool {
-    let least = [usual::Measured::Sensors, usual::Measured::Currents]
-        .map(|measured| usual::range(measured)[0])
-        .into_iter()
-        .fold(f64::INFINITY, f64::min);
+    let [least, _] = usual::band(None);
     errors(d.errors_now()).1.overall.mean_relative_error < 0.5 * least
 }
 
-/// Effects that the parts speak for, too little for what can be measured.
+/// Effects that the parts speak for, too little for one that can be measured.
 fn not_written(d: &Diagnosis) -> impl Iterator<Item = &FoundEffect> {
     let indicated = d.steps.iter().filter(|s| s.status == StepStatus::Indicated);
     indicated.filter(|s| s.written.is_none() && !s.vetoed())
@@ -111,10 +105,8 @@ fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
         (!steps.is_empty()).then(|| format!("{count} {grade}: {}.", names.join("; ")))
     };
     let by = |status: StepStatus| {
-        let steps = d
-            .written()
-            .filter(|s| !s.accepted_by_user && s.status == status);
-        steps.collect::<Vec<_>>()
+        let steps = d.written().filter(|s| !s.accepted_by_user);
+        steps.filter(|s| s.status == status).collect::<Vec<_>>()
     };
     let wanted = d.written().filter(|s| s.accepted_by_user).collect();
     let left = not_written(d).collect();
@@ -139,64 +131,60 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
     }
 }
 
-/// What the diagnosis did to the error, and whether effects were written that gain nothing.
+/// How the diagnosis changed the error, and whether effects were written that gain nothing.
 fn bought(d: &Diagnosis) -> (String, bool) {
     let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
     let mean = |e: &Errors| e.overall.mean_relative_error;
-    let percent = |e: &Errors| number::percent(mean(e));
-    let goes = match (
-        percent(before) == percent(after),
-        mean(after) > mean(before),
-    ) {
-        (true, _) => "stays at",
-        (false, true) => "RISES",
-        (false, false) => "falls",
+    let [from, to] = [before, after].map(|e| number::percent(mean(e)));
+    let changed = d.written().next().is_some();
+    let rises = mean(after) > mean(before);
+    let falls = from != to && !rises;
+    let goes = match changed {
+        false => format!("is {to}"),
+        true if from == to => format!("stays at {to}"),
+        true if rises => format!("RISES from {from} to {to}"),
+        true => format!("falls from {from} to {to}"),
     };
-    let mut text = match (d.written().next(), goes) {
-        (None, _) => format!("The {data} is {}", percent(after)),
-        (Some(_), "stays at") => format!("The {data} stays at {}", percent(after)),
-        (Some(_), goes) => format!(
-            "The {data} {goes} from {} to {}",
-            percent(before),
-            percent(after)
-        ),
+    let over = if after.joints.len() > 1 {
+        " (rms over the joints)"
+    } else {
+        ""
     };
-    if after.joints.len() > 1 {
-        text += " (rms over the joints)";
-    }
-    (text + ".", goes != "falls" && d.written().next().is_some())
+    (format!("The {data} {goes}{over}."), changed && !falls)
 }
 
-/// What held-out data took out of the model.
+/// The effects that held-out data took out of the model.
 fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
     let Some(selected) = &d.selected else {
         return String::new();
     };
     let vetoed = d.steps.iter().filter(|s| s.vetoed());
     let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
+    let names = names.join("; ");
+    let error = |of: &SplitErrors| number::percent(errors(of).1.overall.mean_relative_error);
     if d.written().next().is_none() {
-        return format!(
-            " Not written, for held-out data are worse with it ({}): {}.",
-            number::percent(errors(&d.after).1.overall.mean_relative_error),
-            names.join("; ")
-        );
+        let after = error(&d.after);
+        return format!(" Not written, for held-out data are worse with it ({after}): {names}.");
     }
     format!(
-        " Not written, for held-out data are worse with it: {}. The model as it is written has a {} of {}, \
+        " Not written, for held-out data are worse with it: {names}. The model as it is written has a {} of {}, \
          which is optimistic, since these data chose.",
-        names.join("; "),
         errors(selected).0,
-        number::percent(errors(selected).1.overall.mean_relative_error)
+        error(selected)
     )
 }
 
-/// The joint with the largest share of its torque left beyond the noise, and on what that depends.
+/// The joint with the largest share of its torque left beyond the noise.
+pub(super) fn worst(d: &Diagnosis) -> Option<usize> {
+    let share = |j: &usize| d.left.unexplained[*j].share;
+    let structured = d.structured_joints();
+    structured.max_by(|a, b| share(a).total_cmp(&share(b)))
+}
+
+/// The joint with the largest share of its torque left beyond the noise, and the signals on which that depends.
 fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let names = machine.robot.joint_names();
-    let share = |j: &usize| d.left.unexplained[*j].share;
-    let worst = d
-        .structured_joints()
-        .max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let worst = worst(d)?;
     let error = number::percent(errors(d.errors_now()).1.joints[worst].relative_error);
     let place = match names.len() {
         1 => format!("More than noise is left ({error} of the torque)"),
@@ -208,10 +196,8 @@ fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let dependence = d.left.dependence.iter().find(|of| of.joint == worst);
     let on = dependence.map(|of| {
         let signals = of.signals.iter().map(|s| signal_words(names, worst, *s));
-        format!(
-            "; it depends on {}",
-            signals.collect::<Vec<_>>().join(" and ")
-        )
+        let signals: Vec<String> = signals.collect();
+        format!("; it depends on {}", signals.join(" and "))
     });
     Some(place + &on.unwrap_or_default() + ".")
 }

@@ -1,8 +1,10 @@
 //! The report of `excite`: a motion, judged before the robot moves.
 
 use crate::report::figure::{MotionFigure, MotionPanel};
-use crate::report::table::{Align, Table, unbroken};
-use crate::report::{Report, Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
+use crate::report::table::{Columns, Table, unbroken};
+use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
+use crate::report::words::{self, condition, listed};
+use crate::report::{Report, Writer};
 use cft_ident_core::number;
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::foresee::Expected;
@@ -18,7 +20,7 @@ const PARTS: usize = 4;
 pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
-    let (text, good) = words(judged);
+    let (text, good) = verdict(judged);
     for described in judged.first_words() {
         report.terminal().paragraph(described);
         // numbers of the robot file are a caution, and no verdict
@@ -49,12 +51,13 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
         report.everywhere().table(table);
         return report;
     }
-    report
-        .page()
-        .paragraph(match judged.torques_foreseen {
-            true => "Friction is taken as known; the noise is that of the robot file.",
-            false => "Friction is taken as known; the noise is that of the robot file, or 1 N or N m in every sample where it gives none.",
-        });
+    let noise = match judged.torques_foreseen {
+        true => "Friction is taken as known; the noise is that of the robot file.",
+        false => {
+            "Friction is taken as known; the noise is that of the robot file, or 1 N or N m in every sample where it gives none."
+        }
+    };
+    report.page().paragraph(noise);
     let together = judged.together.as_ref().map(|together| {
         let stds = together.parameters.iter().map(|p| p.relative_std);
         ("with given", stds.collect())
@@ -70,10 +73,10 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     report
 }
 
-/// What a page has room for besides: the motion over time, its spectrum, and the warnings.
+/// Further parts of the page: the motion over time, its spectrum, and the warnings.
 pub fn course(page: &mut Writer, judged: &Judgement, figure: &MotionFigure) {
     page.heading("Positions, speeds and drives");
-    page.traces(&traces(figure), &figure.svg());
+    page.traces(&traces(figure), figure.svg());
     spectrum(page, judged);
     if !judged.warnings.is_empty() {
         page.heading("Warnings");
@@ -81,7 +84,7 @@ pub fn course(page: &mut Writer, judged: &Judgement, figure: &MotionFigure) {
     }
 }
 
-fn words(judged: &Judgement) -> (String, bool) {
+fn verdict(judged: &Judgement) -> (String, bool) {
     let broken = judged.broken().len();
     let mut text = match broken {
         0 if judged.torques_foreseen => "The motion keeps every limit.".to_owned(),
@@ -100,58 +103,41 @@ fn words(judged: &Judgement) -> (String, bool) {
         );
     }
     if judged.friction.is_none() {
-        let condition = &judged.condition;
-        let shown = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
         text += &format!(
             " Condition of the regressor: {}, {} with columns scaled.",
-            shown(condition.raw),
-            shown(condition.normalised)
+            condition(judged.condition.raw),
+            condition(judged.condition.normalised)
         );
     }
     (text, broken == 0)
 }
 
 fn limits(judged: &Judgement, name: &str) -> Table {
-    let shown =
-        |value: Option<f64>| value.map_or(number::ABSENT.into(), |v| number::significant(v, 4));
-    let condition = &judged.condition;
-    let periods = match judged.periods {
-        Some(periods) => format!(", {periods} periods"),
-        None => String::new(),
-    };
+    let value = |v: f64| number::significant(v, 4);
+    let periods = judged.periods.map(|periods| format!(", {periods} periods"));
     let caption = format!(
-        "{name}: condition {} ({} with columns scaled), {} s{periods}",
-        shown(condition.raw),
-        shown(condition.normalised),
-        number::significant(judged.seconds, 4),
+        "{name}: condition {} ({} with columns scaled), {} s{}",
+        words::significant(judged.condition.raw, 4),
+        words::significant(judged.condition.normalised, 4),
+        value(judged.seconds),
+        periods.unwrap_or_default()
     );
-    let mut table = Table::new(&[
-        ("limit", Align::Left),
-        ("from", Align::Decimal),
-        ("to", Align::Decimal),
-        ("allowed", Align::Left),
-        ("unit", Align::Left),
-        ("used", Align::Decimal),
-    ])
-    .caption(&caption);
-    for limit in &judged.limits {
-        let value = |v: f64| number::significant(v, 4);
-        let allowed = if limit.upper.is_finite() {
-            format!("{} .. {}", value(limit.lower), value(limit.upper))
-        } else {
-            format!("{} ..", value(limit.lower))
-        };
-        let mark = if limit.broken { "  BROKEN" } else { "" };
-        table.row([
-            &format!("{} {}", limit.name, limit.quantity.called(&limit.unit)),
-            &value(limit.least),
-            &value(limit.most),
-            &allowed,
-            &limit.unit,
-            &format!("{}{mark}", number::percent(limit.used)),
-        ]);
-    }
-    table
+    Columns::new(&caption, &judged.limits)
+        .words("limit", |limit| {
+            format!("{} {}", limit.name, limit.quantity.called(&limit.unit))
+        })
+        .numbers("from", |limit| value(limit.least))
+        .numbers("to", |limit| value(limit.most))
+        .words("allowed", |limit| match limit.upper.is_finite() {
+            true => format!("{} .. {}", value(limit.lower), value(limit.upper)),
+            false => format!("{} ..", value(limit.lower)),
+        })
+        .words("unit", |limit| &limit.unit)
+        .numbers("used", |limit| {
+            let mark = if limit.broken { "  BROKEN" } else { "" };
+            format!("{}{mark}", number::percent(limit.used))
+        })
+        .into()
 }
 
 /// Expected deviations, and the relative ones of `beside` in a column of their own.
@@ -160,83 +146,51 @@ fn expected(
     parameters: &[Expected],
     beside: Option<(&str, Vec<Option<f64>>)>,
 ) -> Table {
-    let mut columns = vec![
-        ("parameter", Align::Left),
-        ("value", Align::Decimal),
-        ("std", Align::Decimal),
-        ("relative", Align::Decimal),
-        ("unit", Align::Left),
-    ];
-    if let Some((name, _)) = &beside {
-        columns.insert(4, (name, Align::Decimal));
-    }
-    let relative = |std: Option<f64>| std.map_or(number::ABSENT.into(), number::percent);
-    let mut table = Table::new(&columns).caption(caption);
-    for (k, p) in parameters.iter().enumerate() {
-        let std = p.std.map(|s| number::significant(s, 2));
-        let mut row = vec![
-            p.name.clone(),
-            p.value
-                .map_or(number::ABSENT.into(), |v| number::significant(v, 5)),
-            std.unwrap_or(number::ABSENT.into()),
-            relative(p.relative_std),
-        ];
-        if let Some((_, stds)) = &beside {
-            row.push(relative(stds.get(k).copied().flatten()));
-        }
-        row.push(p.unit.clone());
-        table.row(row);
-    }
-    table
+    let (name, stds) = beside.unwrap_or_default();
+    Columns::new(caption, parameters.iter().enumerate())
+        .words("parameter", |(_, p)| &p.name)
+        .digits("value", 5, |(_, p)| p.value)
+        .digits("std", 2, |(_, p)| p.std)
+        .percent("relative", |(_, p)| p.relative_std)
+        .when(!name.is_empty(), |t| {
+            t.percent(name, |(k, _)| stds.get(k).copied().flatten())
+        })
+        .words("unit", |(_, p)| &p.unit)
+        .into()
 }
 
-/// What the motion hardly separates.
+/// The combination of parameters that the motion hardly separates.
 fn apart(report: &mut Report, judged: &Judgement) {
-    let parts = &judged.weakest_direction;
-    let words: Vec<String> = parts
-        .iter()
-        .take(PARTS)
-        .map(|part| format!("{:+.2} {}", part.weight, part.parameter))
-        .collect();
-    report
-        .terminal()
-        .line(&format!("weakest direction: {}", words.join(" ")));
-    let rows = parts
-        .iter()
-        .take_while(|part| part.weight.abs() > 0.1)
-        .map(|part| vec![part.parameter.clone(), format!("{:+.2}", part.weight)])
-        .collect();
-    report.page().rows(
-        "weakest direction, of columns scaled to norm 1",
-        &["parameter", "part"],
-        rows,
-    );
+    let parts = judged.weakest_direction.iter();
+    let words = parts.clone().take(PARTS);
+    let words = words.map(|part| format!("{:+.2} {}", part.weight, part.parameter));
+    let words = words.collect::<Vec<_>>().join(" ");
+    let line = format!("weakest direction: {words}");
+    report.terminal().line(&line);
+    let large = parts.take_while(|part| part.weight.abs() > 0.1);
+    let columns = Columns::new("weakest direction, of columns scaled to norm 1", large)
+        .words("parameter", |part| &part.parameter)
+        .words("part", |part| format!("{:+.2}", part.weight));
+    report.page().table(columns);
     if let Some(pair) = &judged.confounded {
         let (first, second) = (&pair.first, &pair.second);
         let described = format!("{first} and {second}, correlation {:.2}", pair.correlation);
-        report
-            .terminal()
-            .line(&format!("most correlated: {described}"));
-        report
-            .page()
-            .paragraph(&format!("Most correlated: {described}."));
+        let line = format!("most correlated: {described}");
+        report.terminal().line(&line);
+        let sentence = format!("Most correlated: {described}.");
+        report.page().paragraph(&sentence);
     }
 }
 
 /// Where the power of the torques lies, of a series.
 fn bands(judged: &Judgement) -> Option<String> {
-    let bands: Vec<String> = judged
-        .band
-        .as_ref()?
-        .iter()
-        .map(|band| {
-            let hz = number::significant(band.torque_power_99_below_hz, 2);
-            unbroken(&format!("{} {hz} Hz", band.joint))
-        })
-        .collect();
-    let described = bands.join(", ");
+    let bands = judged.band.as_ref()?.iter().map(|band| {
+        let hz = number::significant(band.torque_power_99_below_hz, 2);
+        unbroken(&format!("{} {hz} Hz", band.joint))
+    });
     Some(format!(
-        "99 % of the torque's power lies below: {described}"
+        "99 % of the torque's power lies below: {}",
+        listed(bands)
     ))
 }
 
@@ -273,22 +227,16 @@ fn spectrum(page: &mut Writer, judged: &Judgement) {
     };
     page.heading("Spectrum");
     let each = spectrum.iter().map(|row| row.speed_amplitudes.len());
-    let harmonics = each.max().unwrap_or(0);
-    let head: Vec<String> = ["coordinate".to_owned(), "unit".to_owned()]
-        .into_iter()
-        .chain((1..=harmonics).map(|l| format!("{l}")))
-        .collect();
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    let rows = spectrum
-        .iter()
-        .map(|row| {
-            let values = row.speed_amplitudes.iter();
-            let values = values.map(|a| number::significant(*a, 3));
-            let names = [row.coordinate.clone(), row.unit.clone()];
-            names.into_iter().chain(values).collect()
-        })
-        .collect();
-    page.rows("amplitude of the speed by harmonic", &head, rows);
+    let mut columns = Columns::new("amplitude of the speed by harmonic", spectrum)
+        .words("coordinate", |row| &row.coordinate)
+        .words("unit", |row| &row.unit);
+    for l in 0..each.max().unwrap_or(0) {
+        columns = columns.words(&format!("{}", l + 1), |row| {
+            let amplitude = row.speed_amplitudes.get(l);
+            amplitude.map_or(String::new(), |a| number::significant(*a, 3))
+        });
+    }
+    page.table(columns);
     if let Some(bands) = bands(judged) {
         page.paragraph(&format!("{bands}."));
     }
@@ -305,13 +253,10 @@ pub fn figure(
     title: &str,
 ) -> MotionFigure {
     let seconds = motion.seconds();
-    let t: Vec<f64> = (0..=POINTS)
-        .map(|k| seconds * k as f64 / POINTS as f64)
-        .collect();
-    let states: Vec<_> = t
-        .iter()
-        .map(|t| machine.state(&motion.at(*t)).ok())
-        .collect();
+    let t = (0..=POINTS).map(|k| seconds * k as f64 / POINTS as f64);
+    let t: Vec<f64> = t.collect();
+    let state = |t: &f64| machine.state(&motion.at(*t)).ok();
+    let states: Vec<_> = t.iter().map(state).collect();
     let panel = |kind: Quantity, (i, name): (usize, &str), unit: String| {
         let found = judged.limit(name, kind);
         let of = BoundedQuantity::symmetric(kind, i, "", "", 1.0);
@@ -319,41 +264,31 @@ pub fn figure(
         MotionPanel {
             quantity: kind.called(&unit).into(),
             unit,
-            values: states
-                .iter()
+            values: (states.iter())
                 .map(|state| state.as_ref().map_or(f64::NAN, value))
                 .collect(),
             limits: found
                 .map(|limit: &LimitUse| [limit.lower, limit.upper])
-                .filter(|[lower, upper]| lower.is_finite() && upper.is_finite()),
-            used: found
-                .map(|limit| limit.used)
-                .filter(|share| share.is_finite()),
+                .filter(|limits| limits.iter().all(|limit| limit.is_finite())),
+            used: (found.map(|limit| limit.used)).filter(|share| share.is_finite()),
         }
     };
-    let rows = machine
-        .coordinate_names()
-        .into_iter()
-        .enumerate()
-        .map(|(i, name)| {
-            let (unit, of) = (machine.coordinate_unit(i), (i, name.as_str()));
-            let mut panels = vec![
-                panel(Quantity::Position, of, unit.to_owned()),
-                panel(Quantity::Speed, of, format!("{unit}/s")),
-            ];
-            if judged.torques_foreseen {
-                panels.push(panel(Quantity::Drive, of, machine.drive_unit(i).to_owned()));
-            }
-            (name, panels)
-        })
-        .collect();
-    let unforeseen = match judged.torques_foreseen {
-        true => "",
-        false => " (torques are not foreseen)",
+    let row = |(i, name): (usize, String)| {
+        let (unit, of) = (machine.coordinate_unit(i), (i, name.as_str()));
+        let mut panels = vec![
+            panel(Quantity::Position, of, unit.to_owned()),
+            panel(Quantity::Speed, of, format!("{unit}/s")),
+        ];
+        if judged.torques_foreseen {
+            panels.push(panel(Quantity::Drive, of, machine.drive_unit(i).to_owned()));
+        }
+        (name, panels)
     };
-    MotionFigure {
-        title: format!("{title}{unforeseen}"),
-        t,
-        rows,
-    }
+    let names = machine.coordinate_names().into_iter();
+    let rows = names.enumerate().map(row).collect();
+    let title = match judged.torques_foreseen {
+        true => title.to_owned(),
+        false => format!("{title} (torques are not foreseen)"),
+    };
+    MotionFigure { title, t, rows }
 }

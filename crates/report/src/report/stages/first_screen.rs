@@ -1,32 +1,31 @@
-//! What the page of a diagnosis shows first: errors per joint as bars, and the next thing to do.
+//! The first screen of the page of a diagnosis: errors per joint as bars, and the next thing to do.
 
-use super::diagnose_words::{errors as errors_of, is_exact};
+use super::diagnose_words::{errors as errors_of, is_exact, worst};
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
 use crate::report::{Writer, usual};
-use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect};
+use cft_ident_core::diagnose::{Errors, FoundEffect};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, separating_command};
 
 /// Errors per joint as bars, and the next thing to do.
-pub fn show(
+pub(super) fn show(
     page: &mut Writer,
     (machine, found): (&LoggedRobot, &Diagnosed),
     (path, logs): (&str, &str),
 ) {
-    page.figure(&bars(machine, found).svg());
+    page.figure(bars(machine, found).svg());
     let typed = (&*local(path), &*local(logs));
     page.paragraph(&next(machine, found, typed));
 }
 
 /// Paths of a command as a page has them: an absolute one by its last part, for a page is the same on every machine.
 pub(super) fn local(words: &str) -> String {
-    let word = |word: &str| match word.strip_prefix('/').and_then(|w| w.rsplit('/').next()) {
-        Some(last) => last.to_owned(),
-        None => word.to_owned(),
-    };
-    let words: Vec<String> = words.split(' ').map(word).collect();
-    words.join(" ")
+    let words = words.split(' ').map(|word| match word.starts_with('/') {
+        true => word.rsplit('/').next().unwrap_or(word),
+        false => word,
+    });
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// Errors of every joint before and after: held-out ones where there are any.
@@ -52,13 +51,8 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
         names: ["as given", "after"].map(str::to_owned),
         joints: joints.collect(),
         limit: None,
-        usual: usual_of(machine, d),
+        usual: (!is_exact(d)).then(|| usual::drawn(machine.file.log.torque_is)),
     }
-}
-
-/// The errors that are usual, where they are of use beside those of this model.
-fn usual_of(machine: &LoggedRobot, d: &Diagnosis) -> Option<usual::Usual> {
-    (!is_exact(d)).then(|| usual::drawn(machine.file.log.torque_is))
 }
 
 /// The first effect of the written model that the data do not separate from another.
@@ -67,9 +61,8 @@ fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
     written.find(|step| !step.alternatives.is_empty())
 }
 
-/// The next motion to record, as a command that ends a result: it separates the first effect that the data do not determine
-/// from its like, or narrows what is weak in the model that is written, `path` as a shell takes it.
-pub fn next_motion(
+/// The next motion to record, as a command: it separates an effect from its like, or narrows weak parameters.
+pub(super) fn next_motion(
     writer: &mut Writer,
     (machine, found): (&LoggedRobot, &Diagnosed),
     (file, path): (&ModelFile, &str),
@@ -87,8 +80,8 @@ pub fn next_motion(
     }
 }
 
-/// The motion that narrows what is weak in a model, where something is.
-pub fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
+/// The motion that narrows the weak parameters of a model, where there are some.
+pub(super) fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
     if let Some(([open, all], command)) = narrowing_command(file, path) {
         let words =
             format!("{open} of {all} parameters are weak; a motion to record that narrows them:");
@@ -97,8 +90,8 @@ pub fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
     }
 }
 
-/// What to do next; the paths of the model and of the logs are those that a shell takes.
-pub fn next(machine: &LoggedRobot, found: &Diagnosed, (path, logs): (&str, &str)) -> String {
+/// The next step; the paths of the model and of the logs are those that a shell takes.
+pub(super) fn next(machine: &LoggedRobot, found: &Diagnosed, (path, logs): (&str, &str)) -> String {
     let d = &found.diagnosis;
     if let Some(contact) = found.contacts.first() {
         return format!("Next: see whether something touched the robot. {contact}.");
@@ -124,19 +117,13 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed, (path, logs): (&str, &str)
             step.alternatives[0].title(&machine.robot)
         );
     }
-    let share = |j: &usize| d.left.unexplained[*j].share;
-    let worst = d
-        .structured_joints()
-        .max_by(|a, b| share(a).total_cmp(&share(b)));
-    match worst {
-        Some(j) if !found.searched => format!(
-            "Next: search a formula for what is left of {}: `cft-ident diagnose {logs} -m {path} --search`.",
-            machine.robot.joint_names()[j]
+    match worst(d).map(|j| &machine.robot.joint_names()[j]) {
+        Some(joint) if !found.searched => format!(
+            "Next: search a formula for what is left of {joint}: `cft-ident diagnose {logs} -m {path} --search`."
         ),
-        Some(j) => format!(
-            "Next: look at the residual of {}, which has a pattern that no known effect explains, and \
-             log it at other speeds and loads.",
-            machine.robot.joint_names()[j]
+        Some(joint) => format!(
+            "Next: look at the residual of {joint}, which has a pattern that no known effect explains, and \
+             log it at other speeds and loads."
         ),
         None if d.written().next().is_none() => {
             format!("Next: use the model: `cft-ident export -m {path} --c model.h`.")

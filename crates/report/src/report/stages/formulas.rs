@@ -1,16 +1,17 @@
-//! Formulas of what is left, for a terminal and a page.
+//! Formulas of the residual that is left, for a terminal and a page.
 
 use super::what_is_left::axis_of;
 use crate::report::Writer;
 use crate::report::figure::{Cells, EffectFigure};
+use crate::report::words::listed;
 use cft_ident_core::diagnose::{FormulaEnd, FormulaPicture};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, FormulaResult, LoggedRobot, formula_result};
 
 const NONE: &str = "No formula of few terms explains what is left of a joint: the signals on which it depends stand with it.";
 
-/// What a search came to, for a screen: each formula that is confirmed, and why the others are not.
-pub fn in_short(usual: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+/// The result of a search for a screen: each formula that is confirmed, and why the others are not.
+pub(super) fn in_short(usual: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     if !found.searched {
         return;
     }
@@ -21,36 +22,33 @@ pub fn in_short(usual: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     }
     let (confirmed, others): (Vec<_>, Vec<_>) =
         results.iter().partition(|f| f.end == FormulaEnd::Found);
-    for of in confirmed {
+    for FormulaResult {
+        joint, text, share, ..
+    } in confirmed
+    {
+        let share = number::percent(*share);
         usual.paragraph(&format!(
-            "Formula of {}: {}, {} of what is left; `--accept formula:{}` writes it.",
-            of.joint,
-            of.text,
-            number::percent(of.share),
-            of.joint
+            "Formula of {joint}: {text}, {share} of what is left; `--accept formula:{joint}` writes it."
         ));
     }
-    let others: Vec<String> = others
-        .iter()
-        .map(|of| format!("{} ({})", of.joint, why_not(of)))
-        .collect();
+    let others = others.iter();
+    let others = listed(others.map(|of| format!("{} ({})", of.joint, why_not(of))));
     if !others.is_empty() {
-        usual.paragraph(&format!("No formula confirmed: {}.", others.join(", ")));
+        usual.paragraph(&format!("No formula confirmed: {others}."));
     }
 }
 
 /// The formulas as a file for `--candidates`.
-pub fn candidates(detail: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
-    for formula in &found.diagnosis.formulas {
-        if formula.end == FormulaEnd::Found {
-            let result = formula_result(machine, formula);
-            result.candidate.lines().for_each(|line| detail.line(line));
-        }
+pub(super) fn candidates(detail: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    let formulas = found.diagnosis.formulas.iter();
+    for formula in formulas.filter(|formula| formula.end == FormulaEnd::Found) {
+        let result = formula_result(machine, formula);
+        result.candidate.lines().for_each(|line| detail.line(line));
     }
 }
 
-/// What a search came to, joint by joint.
-pub fn write(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+/// The result of a search, joint by joint.
+pub(super) fn write(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     if !found.searched {
         return;
     }
@@ -66,7 +64,7 @@ pub fn write(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             writer.list(numbers(&result));
             writer.details("as a table for --candidates", result.candidate.trim());
             if let Some(picture) = &formula.picture {
-                writer.figures(&figure(machine, &result, picture));
+                writer.figures(figure(machine, &result, picture));
             }
         }
     }
@@ -84,6 +82,11 @@ fn why_not(of: &FormulaResult) -> String {
     }
 }
 
+fn joint_of(machine: &LoggedRobot, of: &FormulaResult) -> usize {
+    let mut names = machine.robot.joint_names().iter();
+    names.position(|name| *name == of.joint).unwrap_or(0)
+}
+
 fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
     let mut end = match of.end {
         FormulaEnd::Found => format!(
@@ -95,17 +98,11 @@ fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
         ),
         _ => format!("Not confirmed: {}.", why_not(of)),
     };
-    if let Some([without, with]) = of.at_reversals {
-        let joint = machine
-            .robot
-            .joint_names()
-            .iter()
-            .position(|n| *n == of.joint);
+    if let Some(rms) = of.at_reversals {
+        let [without, with] = rms.map(|rms| number::significant(rms, 3));
+        let unit = machine.file.torque_unit(joint_of(machine, of));
         end += &format!(
-            " Within 0.1 s of a reversal, on data set aside, the residual is {} without it and {} {} with it (rms).",
-            number::significant(without, 3),
-            number::significant(with, 3),
-            machine.file.torque_unit(joint.unwrap_or(0))
+            " Within 0.1 s of a reversal, on data set aside, the residual is {without} without it and {with} {unit} with it (rms)."
         );
     }
     let place = match of.in_place_of.is_empty() {
@@ -122,16 +119,13 @@ fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
 }
 
 fn figure(machine: &LoggedRobot, of: &FormulaResult, picture: &FormulaPicture) -> Cells {
-    let names = machine.robot.joint_names();
-    let joint = names.iter().position(|n| *n == of.joint).unwrap_or(0);
+    let joint = joint_of(machine, of);
+    let unit = machine.file.torque_unit(joint).to_owned();
     let figure = EffectFigure {
         title: format!("formula of {}, on data set aside", of.joint),
         description: of.text.clone(),
         over: axis_of(machine, joint, picture.over),
-        of: (
-            "torque".to_owned(),
-            machine.file.torque_unit(joint).to_owned(),
-        ),
+        of: ("torque".to_owned(), unit),
         rows: picture.rows.clone(),
     };
     figure.cells(Vec::new())
@@ -139,24 +133,15 @@ fn figure(machine: &LoggedRobot, of: &FormulaResult, picture: &FormulaPicture) -
 
 /// Numbers with units and intervals.
 fn numbers(of: &FormulaResult) -> Vec<String> {
+    let shown = |x: f64| number::significant(x, 3);
     let numbers = of.parameters.iter().map(|(key, n)| {
-        let interval = match n.std {
-            Some(std) => format!(
-                " ({} .. {})",
-                number::significant(n.value - 1.96 * std, 3),
-                number::significant(n.value + 1.96 * std, 3)
-            ),
-            None => String::new(),
-        };
-        let of_key = of
-            .formulas
-            .get(key)
-            .map_or(String::new(), |f| format!(" of {f}"));
-        format!(
-            "{key} = {}{interval} {}{of_key}",
-            number::significant(n.value, 3),
-            n.unit
-        )
+        let interval = n.std.map_or(String::new(), |std| {
+            let [low, high] = [n.value - 1.96 * std, n.value + 1.96 * std].map(shown);
+            format!(" ({low} .. {high})")
+        });
+        let of_key = of.formulas.get(key);
+        let of_key = of_key.map_or(String::new(), |f| format!(" of {f}"));
+        format!("{key} = {}{interval} {}{of_key}", shown(n.value), n.unit)
     });
     numbers.collect()
 }

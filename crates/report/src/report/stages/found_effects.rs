@@ -2,7 +2,8 @@
 
 use super::step_words::{agreement, alternatives, grade, in_words, titled, worsened};
 use crate::report::Writer;
-use crate::report::sections::effects::{self, Said};
+use crate::report::sections::effects;
+use crate::report::table::Columns;
 use cft_ident_core::diagnose::FoundEffect;
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
@@ -21,16 +22,18 @@ pub(super) fn show(
         false => "the fitted data",
     };
     for (step, rows) in d.written().zip(&replayed.effects) {
-        let said = Said {
-            title: titled(machine, &step.estimate),
-            words: words(machine, step),
-            no_gain: no_gain(step),
-        };
+        let title = titled(machine, &step.estimate);
+        let said = (title, words(machine, step), no_gain(step));
         effects::card(page, (machine, &d.model), rows, said, data);
     }
-    if !d.steps.is_empty() {
-        table(page, machine, found);
-    }
+    let caption = "estimates, in the order in which the effects were found";
+    let columns = Columns::new(caption, &d.steps)
+        .words("effect", |step| step.estimate.title(&machine.robot))
+        .words("parameters", |step| in_words(machine, step))
+        .percent("gain on blocks left out", |step| step.share)
+        .words("grade", grade)
+        .words("agreement", agreement);
+    page.table_if_any(columns);
 }
 
 /// That the held-out error does not fall with an effect, in words.
@@ -42,7 +45,7 @@ fn no_gain(step: &FoundEffect) -> Option<String> {
     ))
 }
 
-/// What is said of one effect besides its picture.
+/// The sentences on one effect beside its picture.
 fn words(machine: &LoggedRobot, step: &FoundEffect) -> Vec<String> {
     let mut words = vec![format!("Grade: {}.", grade(step))];
     if let Some([before, after]) = step.holdout {
@@ -55,28 +58,4 @@ fn words(machine: &LoggedRobot, step: &FoundEffect) -> Vec<String> {
     }
     words.extend(alternatives(machine, step));
     words
-}
-
-fn table(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
-    let d = &found.diagnosis;
-    let row = |step: &FoundEffect| {
-        vec![
-            step.estimate.title(&machine.robot),
-            in_words(machine, step),
-            number::percent(step.share),
-            grade(step).to_owned(),
-            agreement(step),
-        ]
-    };
-    page.rows(
-        "estimates, in the order in which the effects were found",
-        &[
-            "effect",
-            "parameters",
-            "gain on blocks left out",
-            "grade",
-            "agreement",
-        ],
-        d.steps.iter().map(row).collect(),
-    );
 }

@@ -3,15 +3,16 @@
 use crate::report::figure::{FrictionFigure, FrictionPanel};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, parameters, provenance};
-use crate::report::table::Table;
-use crate::report::{Report, Writer, summary};
+use crate::report::table::{Align, Columns};
+use crate::report::words::escaped;
+use crate::report::{Report, Writer};
 use cft_ident_core::friction::estimate::{BEYOND, FrictionCurvePoint, curve_std};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
-use cft_ident_logs::log::{Provenance, escape};
+use cft_ident_logs::log::Provenance;
 use cft_ident_stages::identify::{FrictionOfJoint, IdentifiedFriction, LoggedRobot};
 
-/// What the report is made from.
+/// The parts of the report.
 pub struct Friction<'a> {
     pub machine: &'a LoggedRobot,
     pub found: &'a IdentifiedFriction,
@@ -28,8 +29,7 @@ const MAX_JOINTS_ON_SCREEN: usize = 2;
 
 /// The verdict, how the filter went, and the laws.
 pub fn friction(of: &Friction) -> Report {
-    let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
-    let mut report = Report::new(&format!("Friction from {}", names.join(", ")));
+    let mut report = Report::new(&format!("Friction from {}", escaped(of.logs)));
     let (text, good) = words(of);
     report.everywhere().verdict(&text, good);
     report.terminal().line("");
@@ -39,8 +39,7 @@ pub fn friction(of: &Friction) -> Report {
             true => report.terminal(),
             false => report.detail(),
         };
-        laws.line("");
-        laws.table(law(of.machine, joint));
+        law(&mut laws, of.machine, joint);
     }
     report.terminal().line("");
     let (tally, _) = parameters::tally(of.file);
@@ -50,13 +49,12 @@ pub fn friction(of: &Friction) -> Report {
     report
 }
 
-/// What to do next with the model at a path.
+/// The next step with the model at a path.
 fn next(path: &str) -> String {
     format!("Next: `cft-ident lsq LOG -r ROBOT.toml -m {path} -o model.toml` fits the inertias.")
 }
 
-/// What a page has room for besides; `given` are the robot file and the model whose other joints are
-/// kept.
+/// Further parts of the page; `given` are the robot file and the model whose other joints are kept.
 pub fn pictures(
     page: &mut Writer,
     of: &Friction,
@@ -65,7 +63,7 @@ pub fn pictures(
     command: &str,
 ) {
     page.heading("Friction");
-    page.figures(&figure(of.machine, of.found).cells());
+    page.figures(figure(of.machine, of.found).cells());
     parameters::section(page, of.file, &|_| None);
     nuisance(page, of.machine, of.found);
     page.heading("Correlated parameters");
@@ -76,22 +74,9 @@ pub fn pictures(
 }
 
 /// The parameters of one joint's law.
-fn law(machine: &LoggedRobot, found: &FrictionOfJoint) -> Table {
+fn law(laws: &mut Writer, machine: &LoggedRobot, found: &FrictionOfJoint) {
     let e = &found.estimate;
     let parameters = found.parameters.each();
-    let rows: Vec<summary::ParameterRow> = parameters
-        .iter()
-        .map(|(name, p)| summary::ParameterRow {
-            joint: &found.joint,
-            name,
-            theta: p.theta,
-            value: p.value.unwrap_or(f64::NAN),
-            std: p.std.unwrap_or(f64::NAN),
-            unit: &p.unit,
-            verdict: p.verdict.word(),
-            truth: None,
-        })
-        .collect();
     let caption = format!(
         "friction of {}: speeds {} to {} {}/s, residual {} ({} {}, NIS {:.2})",
         found.joint,
@@ -103,127 +88,118 @@ fn law(machine: &LoggedRobot, found: &FrictionOfJoint) -> Table {
         machine.file.torque_unit(found.index),
         e.nis.mean
     );
-    summary::parameters(&caption, &rows)
+    let columns = Columns::new(&caption, &parameters)
+        .words("joint", |_| &found.joint)
+        .words("parameter", |(name, _)| *name)
+        .when(parameters.iter().any(|(_, p)| p.theta.is_some()), |t| {
+            t.column(Align::Right, "theta", |(_, p)| {
+                p.theta
+                    .map_or(number::ABSENT.into(), |theta| theta.to_string())
+            })
+        })
+        .estimates(["value", "std"], |(_, p)| (p.value, p.std))
+        .words("unit", |(_, p)| &p.unit)
+        .words("verdict", |(_, p)| p.verdict.word());
+    laws.table_apart(columns);
 }
 
 /// The verdict in words, and whether nothing calls for attention.
 fn words(of: &Friction) -> (String, bool) {
-    let worst = of.found.joints.iter();
-    let worst = worst.max_by(|a, b| {
-        a.estimate
-            .relative_error
-            .total_cmp(&b.estimate.relative_error)
-    });
+    let error = |found: &FrictionOfJoint| found.estimate.relative_error;
+    let joints = of.found.joints.iter();
+    let worst = joints.max_by(|a, b| error(a).total_cmp(&error(b)));
     let mut text = worst.map_or_else(String::new, |worst| {
-        let error = number::percent(worst.estimate.relative_error);
+        let (joint, error) = (&worst.joint, number::percent(error(worst)));
         match of.found.joints.len() {
-            1 => format!(
-                "The friction law of {} leaves {error} of its torque.",
-                worst.joint
-            ),
+            1 => format!("The friction law of {joint} leaves {error} of its torque."),
             n => format!(
-                "The friction laws of {n} joints leave at most {error} of the torque, at {}.",
-                worst.joint
+                "The friction laws of {n} joints leave at most {error} of the torque, at {joint}."
             ),
         }
     });
-    let mut good = true;
+    let mut doubts = String::new();
     for found in &of.found.joints {
+        let joint = &found.joint;
         if !found.converged {
-            good = false;
-            text += &format!(" The search for {} ended without converging.", found.joint);
+            doubts += &format!(" The search for {joint} ended without converging.");
         }
         if !found.estimate.missed_plateaus().is_empty() {
-            good = false;
-            text += &format!(
-                " The curve of {} misses the mean torque at constant speed (see the warnings).",
-                found.joint
+            doubts += &format!(
+                " The curve of {joint} misses the mean torque at constant speed (see the warnings)."
             );
         }
         let nis = &found.estimate.nis;
         if nis.mean > nis.upper_95 {
-            good = false;
-            text += &format!(
-                " Something acts on {} that the friction law lacks.",
-                found.joint
-            );
+            doubts += &format!(" Something acts on {joint} that the friction law lacks.");
         }
     }
-    if good {
-        text += " The curves can be used over the speeds covered.";
-    }
-    (text, good)
+    text += match doubts.as_str() {
+        "" => " The curves can be used over the speeds covered.",
+        doubts => doubts,
+    };
+    (text, doubts.is_empty())
 }
 
 /// How the filter went, joint by joint.
 fn filter(page: &mut Writer, of: &Friction) {
-    let row = |found: &FrictionOfJoint| {
-        let e = &found.estimate;
-        let unit = of.machine.file.torque_unit(found.index);
-        let speed = of.machine.robot.joint_kind(found.index).position_unit();
-        let [low, high] = e.speeds.covered;
-        vec![
-            found.joint.clone(),
-            number::percent(e.relative_error),
-            format!("{} {unit}", number::significant(e.rmse, 3)),
-            format!(
-                "{} to {} {speed}/s",
-                number::significant(low, 2),
-                number::significant(high, 3)
-            ),
-            number::significant(e.nis.mean, 3),
-            format!(
-                "{} to {}",
-                number::significant(e.nis.lower_95, 3),
-                number::significant(e.nis.upper_95, 3)
-            ),
-        ]
+    let position = |j: usize| of.machine.robot.joint_kind(j).position_unit();
+    let range = |[low, high]: [f64; 2], digits: [usize; 2]| {
+        let high = number::significant(high, digits[1]);
+        format!("{} to {high}", number::significant(low, digits[0]))
     };
-    page.rows(
-        "relative error of the fit, and normalised innovations squared (NIS, 1 is ideal)",
-        &[
-            "joint",
-            "error",
-            "residual rms",
-            "speeds covered",
-            "NIS",
-            "95 % bounds",
-        ],
-        of.found.joints.iter().map(row).collect(),
-    );
+    let caption = "relative error of the fit, and normalised innovations squared (NIS, 1 is ideal)";
+    let columns = Columns::new(caption, &of.found.joints)
+        .words("joint", |joint| &joint.joint)
+        .words("error", |joint| {
+            number::percent(joint.estimate.relative_error)
+        })
+        .words("residual rms", |joint| {
+            let unit = of.machine.file.torque_unit(joint.index);
+            format!("{} {unit}", number::significant(joint.estimate.rmse, 3))
+        })
+        .words("speeds covered", |joint| {
+            let speeds = range(joint.estimate.speeds.covered, [2, 3]);
+            format!("{speeds} {}/s", position(joint.index))
+        })
+        .words("NIS", |joint| {
+            number::significant(joint.estimate.nis.mean, 3)
+        })
+        .words("95 % bounds", |joint| {
+            let nis = &joint.estimate.nis;
+            range([nis.lower_95, nis.upper_95], [3, 3])
+        });
+    page.table(columns);
 }
 
-/// What was estimated beside the friction.
+/// Quantities that were estimated beside the friction.
 fn nuisance(page: &mut Writer, machine: &LoggedRobot, found: &IdentifiedFriction) {
-    let of_joint = |found: &FrictionOfJoint| {
-        let joint = found.joint.clone();
-        let torque = machine.file.torque_unit(found.index);
-        let position = machine.robot.joint_kind(found.index).position_unit();
-        let each = found.estimate.nuisance.iter();
-        let rows = each.map(|n| {
-            let (value, std) = number::value_and_std(n.value, n.std);
-            let unit = match n.unit.as_str() {
+    let all = found.joints.iter();
+    let all = all.flat_map(|joint| joint.estimate.nuisance.iter().map(move |n| (joint, n)));
+    let all: Vec<_> = all.collect();
+    if all.is_empty() {
+        return;
+    }
+    page.heading("Other quantities estimated");
+    page.paragraph(
+        "Inertia, gravity and the torque from the motion of the other joints; not part of the model.",
+    );
+    let columns = Columns::new("nuisance quantities", all)
+        .words("quantity", |(_, n)| &n.name)
+        .words("joint", |(joint, _)| &joint.joint)
+        .estimates(["value", "std"], |(_, n)| (n.value, n.std))
+        .words("unit", |(joint, n)| {
+            let torque = machine.file.torque_unit(joint.index);
+            let position = machine.robot.joint_kind(joint.index).position_unit();
+            match n.unit.as_str() {
                 "torque" => torque.to_owned(),
                 "torque/acceleration" => format!("{torque} s^2/{position}"),
                 unit => unit.to_owned(),
-            };
-            vec![n.name.clone(), joint.clone(), value, std, unit]
+            }
         });
-        rows.collect::<Vec<_>>()
-    };
-    let rows: Vec<Vec<String>> = found.joints.iter().flat_map(of_joint).collect();
-    if !rows.is_empty() {
-        page.heading("Other quantities estimated");
-        page.paragraph(
-            "Inertia, gravity and the torque from the motion of the other joints; not part of the model.",
-        );
-        let head = ["quantity", "joint", "value", "std", "unit"];
-        page.rows("nuisance quantities", &head, rows);
-    }
+    page.table(columns);
 }
 
-/// Velocities at which a curve is drawn, from the most negative to the most positive: in equal
-/// ratios, for the law bends close to 0, and in equal steps.
+/// Rising velocities at which a curve is drawn: in equal ratios, for the law bends close to 0, and in equal steps.
 fn speeds_to_draw([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
     const POINTS: usize = 80;
     let slowest = (0.1 * low).max(1e-4 * high);
@@ -259,9 +235,7 @@ pub fn figure(machine: &LoggedRobot, found: &IdentifiedFriction) -> FrictionFigu
             curve: curve.collect(),
             covered: vec![[-high, -low], [low, high]],
             plateaus: plateaus.collect(),
-            cloud: Vec::new(),
-            beyond_curve: false,
-            truth: Vec::new(),
+            ..FrictionPanel::default()
         }
     };
     FrictionFigure {

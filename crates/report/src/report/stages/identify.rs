@@ -1,19 +1,19 @@
 //! The report of `identify`: the whole campaign.
 
-use super::{diagnose, first_screen, friction as filter, lsq, quality_of_fit, validate};
+use super::{diagnose, diagnose_words, first_screen, friction as filter};
+use super::{lsq, quality_of_fit, validate};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
-use crate::report::table::Table;
-use crate::report::{Report, Writer, summary};
+use crate::report::words::{escaped, listed};
+use crate::report::{Report, Writer};
 use cft_ident_core::number;
-use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::identify::{Campaigned, DataFault, DiagnoseEnd, Diagnosed, LoggedRobot};
+use cft_ident_stages::identify::{Campaigned, DiagnoseEnd, Diagnosed, LoggedRobot};
 use cft_ident_stages::replay::{Replayed, ReplayedDiagnosis};
 
-/// What the report is made from.
+/// The parts of the report.
 pub struct Identify<'a> {
     pub machine: &'a LoggedRobot,
     /// Name of the campaign.
@@ -25,7 +25,7 @@ pub struct Identify<'a> {
     pub truth: &'a dyn Fn(&Parameter) -> Option<f64>,
     /// Limit that the user set on every joint's relative error.
     pub limit: Option<f64>,
-    /// What was guessed of the robot file, with the lines to change.
+    /// The guesses in the robot file, with the lines to change.
     pub guesses: &'a [String],
     /// Path of the model that is written last, and the logs that were fitted, as a shell takes them.
     pub path: &'a str,
@@ -44,33 +44,24 @@ impl Identify<'_> {
         }
     }
 
-    fn fault(&self) -> Option<&DataFault> {
-        match &self.found.diagnosed {
-            Ok(DiagnoseEnd::DataFault(fault)) => Some(fault),
-            _ => None,
-        }
-    }
-
-    fn title(&self) -> String {
-        let names: Vec<String> = self.unseen.iter().map(|name| escape(name)).collect();
-        names.join(", ")
-    }
-
     fn verdicts(&self, page: &mut Writer) {
-        if let Some(fault) = self.fault() {
-            let text = diagnose::at_fault(fault);
-            page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
-        }
-        if let Some(found) = self.diagnosed() {
-            let (text, good) = diagnose::words(self.machine, found);
-            page.verdict(&text, good);
+        match &self.found.diagnosed {
+            Ok(DiagnoseEnd::DataFault(fault)) => {
+                let text = diagnose::at_fault(fault);
+                page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
+            }
+            Ok(DiagnoseEnd::Diagnosed(found)) => {
+                let (text, good) = diagnose_words::words(self.machine, found);
+                page.verdict(&text, good);
+            }
+            _ => {}
         }
         match &self.found.validated {
-            // the diagnosis has said what the model misses
+            // the diagnosis has said how far the model is off
             Some(_) if self.diagnosed().is_some() && self.limit.is_none() => {}
             Some(validated) => {
                 let errors = validated.judged();
-                let (text, good) = validate::words(errors, self.limit, &self.title());
+                let (text, good) = validate::verdict(errors, self.limit, &escaped(self.unseen));
                 let given = match self.found.refined {
                     Some(_) => text.replacen("The model", "The model before the diagnosis", 1),
                     None => text,
@@ -85,7 +76,7 @@ impl Identify<'_> {
     }
 }
 
-/// The parameters, the quality of the fit, the errors, and what the model lacks.
+/// The parameters, the quality of the fit, the errors, and the effects that the model lacks.
 pub fn identify(of: &Identify) -> Report {
     let (machine, found) = (of.machine, of.found);
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
@@ -111,7 +102,7 @@ pub fn identify(of: &Identify) -> Report {
     let mut detail = report.detail();
     detail.line("");
     detail.paragraph(&format!("{tally}."));
-    detail.table(beside_truth(of));
+    detail.table(parameters::beside_truth(&of.model().parameters, of.truth));
     detail.line("");
     quality_of_fit::condition(&mut detail, &found.dynamics);
     quality_of_fit::fit_quality(&mut detail, &found.dynamics);
@@ -137,40 +128,15 @@ pub fn identify(of: &Identify) -> Report {
     report
 }
 
-/// What was guessed of the robot file, as one verdict.
+/// The guesses in the robot file, as one verdict.
 fn guesses(writer: &mut Writer, guesses: &[String]) {
     if !guesses.is_empty() {
-        writer.verdict(
-            &format!("Guessed, CHECK IT: {}.", guesses.join("; ")),
-            false,
-        );
+        let text = format!("Guessed, CHECK IT: {}.", guesses.join("; "));
+        writer.verdict(&text, false);
     }
 }
 
-/// Every parameter of the model, beside its truth where that is known.
-fn beside_truth(of: &Identify) -> Table {
-    let rows: Vec<summary::ParameterRow> = of
-        .model()
-        .parameters
-        .iter()
-        .map(|p| {
-            let unknown = p.verdict == Some(Verdict::NotIdentifiable);
-            summary::ParameterRow {
-                joint: p.joint.as_deref().unwrap_or(""),
-                name: &p.name,
-                theta: p.theta,
-                value: if unknown { f64::NAN } else { p.value },
-                std: p.std.filter(|_| !unknown).unwrap_or(f64::NAN),
-                unit: &p.unit,
-                verdict: p.verdict_word(),
-                truth: (of.truth)(p),
-            }
-        })
-        .collect();
-    summary::parameters("identified parameters", &rows)
-}
-
-/// What the pages of a campaign come from.
+/// The origin of the pages of a campaign.
 pub struct Origin<'a> {
     /// Text of the campaign file.
     pub campaign: &'a str,
@@ -180,7 +146,7 @@ pub struct Origin<'a> {
     pub command: &'a str,
 }
 
-/// What the logs show beside the model.
+/// The logs that stand beside the model.
 #[derive(Debug, Clone, Copy)]
 pub enum ShownLogs<'a> {
     /// There are no unseen logs, or they are too long to be held.
@@ -191,7 +157,7 @@ pub enum ShownLogs<'a> {
     Diagnosis(&'a ReplayedDiagnosis),
 }
 
-/// What a page has room for besides.
+/// Further parts of the page.
 pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Origin) {
     let (machine, found) = (of.machine, of.found);
     if let Some((laws, _)) = &found.friction {
@@ -201,19 +167,13 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Ori
              speeds that the logs cover, and the mean torque of their plateaus, which took no part \
              in the fit.",
         );
-        page.figures(&filter::figure(machine, laws).cells());
-    } else if let ShownLogs::Model(Replayed {
-        friction: rows,
-        logs,
-        ..
-    })
-    | ShownLogs::Diagnosis(ReplayedDiagnosis {
-        friction: rows,
-        logs,
-        ..
-    }) = shown
-    {
-        friction::section(page, machine, rows, logs);
+        page.figures(filter::figure(machine, laws).cells());
+    } else {
+        match shown {
+            ShownLogs::Nothing => {}
+            ShownLogs::Model(of) => friction::section(page, machine, &of.friction, &of.logs),
+            ShownLogs::Diagnosis(of) => friction::section(page, machine, &of.friction, &of.logs),
+        }
     }
     match (shown, of.diagnosed()) {
         (ShownLogs::Diagnosis(replayed), Some(diagnosed)) => {
@@ -221,19 +181,12 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Ori
         }
         (ShownLogs::Model(replayed), _) => {
             if let Some(validated) = &found.validated {
-                let errors = validated.judged().joints.iter();
-                let errors: Vec<f64> = errors.map(|joint| joint.relative_error).collect();
-                sketch::section(page, machine, replayed.poses.as_ref(), &errors);
+                let errors = validated.judged().joints.iter().map(|j| j.relative_error);
+                sketch::section(page, machine, replayed.poses.as_ref(), errors);
             }
-            torque::section(
-                page,
-                machine,
-                &replayed.torque,
-                &[torque::ONLY],
-                &of.title(),
-            );
-            let figure = residual::figure(machine, &replayed.residual);
-            residual::section(page, &figure);
+            let title = escaped(of.unseen);
+            torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
+            residual::section(page, machine, &replayed.residual);
         }
         _ => {}
     }
@@ -249,7 +202,7 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Ori
     });
     page.paragraph(&format!(
         "Standard deviation of the torque residual before the parallel filter, by joint: {}.",
-        noise.collect::<Vec<_>>().join(", ")
+        listed(noise)
     ));
     page.details("campaign file", origin.campaign);
 }

@@ -1,6 +1,7 @@
-//! The report of `inspect`: what logs hold and what is wrong with them.
+//! The report of `inspect`: the contents of logs and their faults.
 
-use crate::report::table::{Align, Table};
+use crate::report::table::{Align, Columns};
+use crate::report::words::listed;
 use crate::report::{Report, Writer};
 use cft_ident_core::number;
 use cft_ident_logs::inspect::{Findings, LogFault, RowCost, Severity};
@@ -12,20 +13,15 @@ pub fn inspect(logs: &[(String, Findings)], setup: &[Finding]) -> Report {
     let mut report = Report::new("Logs");
     for (name, found) in logs {
         let mut out = report.everywhere();
-        out.verdict(
-            &head(name, found, setup),
-            found.faults.is_empty() && setup.is_empty(),
-        );
+        let good = found.faults.is_empty() && setup.is_empty();
+        out.verdict(&head(name, found, setup), good);
         out.line("");
         if !found.faults.is_empty() {
             faults(&mut out, found);
             out.line("");
         }
-        out.table(channels(found));
-        if !found.joints.is_empty() {
-            out.line("");
-            out.table(joints(found));
-        }
+        channels(&mut out, found);
+        joints(&mut out, found);
         out.line("");
     }
     report
@@ -75,92 +71,60 @@ fn head(name: &str, found: &Findings, setup: &[Finding]) -> String {
     head
 }
 
-fn channels(found: &Findings) -> Table {
-    let mut table = Table::new(&[
-        ("channel", Align::Left),
-        ("from", Align::Decimal),
-        ("to", Align::Decimal),
-        ("unit", Align::Left),
-        ("step", Align::Decimal),
-        ("limits", Align::Left),
-    ]);
-    for channel in &found.channels {
-        let limits = channel.limits.map(|[low, high]| {
-            format!(
-                "{}..{}",
-                number::significant(low, 4),
-                number::significant(high, 4)
-            )
-        });
-        let absent = f64::NAN;
-        table.row([
-            escape(&channel.name),
-            number::significant(channel.min.unwrap_or(absent), 5),
-            number::significant(channel.max.unwrap_or(absent), 5),
-            channel.unit.clone().unwrap_or_default(),
-            channel
-                .step
-                .map(|step| number::significant(step, 3))
-                .unwrap_or_default(),
-            limits.unwrap_or_default(),
-        ]);
-    }
-    table
+fn channels(out: &mut Writer, found: &Findings) {
+    let limits = |[low, high]: [f64; 2]| {
+        format!(
+            "{}..{}",
+            number::significant(low, 4),
+            number::significant(high, 4)
+        )
+    };
+    let columns = Columns::new("", &found.channels)
+        .words("channel", |c| escape(&c.name))
+        .digits("from", 5, |c| c.min)
+        .digits("to", 5, |c| c.max)
+        .words("unit", |c| c.unit.as_deref().unwrap_or(""))
+        .numbers("step", |c| {
+            c.step
+                .map_or(String::new(), |step| number::significant(step, 3))
+        })
+        .words("limits", |c| c.limits.map_or(String::new(), limits));
+    out.table(columns);
 }
 
-fn joints(found: &Findings) -> Table {
-    let mut columns = vec![
-        ("joint", Align::Left),
-        ("moves", Align::Left),
-        ("travel", Align::Decimal),
-        ("speed", Align::Decimal),
-        ("acc.", Align::Decimal),
-        ("reversals", Align::Right),
-        ("moving", Align::Decimal),
-        ("condition", Align::Decimal),
-    ];
+fn joints(out: &mut Writer, found: &Findings) {
+    if found.joints.is_empty() {
+        return;
+    }
     let known = found.joints.iter().any(|joint| joint.unit.is_some());
-    if known {
-        columns.push(("unit", Align::Left));
-    }
-    let unit = match known {
-        true => "unit",
-        false => "unit of the log",
-    };
-    let mut table = Table::new(&columns).caption(&format!(
-        "motion: travel [{unit}], greatest speed [{unit}/s] and acceleration [{unit}/s^2]"
-    ));
-    for joint in &found.joints {
-        table.row([
-            escape(&joint.joint),
-            if joint.moves { "yes" } else { "no" }.to_owned(),
-            number::significant(joint.travel, 3),
-            number::significant(joint.speed_max, 3),
-            number::significant(joint.acceleration_max, 3),
-            joint.reversals.to_string(),
-            number::percent(joint.moving_share),
-            joint
-                .condition
-                .map(|condition| number::significant(condition, 3))
-                .unwrap_or_default(),
-            // Left off where there is no column for it.
-            joint.unit.clone().unwrap_or_default(),
-        ]);
-    }
-    table
+    let unit = if known { "unit" } else { "unit of the log" };
+    let caption =
+        format!("motion: travel [{unit}], greatest speed [{unit}/s] and acceleration [{unit}/s^2]");
+    let shown = |x: f64| number::significant(x, 3);
+    let columns = Columns::new(&caption, &found.joints)
+        .words("joint", |joint| escape(&joint.joint))
+        .words("moves", |joint| if joint.moves { "yes" } else { "no" })
+        .numbers("travel", |joint| shown(joint.travel))
+        .numbers("speed", |joint| shown(joint.speed_max))
+        .numbers("acc.", |joint| shown(joint.acceleration_max))
+        .column(Align::Right, "reversals", |joint| {
+            joint.reversals.to_string()
+        })
+        .percent("moving", |joint| joint.moving_share)
+        .numbers("condition", |joint| {
+            joint.condition.map_or(String::new(), shown)
+        })
+        .when(known, |t| {
+            t.words("unit", |joint| joint.unit.as_deref().unwrap_or(""))
+        });
+    out.table_apart(columns);
 }
 
 fn faults(out: &mut Writer, found: &Findings) {
     if !found.costs.is_empty() {
-        let causes: Vec<String> = found.costs.iter().map(RowCost::text).collect();
-        out.note(
-            "",
-            &format!(
-                "rows that a fit leaves out or bridges: {}",
-                causes.join(", ")
-            ),
-            2,
-        );
+        let causes = listed(found.costs.iter().map(RowCost::text));
+        let text = format!("rows that a fit leaves out or bridges: {causes}");
+        out.note("", &text, 2);
     }
     // One channel at several times, or several channels with the same words; notes of one kind.
     let alike = |a: &LogFault, b: &LogFault| {
@@ -187,8 +151,8 @@ fn faults(out: &mut Writer, found: &Findings) {
         let all: Vec<&LogFault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
         shown.push(fault);
         let channels = all.iter().filter_map(|fault| fault.channel.as_deref());
-        let channels = distinct(channels.map(escape).collect());
-        let spans = distinct(all.iter().map(|fault| fault.span()).collect());
+        let channels = distinct(channels.map(escape));
+        let spans = distinct(all.iter().map(|fault| fault.span()));
         let head = [fault.severity.word(), fault.kind.word(), &channels].join(" ");
         if shown.len() > 1 || !found.costs.is_empty() {
             out.line("");
@@ -200,7 +164,7 @@ fn faults(out: &mut Writer, found: &Findings) {
 }
 
 /// Each text once, in a line.
-fn distinct(texts: Vec<String>) -> String {
+fn distinct(texts: impl Iterator<Item = String>) -> String {
     let mut out: Vec<String> = Vec::new();
     for text in texts {
         if !out.contains(&text) {

@@ -2,21 +2,22 @@
 
 use super::first_screen;
 use super::quality_of_fit::{bodies, condition, consistent, fit_quality};
-use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
+use crate::report::figure::{ErrorFigure, JointBars};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
-use crate::report::table::{Align, Table};
+use crate::report::table::Columns;
+use crate::report::words::{escaped, listed};
 use crate::report::{Report, Writer, summary, usual};
 use cft_ident_core::number;
 use cft_ident_core::verdict::{IDENTIFIED, Verdict};
 use cft_ident_files::config::ModelFile;
-use cft_ident_logs::log::{Provenance, escape};
+use cft_ident_logs::log::Provenance;
 use cft_ident_stages::identify::{
     FrictionOfFit, Gain, IdentifiedDynamics, JointResidual, LoggedRobot, MotionFit,
 };
 use cft_ident_stages::replay::Replayed;
 
-/// What the report is made from.
+/// The parts of the report.
 pub struct Lsq<'a> {
     pub machine: &'a LoggedRobot,
     pub found: &'a IdentifiedDynamics,
@@ -35,8 +36,7 @@ const MAX_PARAMETERS_ON_SCREEN: usize = 8;
 
 /// The verdict, the residual of the fit, the parameters and the quality of the fit.
 pub fn lsq(of: &Lsq) -> Report {
-    let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
-    let mut report = Report::new(&format!("Least squares fit to {}", names.join(", ")));
+    let mut report = Report::new(&format!("Least squares fit to {}", escaped(of.logs)));
     let (text, good) = words(of);
     report.everywhere().verdict(&text, good);
     report.terminal().line("");
@@ -79,7 +79,7 @@ pub fn lsq(of: &Lsq) -> Report {
     if let Some(fit) = &of.found.by_motion {
         motion(&mut page, fit);
     }
-    page.figure(&bars(of).svg());
+    page.figure(bars(of).svg());
     let [logs, model] = [of.typed, of.path].map(first_screen::local);
     page.paragraph(&next(&logs, &model));
     residuals(&mut page, of.found, &all);
@@ -93,10 +93,7 @@ fn bars(of: &Lsq) -> ErrorFigure {
     let joints = moving.map(|joint| JointBars {
         joint: joint.joint.clone(),
         before: None,
-        after: ErrorBar {
-            error: joint.relative_error,
-            interval_95: None,
-        },
+        after: joint.relative_error.into(),
     });
     ErrorFigure {
         title: "Relative torque error on the fitted data".to_owned(),
@@ -107,7 +104,7 @@ fn bars(of: &Lsq) -> ErrorFigure {
     }
 }
 
-/// What a page has room for besides; `given` are the robot file and the model that gave the friction,
+/// Further parts of the page; `given` are the robot file and the model that gave the friction,
 /// `replayed` is absent where the logs are too long to be held.
 pub fn pictures(
     page: &mut Writer,
@@ -123,8 +120,7 @@ pub fn pictures(
         friction::section(page, machine, &replayed.friction, logs);
         let title = logs.join(", ");
         torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
-        let figure = residual::figure(machine, &replayed.residual);
-        residual::section(page, &figure);
+        residual::section(page, machine, &replayed.residual);
     }
     fit::section(page, of.found, of.file);
     quality::section(page, quality, &of.found.warnings);
@@ -133,7 +129,7 @@ pub fn pictures(
     provenance::section(page, file, &inputs, &[], summary, command);
 }
 
-/// What to do next with the model at a path that was fitted to these logs.
+/// The next step with the model at a path that was fitted to these logs.
 fn next(fitted: &str, path: &str) -> String {
     format!(
         "Next: `cft-ident validate LOG -m {path}` on a log that was not fitted, for this error is of the data that \
@@ -158,32 +154,25 @@ fn words(of: &Lsq) -> (String, bool) {
         ),
         None => format!("The fit leaves {rms} of the torque."),
     };
-    text += &super::validate::still(
-        of.found
-            .joints
-            .iter()
-            .filter(|j| !j.moves())
-            .map(|j| &*j.joint),
-    );
+    let resting = of.found.joints.iter().filter(|j| !j.moves());
+    text += &super::validate::still(resting.map(|j| &*j.joint));
     text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
     let useless = joints.iter().filter(|j| j.relative_error >= 1.0);
-    let useless: Vec<&str> = useless.map(|j| j.joint.as_str()).collect();
+    let useless = listed(useless.map(|j| j.joint.as_str()));
     let apart = far_off(of.found);
-    let good = useless.is_empty() && apart.is_none() && !unusual;
-    text += &match (useless.is_empty(), apart) {
-        (false, _) => format!(
-            " The model cannot be used for {}: no torque at all would be as near.",
-            useless.join(", ")
-        ),
-        (true, Some(apart)) => apart,
-        (true, None) if unusual => {
-            " That is more than usual: look at what the model lacks before it is used.".to_owned()
-        }
-        (true, None) => " The model can be used for motions like these.".to_owned(),
+    let good = useless.is_empty() && apart.is_empty() && !unusual;
+    text += &if !useless.is_empty() {
+        format!(" The model cannot be used for {useless}: no torque at all would be as near.")
+    } else if !apart.is_empty() {
+        apart
+    } else if unusual {
+        " That is more than usual: look at what the model lacks before it is used.".to_owned()
+    } else {
+        " The model can be used for motions like these.".to_owned()
     };
-    let open = of.found.unknowns.iter();
-    let open = open
-        .filter(|u| matches!(u.verdict, Verdict::NotIdentifiable))
+    let unknowns = of.found.unknowns.iter();
+    let open = unknowns
+        .filter(|u| u.verdict == Verdict::NotIdentifiable)
         .count();
     if open > 0 {
         text += &format!(
@@ -198,8 +187,8 @@ fn words(of: &Lsq) -> (String, bool) {
 const OUTLYING_RATIO: f64 = 3.0;
 const OUTLYING_ERROR: f64 = 0.05;
 
-/// Joints whose error is far above those of the others, as a sentence.
-fn far_off(found: &IdentifiedDynamics) -> Option<String> {
+/// Joints whose error is far above those of the others, a sentence each.
+fn far_off(found: &IdentifiedDynamics) -> String {
     let error = |j: usize| found.joints[j].relative_error;
     let moving = || (0..found.joints.len()).filter(|j| found.joints[*j].moves());
     let median = |without: usize| {
@@ -208,7 +197,7 @@ fn far_off(found: &IdentifiedDynamics) -> Option<String> {
         errors.sort_by(f64::total_cmp);
         errors.get(errors.len() / 2).copied()
     };
-    let far = moving().filter_map(|j| {
+    let sentence = |j: usize| {
         let median = median(j)?;
         (error(j) > OUTLYING_ERROR && error(j) > OUTLYING_RATIO * median).then(|| {
             format!(
@@ -218,38 +207,29 @@ fn far_off(found: &IdentifiedDynamics) -> Option<String> {
                 number::percent(median)
             )
         })
-    });
-    Some(far.collect::<String>()).filter(|text| !text.is_empty())
+    };
+    moving().filter_map(sentence).collect()
 }
 
 /// The residual of the fit, of these joints.
 pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics, joints: &[usize]) {
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("relative error", Align::Decimal),
-        ("residual rms", Align::Decimal),
-        ("torque rms", Align::Decimal),
-        ("unit", Align::Left),
-    ])
-    .caption("residual of the fit, on the logs that were fitted");
-    for &j in joints {
-        let (joint, rms) = (&found.joints[j], &found.fit.torque_rms[j]);
-        let torque = |v: f64| number::significant(v, 3);
-        table.row([
-            joint.joint.as_str(),
-            &number::percent(joint.relative_error),
-            &torque(joint.rmse),
-            &match joint.moves() {
-                true => torque(*rms),
-                false => number::ABSENT.to_owned(),
-            },
-            joint.unit,
-        ]);
-    }
-    writer.table(table);
+    let torque = |v: f64| number::significant(v, 3);
+    let rows = joints.iter();
+    let rows = rows.map(|&j| (&found.joints[j], found.fit.torque_rms[j]));
+    let caption = "residual of the fit, on the logs that were fitted";
+    let columns = Columns::new(caption, rows)
+        .words("joint", |(joint, _)| &joint.joint)
+        .percent("relative error", |(joint, _)| joint.relative_error)
+        .numbers("residual rms", |(joint, _)| torque(joint.rmse))
+        .numbers("torque rms", |(joint, rms)| match joint.moves() {
+            true => torque(rms),
+            false => number::ABSENT.to_owned(),
+        })
+        .words("unit", |(joint, _)| joint.unit);
+    writer.table(columns);
 }
 
-/// The fit to the motion: what it added, and by how much simulated positions are off before and after.
+/// The fit to the motion: the friction that it added, and errors of simulated positions before and after.
 fn motion(writer: &mut Writer, fit: &MotionFit) {
     writer.line("");
     let chosen = match fit.window_given {
@@ -260,41 +240,32 @@ fn motion(writer: &mut Writer, fit: &MotionFit) {
         "Fitted to the motion that the torques of {} make in windows of {} s{chosen}.",
         fit.joint, fit.window_s
     ));
-    let mut table = Table::new(&[
-        ("rms error of simulated positions", Align::Left),
-        ("least squares", Align::Decimal),
-        ("fit to the motion", Align::Decimal),
-        ("unit", Align::Left),
-    ]);
     let (before, after) = (&fit.before, &fit.after);
-    let blocks = "blocks set aside, from begin to end".to_owned();
     let windows = format!("windows of {} s", fit.window_s);
-    for (what, from, to) in [
-        (windows, before.windows, after.windows),
-        (blocks, before.blocks, after.blocks),
-    ] {
-        let [from, to] = [from, to].map(|x| number::significant(x, 3));
-        table.row([what.as_str(), &from, &to, fit.unit]);
-    }
-    writer.table(table);
+    let blocks = "blocks set aside, from begin to end";
+    let rows = [
+        (&*windows, [before.windows, after.windows]),
+        (blocks, [before.blocks, after.blocks]),
+    ];
+    let columns = Columns::new("", &rows)
+        .words("rms error of simulated positions", |(name, _)| *name)
+        .digits("least squares", 3, |(_, errors)| errors[0])
+        .digits("fit to the motion", 3, |(_, errors)| errors[1])
+        .words("unit", |_| fit.unit);
+    writer.table(columns);
     if !fit.taken {
         writer.paragraph("It runs no better than least squares, which stands in the model.");
     }
     let added = fit.effects.iter().flat_map(|effect| {
         let numbers = effect.parameters.iter().filter(|(_, p)| !p.bound);
         numbers.map(move |(key, p)| {
-            [
-                effect.name.as_str(),
-                key,
-                &with_deviation(p.value, p.std),
-                &p.unit,
-            ]
-            .join(" ")
+            let value = with_deviation(p.value, p.std);
+            format!("{} {key} {value} {}", effect.name, p.unit)
         })
     });
-    let added: Vec<String> = added.collect();
+    let added = listed(added);
     if !added.is_empty() {
-        writer.paragraph(&format!("Friction that was added: {}.", added.join(", ")));
+        writer.paragraph(&format!("Friction that was added: {added}."));
     }
 }
 
@@ -311,98 +282,70 @@ fn gains(writer: &mut Writer, gains: &[Gain]) {
     if gains.is_empty() {
         return;
     }
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("gain", Align::Decimal),
-        ("std", Align::Decimal),
-        ("unit", Align::Left),
-        ("verdict", Align::Left),
-    ])
-    .caption("gains of the torque channels");
-    for gain in gains {
-        let (value, std) = number::value_and_std(gain.value, gain.std);
-        let verdict = gain.verdict.word();
-        table.row([&gain.joint, &value, &std, &gain.unit, verdict]);
-    }
-    writer.table(table);
+    let columns = Columns::new("gains of the torque channels", gains)
+        .words("joint", |gain| &gain.joint)
+        .estimates(["gain", "std"], |gain| (gain.value, gain.std))
+        .words("unit", |gain| &gain.unit)
+        .words("verdict", |gain| gain.verdict.word());
+    writer.table(columns);
     writer.line("");
 }
 
-/// The friction that was known before, and what the fit made of it: the shift in deviations of before.
+/// The friction that was known before, and its shift by the fit in deviations of before.
 fn known_friction(writer: &mut Writer, friction: &[FrictionOfFit]) {
-    let moved = |joint: &&FrictionOfFit| joint.parameters.values().any(|p| !p.held);
-    if !friction.iter().any(|joint| moved(&joint)) {
+    let moved = friction.iter();
+    let moved = moved.filter(|joint| joint.parameters.values().any(|p| !p.held));
+    let rows = moved.flat_map(|of| of.parameters.iter().map(|(name, p)| (&of.joint, name, p)));
+    let rows: Vec<_> = rows.collect();
+    if rows.is_empty() {
         return;
     }
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("parameter", Align::Left),
-        ("value", Align::Decimal),
-        ("std", Align::Decimal),
-        ("before", Align::Decimal),
-        ("std before", Align::Decimal),
-        ("shift", Align::Decimal),
-        ("unit", Align::Left),
-    ])
-    .caption("friction refined with the inertias; the shift is in deviations of before");
-    for joint in friction.iter().filter(moved) {
-        for (name, p) in &joint.parameters {
-            let pair = |value: f64, std: Option<f64>| match std {
-                Some(std) => number::value_and_std(value, std),
-                None => (number::significant(value, 4), String::new()),
-            };
-            let (value, std) = pair(p.value, p.std);
-            let (before, std_before) = pair(p.prior, p.prior_std);
-            let shift = match (p.held, p.prior_std) {
-                (true, _) => "held".to_owned(),
-                (false, Some(std)) => format!("{:+.1}", (p.value - p.prior) / std),
-                (false, None) => String::new(),
-            };
-            table.row([
-                joint.joint.as_str(),
-                name.as_str(),
-                value.as_str(),
-                std.as_str(),
-                before.as_str(),
-                std_before.as_str(),
-                shift.as_str(),
-                p.unit.as_str(),
-            ]);
-        }
-    }
-    writer.line("");
-    writer.table(table);
+    let pair = |value: f64, std: Option<f64>| match std {
+        Some(std) => number::value_and_std(value, std),
+        None => (number::significant(value, 4), String::new()),
+    };
+    let caption = "friction refined with the inertias; the shift is in deviations of before";
+    let columns = Columns::new(caption, &rows)
+        .words("joint", |(joint, ..)| *joint)
+        .words("parameter", |(_, name, _)| *name)
+        .pair(["value", "std"], |(.., p)| pair(p.value, p.std))
+        .pair(["before", "std before"], |(.., p)| {
+            pair(p.prior, p.prior_std)
+        })
+        .numbers("shift", |(.., p)| match (p.held, p.prior_std) {
+            (true, _) => "held".to_owned(),
+            (false, Some(std)) => format!("{:+.1}", (p.value - p.prior) / std),
+            (false, None) => String::new(),
+        })
+        .words("unit", |(.., p)| &p.unit);
+    writer.table_apart(columns);
 }
 
 /// The parameters for a terminal.
 fn fitted(terminal: &mut Writer, found: &IdentifiedDynamics) {
-    let rows: Vec<summary::ParameterRow> = found
-        .unknowns
-        .iter()
-        .map(|u| summary::ParameterRow {
-            joint: u.joint.as_deref().unwrap_or(""),
-            name: &u.key,
-            theta: None,
-            value: u.value.unwrap_or(f64::NAN),
-            std: u.std.unwrap_or(f64::NAN),
-            unit: &u.unit,
-            verdict: if u.negligible && u.fitted_relative_std() > IDENTIFIED {
-                "negligible"
-            } else {
-                u.verdict.word()
-            },
-            truth: None,
+    let unknowns = &found.unknowns;
+    let columns = Columns::new("parameters", unknowns)
+        .when(unknowns.iter().any(|u| u.joint.is_some()), |t| {
+            t.words("joint", |u| u.joint.as_deref().unwrap_or(""))
         })
-        .collect();
-    terminal.table(summary::parameters("parameters", &rows));
+        .words("parameter", |u| &u.key)
+        .estimates(["value", "std"], |u| (u.value, u.std))
+        .words("unit", |u| &u.unit)
+        .words("verdict", |u| {
+            match u.negligible && u.fitted_relative_std() > IDENTIFIED {
+                true => "negligible",
+                false => u.verdict.word(),
+            }
+        });
+    terminal.table(columns);
 }
 
-/// What the short names of base parameters stand for; nothing where they are names already.
+/// The combinations that the short names of base parameters stand for; nothing where they are names already.
 fn groupings(terminal: &mut Writer, found: &IdentifiedDynamics) {
-    let grouped = || found.unknowns.iter().filter(|u| u.name != u.key);
-    if grouped().next().is_some() {
+    let mut grouped = found.unknowns.iter().filter(|u| u.name != u.key).peekable();
+    if grouped.peek().is_some() {
         terminal.line("");
         terminal.line("parameters that stand for combinations");
-        terminal.list(grouped().map(|u| &u.name));
+        terminal.list(grouped.map(|u| &u.name));
     }
 }

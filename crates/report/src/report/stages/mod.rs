@@ -1,5 +1,5 @@
-//! The reports, one file per stage: the verdict comes first, in words and one table; what it stands on
-//! follows; where it came from ends the page.
+//! The reports, one file per stage: the verdict comes first, in words and one table; its grounds follow, and the origin
+//! of the page ends it.
 
 pub mod compare;
 pub mod diagnose;

@@ -1,7 +1,8 @@
-//! How good a fit is: its condition, what it left open, how its estimator went, and links that can exist.
+//! How good a fit is: its condition, open directions, how its estimator went, and links that can exist.
 
-use crate::report::Writer;
-use crate::report::table::{Align, Table, unbroken};
+use crate::report::table::{Columns, Table, unbroken};
+use crate::report::words::listed;
+use crate::report::{Writer, words};
 use cft_ident_core::math::descent::Ending;
 use cft_ident_core::number;
 use cft_ident_core::verdict::{Verdict, WEAK};
@@ -10,11 +11,10 @@ use cft_ident_stages::identify::{Account, ConsistentLinks, IdentifiedDynamics, J
 /// Condition, rank and effective sample size of the fit.
 pub(super) fn condition(terminal: &mut Writer, found: &IdentifiedDynamics) {
     let fit = &found.fit;
-    let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
     terminal.paragraph(&format!(
         "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, effective sample size {:.0}",
-        condition(fit.condition.raw),
-        condition(fit.condition.normalised),
+        words::condition(fit.condition.raw),
+        words::condition(fit.condition.normalised),
         fit.rank,
         found.unknowns.len(),
         fit.rows,
@@ -29,61 +29,47 @@ pub(super) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
     account(terminal, &found.account);
     let alone = found.essential.joints.iter();
     let alone = alone.map(|e| {
-        unbroken(&format!(
-            "{} {}",
-            e.joint,
-            number::percent(e.relative_error)
-        ))
+        let error = number::percent(e.relative_error);
+        unbroken(&format!("{} {error}", e.joint))
     });
     terminal.paragraph(&format!(
         "{} of {} parameters are significant (F test, 1 %); residual with them alone: {}",
         found.essential.count,
         found.unknowns.len(),
-        alone.collect::<Vec<_>>().join(", ")
+        listed(alone)
     ));
 }
 
-/// The position cut-offs that were found, and what they leave of friction's errors at reversals.
+/// The position cut-offs that were found, and the error of friction that they leave at reversals.
 fn cutoffs(terminal: &mut Writer, found: &IdentifiedDynamics) {
     let found = found.position_cutoffs.iter().filter(|c| !c.declared);
-    let found: Vec<String> = found
-        .map(|c| {
-            let (hz, off) = (c.cutoff_hz, c.smear.hypot(c.noise));
-            unbroken(&format!(
-                "{} {} Hz ({} {})",
-                c.joint,
-                number::significant(hz, 3),
-                number::significant(off, 2),
-                c.unit
-            ))
-        })
-        .collect();
+    let found = listed(found.map(|c| {
+        let hz = number::significant(c.cutoff_hz, 3);
+        let off = number::significant(c.smear.hypot(c.noise), 2);
+        unbroken(&format!("{} {hz} Hz ({off} {})", c.joint, c.unit))
+    }));
     if !found.is_empty() {
         terminal.paragraph(&format!(
-            "position cut-offs found from the logs, and the error of friction that is left at reversals: {}",
-            found.join(", ")
+            "position cut-offs found from the logs, and the error of friction that is left at reversals: {found}"
         ));
     }
 }
 
-/// What rank and verdicts say together, where a parameter is called not identifiable: that the
-/// motion does not excite it, or that the noise is larger than its torque.
+/// Why parameters are called not identifiable: the motion does not excite them, or the noise is larger than their torque.
 fn open_directions(terminal: &mut Writer, found: &IdentifiedDynamics) {
     let unknowns = found.unknowns.iter();
-    let open = unknowns.filter(|u| u.verdict == Verdict::NotIdentifiable);
-    let all = open.count();
-    if all == 0 {
+    let open = unknowns
+        .filter(|u| u.verdict == Verdict::NotIdentifiable)
+        .count();
+    if open == 0 {
         return;
     }
-    let missing = found.unknowns.len().saturating_sub(found.fit.rank);
+    let all = found.unknowns.len();
     let noise = format!("a standard deviation above {:.0} %", 100.0 * WEAK);
-    terminal.paragraph(&match missing {
-        0 => format!(
-            "all {} base parameters are excited; {all} have {noise}",
-            found.unknowns.len()
-        ),
-        _ => format!(
-            "{missing} combinations of parameters are not excited; the {all} not-identifiable are in these, or \
+    terminal.paragraph(&match all.saturating_sub(found.fit.rank) {
+        0 => format!("all {all} base parameters are excited; {open} have {noise}"),
+        missing => format!(
+            "{missing} combinations of parameters are not excited; the {open} not-identifiable are in these, or \
              have {noise}"
         ),
     });
@@ -96,19 +82,19 @@ fn account(terminal: &mut Writer, account: &Account) {
         Ending::IterationLimit => "stopped at the limit of iterations",
         Ending::Diverged => "diverged",
     };
-    if account.iterations > 1 {
+    let passes = account.iterations;
+    if passes > 1 {
+        let estimator = account.estimator.name();
         terminal.line(&format!(
-            "{}: {ended} after {} passes over the logs",
-            account.estimator.name(),
-            account.iterations
+            "{estimator}: {ended} after {passes} passes over the logs"
         ));
     }
     let each = |shown: &dyn Fn(&JointAccount) -> Option<String>| {
         let joints = account.joints.iter();
-        let words = joints.filter_map(|of| Some(format!("{} {}", of.joint, shown(of)?)));
-        Some(words.collect::<Vec<_>>().join(", ")).filter(|words| !words.is_empty())
+        listed(joints.filter_map(|of| Some(format!("{} {}", of.joint, shown(of)?))))
     };
-    if let Some(shares) = each(&|of| of.down_weighted.map(number::percent)) {
+    let shares = each(&|of| of.down_weighted.map(number::percent));
+    if !shares.is_empty() {
         terminal.line(&format!("rows of less than half weight: {shares}"));
     }
     if let Some(simulated) = &account.simulated {
@@ -117,41 +103,39 @@ fn account(terminal: &mut Writer, account: &Account) {
             Some(format!("{k} and {d}"))
         });
         terminal.line(&format!(
-            "simulated in closed loop at {} rad/s, gains on position and velocity: {}",
+            "simulated in closed loop at {} rad/s, gains on position and velocity: {gains}",
             number::significant(simulated.loop_frequency, 3),
-            gains.unwrap_or_default()
         ));
     }
-    if let Some(errors) = each(&|of| of.relative_error_before.map(number::percent)) {
+    let errors = each(&|of| of.relative_error_before.map(number::percent));
+    if !errors.is_empty() {
         terminal.line(&format!("residual before the refinement: {errors}"));
     }
 }
 
 /// Links that can exist.
 pub(super) fn bodies(found: &ConsistentLinks) -> Table {
-    let numbers = ["mass", "x", "y", "z", "Ixx", "Iyy", "Izz"].map(|name| (name, Align::Decimal));
-    let mut columns = vec![("link", Align::Left)];
-    columns.extend(numbers);
-    let mut table = Table::new(&columns)
-        .caption("links that can exist: kg, centre of gravity in m, moments about it in kg m^2");
-    for link in &found.links {
-        let [xx, _, _, yy, _, zz] = link.inertia;
-        let mut row = vec![link.name.clone(), number::significant(link.mass, 4)];
-        row.extend(link.centre.map(|x| number::significant(x, 3)));
-        row.extend([xx, yy, zz].map(|x| number::significant(x, 3)));
-        table.row(row);
+    let caption = "links that can exist: kg, centre of gravity in m, moments about it in kg m^2";
+    let mut columns = Columns::new(caption, &found.links)
+        .words("link", |link| &link.name)
+        .digits("mass", 4, |link| link.mass);
+    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
+        columns = columns.digits(name, 3, |link| link.centre[k]);
     }
-    table
+    for (k, name) in [(0, "Ixx"), (3, "Iyy"), (5, "Izz")] {
+        columns = columns.digits(name, 3, |link| link.inertia[k]);
+    }
+    columns.into()
 }
 
 /// Drives that can exist, and by how much the fit suffers from links that can.
 pub(super) fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
     let drives = found.drives.iter();
-    let drives: Vec<String> = drives
-        .map(|drive| format!("{} {}", drive.joint, number::significant(drive.inertia, 3)))
-        .collect();
+    let drives =
+        drives.map(|drive| format!("{} {}", drive.joint, number::significant(drive.inertia, 3)));
+    let drives = listed(drives);
     if !drives.is_empty() {
-        terminal.line(&format!("drive inertias: {}", drives.join(", ")));
+        terminal.line(&format!("drive inertias: {drives}"));
     }
     let both = found.relative_error_before.iter();
     let both = both.zip(&found.relative_error_after);
@@ -159,9 +143,8 @@ pub(super) fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
         let [from, to] = [before, after].map(|e| number::percent(e.relative_error));
         unbroken(&format!("{} {from} to {to}", before.joint))
     });
-    let change: Vec<String> = change.collect();
     terminal.paragraph(&format!(
         "what consistency costs the fit: {}",
-        change.join(", ")
+        listed(change)
     ));
 }

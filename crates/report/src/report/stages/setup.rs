@@ -1,4 +1,4 @@
-//! What the check of a set-up found, for every report.
+//! The findings of the check of a set-up, for every report.
 
 use crate::report::Writer;
 use cft_ident_stages::setup::{FindingSeverity, SetupReport};
@@ -22,16 +22,10 @@ pub fn section(out: &mut Writer, report: &SetupReport) {
         if !finding.remedy.is_empty() {
             out.note("    ", &format!("-> write {}", finding.remedy), 4);
         }
-        for tie in finding
-            .tied_with
-            .iter()
-            .filter(|tie| !tie.remedy.is_empty())
-        {
-            out.note(
-                "    ",
-                &format!("-> or, by these data as well: {}", tie.remedy),
-                4,
-            );
+        let ties = finding.tied_with.iter().map(|tie| &tie.remedy);
+        for remedy in ties.filter(|remedy| !remedy.is_empty()) {
+            let text = format!("-> or, by these data as well: {remedy}");
+            out.note("    ", &text, 4);
         }
     }
     for power in &report.friction_power {

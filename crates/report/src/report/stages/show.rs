@@ -1,25 +1,27 @@
 //! The report of `show`: a model file as a person wants to know it.
 
 use crate::report::sections::parameters;
-use crate::report::table::{Align, Table};
+use crate::report::table::Columns;
+use crate::report::words::listed;
 use crate::report::{Report, Writer};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::escape;
 use cft_ident_stages::identify::{BANDWIDTH_HZ, JointInUse, LoggedRobot};
 
-/// What the report is made from.
+/// The parts of the report.
 pub struct Show<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
     pub model: &'a AugmentedModel,
-    /// What the errors mean in use, and the point that forces are reported at.
+    /// The errors in use, and the point at which forces are reported.
     pub in_use: Option<&'a (Vec<JointInUse>, String)>,
 }
 
-/// The model, first what its error means.
+/// The model, first its error in use.
 pub fn show(of: &Show) -> Report {
     let name = escape(&of.machine.name);
     let mut report = Report::new(&format!("Model {name}"));
@@ -28,8 +30,8 @@ pub fn show(of: &Show) -> Report {
     report.terminal().line("");
     let mut all = report.everywhere();
     if let Some((joints, point)) = of.in_use {
-        all.table(uses(joints, point));
-        all.table(range(joints));
+        uses(&mut all, joints, point);
+        range(&mut all, joints);
     }
     parameters_table(&mut report.terminal(), of.file);
     parameters::section(&mut report.page(), of.file, &|_| None);
@@ -45,20 +47,18 @@ fn verdict(of: &Show) -> (String, bool) {
     let (tally, good) = parameters::tally(of.file);
     let kind = of.file.robot.robot.model.name();
     let mut text = format!(
-        "{kind} robot, {} joint{}: {}. ",
+        "{kind} robot, {} joint{}: {}. {tally}.",
         joints.len(),
         if joints.len() == 1 { "" } else { "s" },
         escape(&joints.join(", "))
     );
-    text += &format!("{tally}.");
     text += match of.file.is_consistent() {
         true => " Torques are computed with physically consistent parameters beside the plain fit.",
         false => " It holds the plain fit alone.",
     };
     let hidden = of.in_use.and_then(|(joints, point)| {
-        let forces = joints
-            .iter()
-            .filter_map(|j| Some((j.hidden_force_n?, &j.joint)));
+        let forces = joints.iter();
+        let forces = forces.filter_map(|j| Some((j.hidden_force_n?, &j.joint)));
         let (force, joint) = forces.min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(format!(
             " The smallest force at the {} that it can show is {} N, by {joint}.",
@@ -72,91 +72,53 @@ fn verdict(of: &Show) -> (String, bool) {
     (text, good && of.in_use.is_some())
 }
 
-/// What the error means in use.
-fn uses(joints: &[JointInUse], point: &str) -> Table {
+/// The error in use.
+fn uses(to: &mut Writer, joints: &[JointInUse], point: &str) {
     let caption = format!(
         "what the error means: 95 % band of the torque, the force at the {} that it hides, and the lag that \
          feed-forward leaves to a position loop of {BANDWIDTH_HZ} Hz",
         escape(point)
     );
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("band +-", Align::Decimal),
-        ("of torque", Align::Decimal),
-        ("unit", Align::Left),
-        ("hides [N]", Align::Decimal),
-        ("lag", Align::Decimal),
-        ("of", Align::Left),
-    ])
-    .caption(&caption);
-    let shown = |x: Option<f64>, digits| {
-        x.map_or(number::ABSENT.to_owned(), |x| {
-            number::significant(x, digits)
-        })
-    };
-    for j in joints {
-        table.row([
-            j.joint.as_str(),
-            &number::significant(j.half_width_95, 3),
-            &number::percent(j.half_width_95 / j.torque_seen),
-            &j.unit,
-            &shown(j.hidden_force_n, 2),
-            &shown(j.lag.map(|lag| 1e3 * lag), 2),
-            if j.position_unit == "m" { "mm" } else { "mrad" },
-        ]);
-    }
-    table
+    let columns = Columns::new(&caption, joints)
+        .words("joint", |j| &j.joint)
+        .digits("band +-", 3, |j| j.half_width_95)
+        .percent("of torque", |j| j.half_width_95 / j.torque_seen)
+        .words("unit", |j| &j.unit)
+        .digits("hides [N]", 2, |j| j.hidden_force_n)
+        .digits("lag", 2, |j| j.lag.map(|lag| 1e3 * lag))
+        .words("of", |j| if j.position_unit == "m" { "mm" } else { "mrad" });
+    to.table(columns);
 }
 
-/// For what motion it holds.
-fn range(joints: &[JointInUse]) -> Table {
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("from", Align::Decimal),
-        ("to", Align::Decimal),
-        ("unit", Align::Left),
-        ("speed up to", Align::Decimal),
-        ("torque up to", Align::Decimal),
-    ])
-    .caption("holds for motions like those of its logs: beyond these ranges its band is a guess");
-    for j in joints {
-        let [low, high] = j.positions_seen;
-        table.row([
-            j.joint.as_str(),
-            &number::significant(low, 3),
-            &number::significant(high, 3),
-            &j.position_unit,
-            &number::significant(j.speed_seen, 3),
-            &format!("{} {}", number::significant(j.torque_seen, 3), j.unit),
-        ]);
-    }
-    table
+/// For which motion it holds.
+fn range(to: &mut Writer, joints: &[JointInUse]) {
+    let shown = |x: f64| number::significant(x, 3);
+    let caption =
+        "holds for motions like those of its logs: beyond these ranges its band is a guess";
+    let columns = Columns::new(caption, joints)
+        .words("joint", |j| &j.joint)
+        .numbers("from", |j| shown(j.positions_seen[0]))
+        .numbers("to", |j| shown(j.positions_seen[1]))
+        .words("unit", |j| &j.position_unit)
+        .numbers("speed up to", |j| shown(j.speed_seen))
+        .numbers("torque up to", |j| {
+            format!("{} {}", shown(j.torque_seen), j.unit)
+        });
+    to.table(columns);
 }
 
-/// Every parameter with its interval and what is in use of it.
+/// Every parameter with its deviation and its value in use.
 fn parameters_table(terminal: &mut Writer, file: &ModelFile) {
-    let consistent = file.is_consistent();
-    let mut columns = vec![
-        ("parameter", Align::Left),
-        ("value", Align::Decimal),
-        ("std", Align::Decimal),
-    ];
-    if consistent {
-        columns.push(("in use", Align::Decimal));
-    }
-    columns.extend([("unit", Align::Left), ("verdict", Align::Left)]);
-    let mut table = Table::new(&columns).caption("parameters");
-    for p in &file.parameters {
-        let (value, std) = number::value_and_std(p.value, p.std.unwrap_or(f64::NAN));
-        let mut row = vec![escape(&p.key()), value, std];
-        if consistent {
-            row.push(number::value_and_std(p.in_use(), p.std.unwrap_or(f64::NAN)).0);
-        }
-        row.extend([p.unit.clone(), p.verdict_word().to_owned()]);
-        table.row(row);
-    }
-    terminal.line("");
-    terminal.table(table);
+    let columns = Columns::new("parameters", &file.parameters)
+        .words("parameter", |p| escape(&p.key()))
+        .estimates(["value", "std"], |p| (p.value, p.std))
+        .when(file.is_consistent(), |t| {
+            let std = |p: &Parameter| p.std.unwrap_or(f64::NAN);
+            t.numbers("in use", |p| number::value_and_std(p.in_use(), std(p)).0)
+        })
+        .words("unit", |p| &p.unit)
+        .words("verdict", |p| p.verdict_word());
+    terminal.table_apart(columns);
 }
 
 /// Characters of a curve, from low to high.
@@ -167,36 +129,28 @@ const STEPS: i32 = 12;
 /// The declared friction of each joint over the speeds seen, as a row of characters.
 fn friction(to: &mut Writer, of: &Show) {
     let Some((joints, _)) = of.in_use else { return };
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("friction over speed", Align::Left),
-        ("at -", Align::Decimal),
-        ("at +", Align::Decimal),
-        ("unit", Align::Left),
-    ])
-    .caption("friction from the greatest speed backwards to the greatest forwards");
-    let mut any = false;
-    for (joint, law) in joints.iter().zip(&of.model.model.friction) {
-        if *law == JointFriction::None {
-            continue;
-        }
-        any = true;
+    let laws = joints.iter().zip(&of.model.model.friction);
+    let laws = laws.filter(|(_, law)| **law != JointFriction::None);
+    let rows = laws.map(|(joint, law)| {
         let speeds = (-STEPS..=STEPS).map(|k| joint.speed_seen * f64::from(k) / f64::from(STEPS));
         let values: Vec<f64> = speeds.map(|v| law.torque(v)).collect();
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let room = (high - low).max(f64::MIN_POSITIVE);
-        let curve: String = values
-            .iter()
-            .map(|x| HEIGHTS[((x - low) / room * 7.0).round().clamp(0.0, 7.0) as usize])
-            .collect();
+        let height = |x: &f64| HEIGHTS[((x - low) / room * 7.0).round().clamp(0.0, 7.0) as usize];
         let ends = [values.first(), values.last()];
-        let [first, last] = ends.map(|x| number::significant(x.copied().unwrap_or(0.0), 3));
-        table.row([joint.joint.as_str(), &curve, &first, &last, &joint.unit]);
-    }
-    if any {
-        to.table(table);
-    }
+        let ends = ends.map(|x| number::significant(x.copied().unwrap_or(0.0), 3));
+        (joint, values.iter().map(height).collect::<String>(), ends)
+    });
+    let rows: Vec<_> = rows.collect();
+    let caption = "friction from the greatest speed backwards to the greatest forwards";
+    let columns = Columns::new(caption, &rows)
+        .words("joint", |(joint, ..)| &joint.joint)
+        .words("friction over speed", |(_, curve, _)| curve)
+        .numbers("at -", |(.., ends)| &ends[0])
+        .numbers("at +", |(.., ends)| &ends[1])
+        .words("unit", |(joint, ..)| &joint.unit);
+    to.table_if_any(columns);
 }
 
 fn effects(terminal: &mut Writer, of: &Show) {
@@ -212,14 +166,17 @@ fn effects(terminal: &mut Writer, of: &Show) {
     }
 }
 
-/// What it was fitted on.
+/// The logs on which it was fitted.
 fn made_from(to: &mut Writer, file: &ModelFile) {
     let made = &file.provenance;
     let inputs = made.inputs.iter().map(|input| {
         let span = input.span.as_ref().map(|span| format!("@{span}"));
         format!("{}{}", escape(&input.name), span.unwrap_or_default())
     });
-    let inputs: Vec<String> = inputs.collect();
+    let inputs = match made.inputs.is_empty() {
+        true => "no log".to_owned(),
+        false => listed(inputs),
+    };
     let command = match made.command.as_str() {
         "" => "by hand".to_owned(),
         command => format!(
@@ -228,11 +185,5 @@ fn made_from(to: &mut Writer, file: &ModelFile) {
             escape(&made.version)
         ),
     };
-    to.paragraph(&format!(
-        "Made {command} from {}.",
-        match inputs.is_empty() {
-            true => "no log".to_owned(),
-            false => inputs.join(", "),
-        }
-    ));
+    to.paragraph(&format!("Made {command} from {inputs}."));
 }

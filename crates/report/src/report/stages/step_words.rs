@@ -1,12 +1,12 @@
-//! What is said of one effect that was found.
+//! One effect that was found, in words.
 
+use crate::report::words::{listed, scaled};
 use cft_ident_core::diagnose::{FoundEffect, StepStatus};
 use cft_ident_core::effect::Added;
 use cft_ident_core::number;
 use cft_ident_stages::identify::{LoggedRobot, numbers_of};
 
-/// The joints that an effect makes worse on held-out data, with the change of their errors; nothing where there is
-/// none.
+/// The joints that an effect makes worse on held-out data, with the change of their errors.
 pub(super) fn worsened(step: &FoundEffect) -> String {
     let joints = step.joints.iter().filter(|j| j.worsened).map(|j| {
         let [low, high] = j.interval_95.map(|x| format!("{:+.2}", 100.0 * x));
@@ -16,10 +16,9 @@ pub(super) fn worsened(step: &FoundEffect) -> String {
             j.joint,
         )
     });
-    let joints: Vec<String> = joints.collect();
-    match joints.is_empty() {
-        true => String::new(),
-        false => format!("; worse on {}", joints.join(", ")),
+    match listed(joints).as_str() {
+        "" => String::new(),
+        joints => format!("; worse on {joints}"),
     }
 }
 
@@ -58,24 +57,16 @@ pub(super) fn agreement(step: &FoundEffect) -> String {
     }
 }
 
-/// What an effect is called where it was found.
+/// The name of an effect where it was found.
 pub(super) fn titled(machine: &LoggedRobot, effect: &Added) -> String {
     let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
     effect.said_and_named(&machine.robot, unit)
 }
 
-/// A p-value in words.
-pub(super) fn chance(p: f64) -> String {
-    format!("p = {p:.3}")
-}
-
 /// Estimated parameters of an effect in words: `order = 14.0 1/m, ..`.
 pub(super) fn in_words(machine: &LoggedRobot, step: &FoundEffect) -> String {
     let words = numbers_of(machine, step).into_iter().map(|t| {
-        let (scale, unit) = match t.unit == "m" && t.value.abs() < number::MILLIMETRES {
-            true => (1e3, "mm"),
-            false => (1.0, t.unit.as_ref()),
-        };
+        let (scale, unit) = scaled(t.unit.as_ref(), [t.value]);
         let value = match t.std {
             Some(std) if std > 0.0 => number::plus_minus(scale * t.value, scale * std),
             _ => number::significant(scale * t.value, 4),
@@ -83,18 +74,13 @@ pub(super) fn in_words(machine: &LoggedRobot, step: &FoundEffect) -> String {
         let shown = format!("{} = {value} {unit}", t.key);
         shown.trim_end().to_owned()
     });
-    words.collect::<Vec<_>>().join(", ")
+    listed(words)
 }
 
-/// Names of the effects that these data do not separate from it, and what would; nothing where there are none.
+/// Names of the effects that these data do not separate from it, and how that can be done.
 pub(super) fn alternatives(machine: &LoggedRobot, step: &FoundEffect) -> Option<String> {
-    let names = step.alternatives.iter().map(|c| c.title(&machine.robot));
-    let names: Vec<String> = names.collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "these data do not separate it from {}; to tell them apart, {}",
-            names.join(", "),
-            step.estimate.law.entry.separate_by
-        )
-    })
+    let names = listed(step.alternatives.iter().map(|c| c.title(&machine.robot)));
+    let by = step.estimate.law.entry.separate_by;
+    (!names.is_empty())
+        .then(|| format!("these data do not separate it from {names}; to tell them apart, {by}"))
 }

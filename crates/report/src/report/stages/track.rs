@@ -2,8 +2,9 @@
 
 use crate::report::figure::{CourseFigure, CoursePanel};
 use crate::report::sections::provenance;
-use crate::report::table::{Align, Table};
-use crate::report::{Report, Writer};
+use crate::report::table::{Align, Columns, Table};
+use crate::report::words::of_joint;
+use crate::report::{Report, Writer, words};
 use cft_ident_core::number;
 use cft_ident_fleet::track::ChangeKind;
 use cft_ident_logs::log::escape;
@@ -23,24 +24,19 @@ pub fn track(of: &Tracked) -> Report {
     let mut report = Report::new("Parameters over time");
     let same = of.robots.iter().all(|r| r.changes.is_empty()) && of.fleet.is_empty();
     let good = same && !too_few(of);
-    report.everywhere().verdict(&words(of), good);
-    if let Some(table) = changes(of) {
-        let mut all = report.everywhere();
-        all.line("");
-        all.table(table);
-    }
-    if let Some(table) = fleet(of) {
-        let mut all = report.everywhere();
-        all.line("");
-        all.table(table);
+    let mut all = report.everywhere();
+    all.verdict(&verdict(of), good);
+    for table in [changes(of), fleet(of)] {
+        if !table.is_empty() {
+            all.table_apart(table);
+        }
     }
     if let [robot] = of.robots.as_slice() {
-        let mut table = match robot.parameters.len() > MAX_PARAMETERS_ON_SCREEN {
+        let mut writer = match robot.parameters.len() > MAX_PARAMETERS_ON_SCREEN {
             true => report.detail(),
             false => report.terminal(),
         };
-        table.line("");
-        table.table(last(robot));
+        writer.table_apart(last(robot));
     }
     let mut page = report.page();
     page.paragraph(next(of));
@@ -48,10 +44,9 @@ pub fn track(of: &Tracked) -> Report {
         page.table(last(robot));
     }
     page.list(&of.warnings);
-    let changed = |r: &&TrackedRobot| !r.changes.is_empty();
-    let first = of.robots.iter().filter(changed);
-    let others = of.robots.iter().filter(|r| !changed(r));
-    for robot in first.chain(others).take(ROBOTS) {
+    let mut robots: Vec<&TrackedRobot> = of.robots.iter().collect();
+    robots.sort_by_key(|robot| robot.changes.is_empty());
+    for robot in robots.into_iter().take(ROBOTS) {
         course(&mut page, robot);
     }
     if of.robots.len() > ROBOTS {
@@ -63,7 +58,7 @@ pub fn track(of: &Tracked) -> Report {
     report
 }
 
-/// What to do next.
+/// The next step.
 fn next(of: &Tracked) -> &'static str {
     let changed = of.robots.iter().any(|r| !r.changes.is_empty());
     match changed || !of.fleet.is_empty() {
@@ -85,14 +80,6 @@ pub fn origin(page: &mut Writer, of: &Tracked, command: &str) {
     provenance::called(page, command);
 }
 
-/// Name of a parameter with its joint.
-fn named(name: &str, joint: Option<&String>) -> String {
-    match joint {
-        Some(joint) => format!("{name} of {}", escape(joint)),
-        None => name.to_owned(),
-    }
-}
-
 fn kind(kind: ChangeKind) -> &'static str {
     match kind {
         ChangeKind::Step => "step",
@@ -101,7 +88,7 @@ fn kind(kind: ChangeKind) -> &'static str {
 }
 
 /// The verdict in words.
-fn words(of: &Tracked) -> String {
+fn verdict(of: &Tracked) -> String {
     let logs: usize = of.robots.iter().map(|r| r.logs.len()).sum();
     let changed = of.robots.iter().filter(|r| !r.changes.is_empty()).count();
     let changes: usize = of.robots.iter().map(|r| r.changes.len()).sum();
@@ -139,13 +126,13 @@ fn unseen(of: &Tracked) -> String {
     let all = || of.robots.iter().flat_map(|r| &r.parameters);
     let mut least: Vec<f64> = all().filter_map(relative_least).collect();
     least.sort_by(f64::total_cmp);
-    match least.get(least.len() / 2) {
-        Some(median) => format!(
-            " Changes smaller than {} of the value, in the median over the parameters, could not be seen.",
-            number::percent(*median)
-        ),
-        None => String::new(),
-    }
+    let sentence = |median: &f64| {
+        let median = number::percent(*median);
+        format!(
+            " Changes smaller than {median} of the value, in the median over the parameters, could not be seen."
+        )
+    };
+    least.get(least.len() / 2).map(sentence).unwrap_or_default()
 }
 
 /// The least change that could be seen, over the parameter.
@@ -154,96 +141,51 @@ fn relative_least(p: &TrackedParameter) -> Option<f64> {
     (*last != 0.0).then(|| p.least_seen.map(|least| least / last.abs()))?
 }
 
-fn changes(of: &Tracked) -> Option<Table> {
-    let columns = [
-        ("robot", Align::Left),
-        ("parameter", Align::Left),
-        ("kind", Align::Left),
-        ("log", Align::Left),
-        ("size", Align::Decimal),
-        ("std", Align::Decimal),
-        ("unit", Align::Left),
-        ("change", Align::Right),
-    ];
-    let mut table = Table::new(&columns).caption("changes");
-    for robot in &of.robots {
-        for change in &robot.changes {
-            table.row(change_row(robot, change));
-        }
-    }
-    (!table.is_empty()).then_some(table)
+fn changes(of: &Tracked) -> Table {
+    let all = of.robots.iter();
+    let all = all.flat_map(|robot| robot.changes.iter().map(move |change| (robot, change)));
+    Columns::new("changes", all)
+        .words("robot", |(robot, _)| escape(&robot.name))
+        .words("parameter", |(_, c)| {
+            of_joint(&c.parameter, c.joint.as_deref())
+        })
+        .words("kind", |(_, c)| kind(c.kind))
+        .words("log", |(robot, c)| escape(&robot.logs[c.log]))
+        .estimates(["size", "std"], |(_, c)| (c.size, c.std))
+        .words("unit", |(_, c)| &c.unit)
+        .column(Align::Right, "change", |(_, c)| words::percent(c.relative))
+        .into()
 }
 
-fn change_row(robot: &TrackedRobot, change: &TrackedChange) -> Vec<String> {
-    let (size, std) = number::value_and_std(change.size, change.std);
-    vec![
-        escape(&robot.name),
-        named(&change.parameter, change.joint.as_ref()),
-        kind(change.kind).to_owned(),
-        escape(&robot.logs[change.log]),
-        size,
-        std,
-        change.unit.clone(),
-        change
-            .relative
-            .map_or(number::ABSENT.to_owned(), number::percent),
-    ]
-}
-
-fn fleet(of: &Tracked) -> Option<Table> {
-    let columns = [
-        ("robot", Align::Left),
-        ("parameter", Align::Left),
-        ("value", Align::Decimal),
-        ("usual", Align::Decimal),
-        ("std", Align::Decimal),
-        ("unit", Align::Left),
-    ];
-    let mut table = Table::new(&columns).caption("robots that differ from the others");
-    for one in &of.fleet {
-        let (value, std) = number::value_and_std(one.value, one.std);
-        table.row(vec![
-            escape(&one.robot),
-            named(&one.parameter, one.joint.as_ref()),
-            value,
-            number::value_and_std(one.usual, one.std).0,
-            std,
-            one.unit.clone(),
-        ]);
-    }
-    (!table.is_empty()).then_some(table)
+fn fleet(of: &Tracked) -> Table {
+    let pair = |value: f64, std: f64| number::value_and_std(value, std);
+    Columns::new("robots that differ from the others", &of.fleet)
+        .words("robot", |one| escape(&one.robot))
+        .words("parameter", |one| {
+            of_joint(&one.parameter, one.joint.as_deref())
+        })
+        .numbers("value", |one| pair(one.value, one.std).0)
+        .numbers("usual", |one| pair(one.usual, one.std).0)
+        .numbers("std", |one| pair(one.value, one.std).1)
+        .words("unit", |one| &one.unit)
+        .into()
 }
 
 /// The parameters after the last log.
 fn last(robot: &TrackedRobot) -> Table {
-    let columns = [
-        ("parameter", Align::Left),
-        ("value", Align::Decimal),
-        ("std", Align::Decimal),
-        ("unit", Align::Left),
-        ("walk", Align::Decimal),
-        ("scatter", Align::Decimal),
-        ("least seen", Align::Decimal),
-    ];
     let caption = format!(
         "parameters after {} logs; a step is seen from the least size on",
         robot.logs.len()
     );
-    let mut table = Table::new(&columns).caption(&caption);
-    for p in &robot.parameters {
-        let last = |x: &[Option<f64>]| x.last().copied().flatten().unwrap_or(f64::NAN);
-        let (value, std) = number::value_and_std(last(&p.values), last(&p.std));
-        table.row(vec![
-            named(&p.name, p.joint.as_ref()),
-            value,
-            std,
-            p.unit.clone(),
-            number::significant(p.walk, 2),
-            number::significant(p.scatter, 2),
-            number::significant(p.least_seen.unwrap_or(f64::NAN), 2),
-        ]);
-    }
-    table
+    let last = |x: &[Option<f64>]| x.last().copied().flatten();
+    Columns::new(&caption, &robot.parameters)
+        .words("parameter", |p| of_joint(&p.name, p.joint.as_deref()))
+        .estimates(["value", "std"], |p| (last(&p.values), last(&p.std)))
+        .words("unit", |p| &p.unit)
+        .digits("walk", 2, |p| p.walk)
+        .digits("scatter", 2, |p| p.scatter)
+        .digits("least seen", 2, |p| p.least_seen)
+        .into()
 }
 
 /// The courses of one robot, those with changes first.
@@ -252,27 +194,21 @@ fn course(page: &mut Writer, robot: &TrackedRobot) {
     let Some(first) = robot.parameters.first() else {
         return;
     };
-    let span = match (first.times.first(), first.times.last()) {
-        (Some(a), Some(b)) => b - a,
-        _ => 0.0,
-    };
+    let [begin, end] = [first.times.first(), first.times.last()].map(|t| t.copied().unwrap_or(0.0));
     let numbered = first.times.iter().enumerate().all(|(k, t)| *t == k as f64);
-    let (unit, seconds) = match span {
+    let (unit, seconds) = match end - begin {
         _ if numbered => ("", 1.0),
         s if s > 2.0 * 86_400.0 => ("d", 86_400.0),
         s if s > 7200.0 => ("h", 3600.0),
         _ => ("s", 1.0),
     };
-    let zero = match numbered {
-        true => 0.0,
-        false => first.times.first().copied().unwrap_or_default(),
-    };
+    let zero = if numbered { 0.0 } else { begin };
     let of =
         |p: &TrackedParameter, c: &&TrackedChange| (&c.parameter, &c.joint) == (&p.name, &p.joint);
     let changed = |p: &&TrackedParameter| robot.changes.iter().any(|c| of(p, &c));
     let (changes, steady): (Vec<_>, Vec<_>) = robot.parameters.iter().partition(changed);
     let panel = |p: &TrackedParameter| CoursePanel {
-        name: named(&p.name, p.joint.as_ref()),
+        name: of_joint(&p.name, p.joint.as_deref()),
         unit: p.unit.clone(),
         times: p.times.iter().map(|t| (t - zero) / seconds).collect(),
         estimates: p.estimates.clone(),
@@ -283,27 +219,20 @@ fn course(page: &mut Writer, robot: &TrackedRobot) {
             .map(|c| (c.time - zero) / seconds)
             .collect(),
     };
+    let (name, logs) = (escape(&robot.name), robot.logs.len());
     let figure = |what: &str, of: &[&TrackedParameter]| CourseFigure {
-        title: format!(
-            "{what} of {} over {} logs",
-            escape(&robot.name),
-            robot.logs.len()
-        ),
+        title: format!("{what} of {name} over {logs} logs"),
         time_unit: unit.to_owned(),
         panels: of.iter().take(DRAWN).map(|p| panel(p)).collect(),
     };
     if !changes.is_empty() {
-        page.figures(&figure("Parameters that changed", &changes).cells());
+        page.figures(figure("Parameters that changed", &changes).cells());
     }
     // a robot of one joint is seen at a glance, all courses of an arm are not
-    let few = steady.len() <= AT_ONCE;
     let courses = figure("Parameters without a change", &steady).cells();
-    match steady.as_slice() {
-        [] => {}
-        _ if few => page.figures(&courses),
-        _ => page.folded(
-            &format!("{} parameters without a change", steady.len()),
-            &courses,
-        ),
+    match steady.len() {
+        0 => {}
+        1..=AT_ONCE => page.figures(courses),
+        many => page.folded(format!("{many} parameters without a change"), courses),
     }
 }

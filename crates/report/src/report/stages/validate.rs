@@ -1,11 +1,12 @@
 //! The report of `validate`.
 
-use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, JointTorque, TorqueFigure};
+use crate::report::figure::{ErrorFigure, JointBars, JointTorque, TorqueFigure, parted};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{
     fit, free_run, friction, parameters, provenance, residual, sketch, torque,
 };
-use crate::report::table::unbroken;
+use crate::report::table::{Columns, unbroken};
+use crate::report::words::{self, escaped, listed};
 use crate::report::{Report, Writer, summary, usual};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
@@ -15,7 +16,7 @@ use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for};
 use cft_ident_stages::replay::Replayed;
 
-/// What the report is made from.
+/// The parts of the report.
 pub struct Validate<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
@@ -39,7 +40,7 @@ pub fn validate(of: &Validate) -> Report {
     ));
     let by_use = of.found.by_use.as_ref();
     let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
-    let (mut text, mut good) = words(judged, of.limit, &escaped(logs));
+    let (mut text, mut good) = verdict(judged, of.limit, &escaped(logs));
     text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
     if let Some(shown) = not_a_validation(judged) {
         text = format!("NOT A VALIDATION: {shown}.");
@@ -61,7 +62,7 @@ pub fn validate(of: &Validate) -> Report {
     free_run::section(&mut report.detail(), of.found.free_run.as_ref());
     overall(&mut report.detail(), judged);
     let mut page = report.page();
-    page.figure(&bars(of).svg());
+    page.figure(bars(of).svg());
     errors(&mut page, judged, "errors of the reconstructed torque");
     if let Some(ErrorsByUse { used, .. }) = by_use {
         let logs = escaped(&used.logs);
@@ -74,19 +75,15 @@ pub fn validate(of: &Validate) -> Report {
 
 /// Errors joint by joint as bars, with the limit that the user set.
 fn bars(of: &Validate) -> ErrorFigure {
-    let bar = |e: &JointError| ErrorBar {
-        error: e.relative_error,
-        interval_95: None,
-    };
     let used = |j: usize| {
         let by_use = of.found.by_use.as_ref()?;
-        by_use.used.errors.joints.get(j).map(bar)
+        by_use.used.errors.joints.get(j)
     };
     let joints = of.found.judged().joints.iter().enumerate();
     let joints = joints.map(|(j, e)| JointBars {
         joint: e.joint.clone(),
-        before: used(j),
-        after: bar(e),
+        before: used(j).map(|used| used.relative_error.into()),
+        after: e.relative_error.into(),
     });
     ErrorFigure {
         title: "Relative torque error".to_owned(),
@@ -97,7 +94,7 @@ fn bars(of: &Validate) -> ErrorFigure {
     }
 }
 
-/// What a page has room for besides; `replayed` is absent where the logs are too long to be held.
+/// Further parts of the page; `replayed` is absent where the logs are too long to be held.
 pub fn pictures(
     page: &mut Writer,
     of: &Validate,
@@ -114,13 +111,11 @@ pub fn pictures(
     match replayed {
         Some(replayed) => {
             let machine = of.machine;
-            let judged = of.found.judged().joints.iter();
-            let errors: Vec<f64> = judged.map(|joint| joint.relative_error).collect();
-            sketch::section(page, machine, replayed.poses.as_ref(), &errors);
+            let errors = of.found.judged().joints.iter().map(|j| j.relative_error);
+            sketch::section(page, machine, replayed.poses.as_ref(), errors);
             friction::section(page, machine, &replayed.friction, &replayed.logs);
             torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
-            let figure = residual::figure(machine, &replayed.residual);
-            residual::section(page, &figure);
+            residual::section(page, machine, &replayed.residual);
         }
         None => {
             page.heading("Torque, measured and reconstructed");
@@ -128,7 +123,7 @@ pub fn pictures(
                 "These logs are too long to be held in memory, so this picture shows extremes only; \
                  choose spans of them, as in LOG@0..20%, for pictures that can be zoomed.",
             );
-            page.figure(&figure(validation, &title).svg());
+            page.figure(figure(validation, &title).svg());
         }
     }
     page.heading("Correlated parameters");
@@ -141,14 +136,8 @@ pub fn pictures(
     provenance::section(page, file, &inputs, made_from, summary, command);
 }
 
-/// Names as a page shows them.
-fn escaped(names: &[String]) -> String {
-    let names: Vec<String> = names.iter().map(|name| escape(name)).collect();
-    names.join(", ")
-}
-
 /// The errors for a terminal.
-pub fn errors_by_joint(terminal: &mut Writer, of: &TorqueErrors, caption: &str) {
+pub(super) fn errors_by_joint(terminal: &mut Writer, of: &TorqueErrors, caption: &str) {
     terminal.table(summary::torque_errors(caption, &of.joints));
     if let Some(text) = at_rest(of) {
         terminal.line("");
@@ -157,46 +146,41 @@ pub fn errors_by_joint(terminal: &mut Writer, of: &TorqueErrors, caption: &str) 
 }
 
 /// Errors over all joints and before the parallel filter, for a terminal that shows everything.
-pub fn overall(terminal: &mut Writer, of: &TorqueErrors) {
+pub(super) fn overall(terminal: &mut Writer, of: &TorqueErrors) {
     let joints = &of.joints;
     terminal.line("");
     let raw = joints.iter().map(|e| {
         let error = number::percent(e.relative_error_raw);
         unbroken(&format!("{} {error}", e.joint))
     });
-    let pooled = of.overall.relative_error;
-    let pooled = pooled
-        .filter(|_| joints.len() > 1)
-        .map(|error| format!(", {} pooled (stacked norms)", number::percent(error)));
+    let pooled = match of.overall.relative_error {
+        Some(error) if joints.len() > 1 => {
+            format!(", {} pooled (stacked norms)", number::percent(error))
+        }
+        _ => String::new(),
+    };
     terminal.paragraph(&format!(
-        "over joints {}{}; before the parallel filter: {}",
+        "over joints {}{pooled}; before the parallel filter: {}",
         number::percent(of.overall.mean_relative_error),
-        pooled.unwrap_or_default(),
-        raw.collect::<Vec<_>>().join(", ")
+        listed(raw)
     ));
 }
 
 /// The errors of moving and of resting joints apart, where one rests in a hundredth of its rows.
 fn at_rest(of: &TorqueErrors) -> Option<String> {
     let rests = |e: &&JointError| 100 * e.resting >= e.samples && e.resting > 0;
-    let joints = of.joints.iter().filter(rests);
-    let each: Vec<String> = joints
-        .map(|e| {
-            let error = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), number::percent);
-            unbroken(&format!(
-                "{} {} moving, {} at rest ({} of its rows)",
-                e.joint,
-                error(e.relative_error_moving),
-                error(e.relative_error_rest),
-                number::percent(e.resting as f64 / e.samples as f64)
-            ))
-        })
-        .collect();
+    let each = of.joints.iter().filter(rests).map(|e| {
+        unbroken(&format!(
+            "{} {} moving, {} at rest ({} of its rows)",
+            e.joint,
+            words::percent(e.relative_error_moving),
+            words::percent(e.relative_error_rest),
+            number::percent(e.resting as f64 / e.samples as f64)
+        ))
+    });
+    let each = listed(each);
     (!each.is_empty()).then(|| {
-        format!(
-            "At rest friction takes any torque up to its Coulomb level, which no model predicts: {}",
-            each.join(", ")
-        )
+        format!("At rest friction takes any torque up to its Coulomb level, which no model predicts: {each}")
     })
 }
 
@@ -211,7 +195,7 @@ pub(super) fn still<'a>(joints: impl Iterator<Item = &'a str>) -> String {
 }
 
 /// The verdict in words, and whether nothing calls for attention.
-pub fn words(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, bool) {
+pub(super) fn verdict(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, bool) {
     let mut text = format!(
         "The model misses {} of the torque of {title}",
         number::percent(of.overall.mean_relative_error)
@@ -231,89 +215,48 @@ pub fn words(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, boo
     let Some(limit) = limit else {
         return (text, true);
     };
-    let beyond: Vec<&str> = of
-        .joints
-        .iter()
-        .filter(|e| e.moves() && (e.relative_error.is_nan() || e.relative_error > limit))
-        .map(|e| e.joint.as_str())
-        .collect();
-    match beyond.as_slice() {
-        [] => {
-            text += &format!(
-                " Every joint keeps the limit of {}.",
-                number::percent(limit)
-            )
-        }
-        some => {
-            text += &format!(
-                " The limit of {} is missed by {}.",
-                number::percent(limit),
-                some.join(", ")
-            );
-        }
-    }
+    let beyond = |e: &&JointError| e.relative_error.is_nan() || e.relative_error > limit;
+    let beyond = of.joints.iter().filter(|e| e.moves()).filter(beyond);
+    let beyond = listed(beyond.map(|e| e.joint.as_str()));
+    let limit = number::percent(limit);
+    text += &match beyond.is_empty() {
+        true => format!(" Every joint keeps the limit of {limit}."),
+        false => format!(" The limit of {limit} is missed by {beyond}."),
+    };
     (text, beyond.is_empty())
 }
 
 /// The errors of every joint.
-pub fn errors(page: &mut Writer, of: &TorqueErrors, caption: &str) {
-    let rows: Vec<Vec<String>> = of
-        .joints
-        .iter()
-        .map(|e| {
-            let torque = |v: f64| format!("{} {}", number::significant(v, 3), e.unit);
-            let rest = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), number::percent);
-            vec![
-                e.joint.clone(),
-                number::percent(e.relative_error),
-                torque(e.rmse),
-                torque(e.max_abs),
-                match e.r2.is_finite() {
-                    true => format!("{:.5}", e.r2),
-                    false => number::ABSENT.to_owned(),
-                },
-                rest(e.relative_error_moving),
-                rest(e.relative_error_rest),
-                number::percent(e.relative_error_raw),
-                e.samples.to_string(),
-            ]
-        })
-        .collect();
-    page.rows(
-        caption,
-        &[
-            "joint",
-            "relative error",
-            "rms error",
-            "largest",
-            "R\u{b2}",
-            "moving",
-            "at rest",
-            "relative error before the filter",
-            "rows",
-        ],
-        rows,
-    );
+fn errors(page: &mut Writer, of: &TorqueErrors, caption: &str) {
+    let torque = |v: f64, e: &JointError| format!("{} {}", number::significant(v, 3), e.unit);
+    let columns = Columns::new(caption, &of.joints)
+        .words("joint", |e| &e.joint)
+        .percent("relative error", |e| e.relative_error)
+        .words("rms error", |e| torque(e.rmse, e))
+        .words("largest", |e| torque(e.max_abs, e))
+        .words("R\u{b2}", |e| words::r2(e.r2))
+        .percent("moving", |e| e.relative_error_moving)
+        .percent("at rest", |e| e.relative_error_rest)
+        .percent("relative error before the filter", |e| e.relative_error_raw)
+        .words("rows", |e| e.samples.to_string());
+    page.table(columns);
 }
 
 /// Logs that the model was made from are no test of it.
 fn used_before(page: &mut Writer, of: &Validate) {
     let used = used_for(of.file, &of.found.inputs);
-    let names: Vec<String> = (of.found.inputs.iter().zip(&used))
-        .filter(|(_, used)| **used)
-        .map(|(input, _)| escape(&input.name))
-        .collect();
+    let used = of.found.inputs.iter().zip(&used).filter(|(_, used)| **used);
+    let names = listed(used.map(|(input, _)| escape(&input.name)));
     if names.is_empty() {
         return;
     }
-    let names = names.join(", ");
-    let made = "used to make this model (the checksum is the same)";
+    let made = format!("{names} was used to make this model (the checksum is the same)");
     match of.found.by_use {
         Some(_) => page.paragraph(&format!(
-            "{names} was {made}: its error stands apart and is no test of the model."
+            "{made}: its error stands apart and is no test of the model."
         )),
         None => page.verdict(
-            &format!("{names} was {made}: its error is no test of the model."),
+            &format!("{made}: its error is no test of the model."),
             false,
         ),
     }
@@ -321,37 +264,21 @@ fn used_before(page: &mut Writer, of: &Validate) {
 
 /// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
 pub fn figure(validation: &Validation, title: &str) -> TorqueFigure {
-    let traces = &validation.traces;
-    let n = validation.errors.joints.len();
-    let joints = validation
-        .errors
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(j, e)| {
-            let mut joint = JointTorque {
-                joint: e.joint.clone(),
-                unit: e.unit.to_owned(),
-                t: Vec::with_capacity(traces.t.len()),
-                measured: Vec::with_capacity(traces.t.len()),
-                reconstructed: Vec::with_capacity(traces.t.len()),
-                relative_error: e.relative_error,
-                rmse: e.rmse,
-            };
-            for (k, t) in traces.t.iter().enumerate() {
-                if k > 0 && traces.breaks.contains(&k) {
-                    // a row that is not finite parts the lines at a gap
-                    joint.t.push(*t);
-                    joint.measured.push(f64::NAN);
-                    joint.reconstructed.push(f64::NAN);
-                }
-                joint.t.push(*t);
-                joint.measured.push(traces.measured[k * n + j]);
-                joint.reconstructed.push(traces.reconstructed[k * n + j]);
-            }
-            joint
-        })
-        .collect();
+    let (traces, joints) = (&validation.traces, &validation.errors.joints);
+    let of = |values: &[f64], j: usize| {
+        let values = values.iter().skip(j).step_by(joints.len());
+        parted(values.copied(), &traces.breaks)
+    };
+    let joint = |(j, e): (usize, &JointError)| JointTorque {
+        joint: e.joint.clone(),
+        unit: e.unit.to_owned(),
+        t: parted(traces.t.iter().copied(), &traces.breaks),
+        measured: of(&traces.measured, j),
+        reconstructed: of(&traces.reconstructed, j),
+        relative_error: e.relative_error,
+        rmse: e.rmse,
+    };
+    let joints = joints.iter().enumerate().map(joint).collect();
     TorqueFigure {
         title: title.to_owned(),
         joints,

@@ -1,34 +1,25 @@
-//! What of the residual no effect explains: on which signals it depends, in sentences and as pictures.
+//! The residual that no effect explains: on which signals it depends, in sentences and as pictures.
 
-use super::step_words::chance;
 use crate::report::Writer;
 use crate::report::figure::MapFigure;
+use crate::report::words::{listed, scaled};
 use cft_ident_core::diagnose::{ResidualMap, Signal};
-use cft_ident_core::number::{self, MILLIMETRES};
+use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot, signal_words};
 
-/// What the residual that is left depends on, a sentence for each joint.
+/// The signals on which the residual that is left depends, a sentence for each joint.
 pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let names = machine.robot.joint_names();
     let all = &found.diagnosis.left.dependence;
     let of_joint = |(j, name): (usize, &String)| {
         let signals = all.iter().filter(|d| d.joint == j).map(|d| {
             let signals = d.signals.iter().map(|s| signal_words(names, j, *s));
-            let signals: Vec<String> = signals.collect();
-            format!(
-                "{} ({} of its square, {})",
-                signals.join(" with "),
-                number::percent(d.share),
-                chance(d.p_value)
-            )
+            let signals = signals.collect::<Vec<String>>().join(" with ");
+            let share = number::percent(d.share);
+            format!("{signals} ({share} of its square, p = {:.3})", d.p_value)
         });
-        let signals: Vec<String> = signals.collect();
-        (!signals.is_empty()).then(|| {
-            format!(
-                "the residual of {name} still depends on {}",
-                signals.join(", ")
-            )
-        })
+        let signals = listed(signals);
+        (!signals.is_empty()).then(|| format!("the residual of {name} still depends on {signals}"))
     };
     names.iter().enumerate().filter_map(of_joint).collect()
 }
@@ -47,7 +38,7 @@ pub(super) fn section(page: &mut Writer, machine: &LoggedRobot, found: &Diagnose
          Where a pattern stands in these, physics is missing; --candidates takes a formula for it.",
     );
     for figure in drawn {
-        page.figures(&figure.cells(Vec::new()));
+        page.figures(figure.cells(Vec::new()));
     }
 }
 
@@ -55,16 +46,10 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
     let names = machine.robot.joint_names();
     let torque = machine.file.torque_unit(joint);
     let over = map.signals.map(|signal| axis_of(machine, joint, signal));
-    let small = [0, 1]
-        .map(|s: usize| over[s].1 == "m" && map.ends[s].iter().all(|end| end.abs() < MILLIMETRES));
-    let scale = small.map(|small| if small { 1e3 } else { 1.0 });
-    let over = [0, 1].map(|s: usize| {
-        let (name, unit) = over[s].clone();
-        (name, if small[s] { "mm".to_owned() } else { unit })
-    });
+    let [across, up] = [0, 1].map(|s: usize| scaled(&over[s].1, map.ends[s]));
     let means = map.curve.iter().map(|[_, mean, _]| *mean);
-    let [low, high] =
-        [f64::min as fn(f64, f64) -> f64, f64::max].map(|of| means.clone().fold(0.0, of));
+    let low = means.clone().fold(0.0, f64::min);
+    let high = means.fold(0.0, f64::max);
     MapFigure {
         title: format!("what is left of {}", names[joint]),
         description: format!(
@@ -74,11 +59,17 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
             number::significant(high, 2)
         ),
         unit: torque.to_owned(),
-        over,
-        ends: [0, 1].map(|s: usize| map.ends[s].map(|end| scale[s] * end)),
+        over: [
+            (over[0].0.clone(), across.1.to_owned()),
+            (over[1].0.clone(), up.1.to_owned()),
+        ],
+        ends: [
+            map.ends[0].map(|end| across.0 * end),
+            map.ends[1].map(|end| up.0 * end),
+        ],
         cells: map.cells.clone(),
         curve: (map.curve.iter())
-            .map(|[x, mean, std]| [scale[0] * x, *mean, *std])
+            .map(|[x, mean, std]| [across.0 * x, *mean, *std])
             .collect(),
     }
 }
