@@ -8,13 +8,11 @@ use super::outcome::{FoundEffect, StepStatus};
 use super::prepared::{PreparedCase, moved};
 use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
-use super::problem::unknowns::{Unknown, value};
+use super::problem::unknowns::{Unknown, step, value};
 use super::search::{Chosen, Field};
 use super::searched::SearchedCase;
 use super::tables::{self, Estimates, TermPlaces, Verified};
-use super::watch::UNWATCHED;
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{Numbers, Terms};
 
 /// What is made of the effects that were chosen.
 #[derive(Clone)]
@@ -40,16 +38,10 @@ struct Way {
 }
 
 /// Asks the parts, then held-out data.
-///
-/// # Errors
-/// [`DiagnoseError`].
 pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
-    let summed = &searched.summed;
     let mut work = Judging {
         prepared,
-        field: prepared.field(&searched.candidates, summed, UNWATCHED),
-        declared: &summed.declared,
-        about: &summed.about,
+        field: prepared.field(&searched.candidates, &searched.summed),
         refit: true,
     };
     let mut ways = work.ways(searched)?;
@@ -68,18 +60,11 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
 struct Judging<'a> {
     prepared: &'a PreparedCase<'a>,
     field: Field<'a>,
-    declared: &'a Terms,
-    /// The declared model that the sums are about.
-    about: &'a AugmentedModel,
     /// Whether these data want other declared numbers than those that were given.
     refit: bool,
 }
 
 impl Judging<'_> {
-    fn numbers(&self) -> &Numbers {
-        self.field.numbers
-    }
-
     /// The effects that were chosen, and those that the user wants.
     fn ways(&self, searched: &SearchedCase) -> Result<Vec<Way>, DiagnoseError> {
         let case = self.prepared.case;
@@ -92,15 +77,10 @@ impl Judging<'_> {
             let own = |name: &String| effect.name().starts_with(name);
             joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
         };
-        let verified = tables::verified(
-            &self.field,
-            self.declared,
-            &searched.chosen,
-            &self.prepared.blocks,
-            searched.noisier.as_ref(),
-        );
+        let noisier = searched.noisier.as_ref();
+        let verified = tables::verified(&self.field, &searched.chosen, noisier);
         let way = |verified: Verified| {
-            let effect = &searched.candidates[verified.chosen.candidate].effect;
+            let effect = self.field.effect(&verified.chosen);
             Way {
                 accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted))
                     || effect.law.formula.is_some() && formula_wanted(effect),
@@ -113,14 +93,13 @@ impl Judging<'_> {
         Ok(verified.into_iter().map(way).collect())
     }
 
-    /// Amplitudes of the predicting model: those of the joint fit with all effects whose parts agree, as much of each as
-    /// they agree.
+    /// Amplitudes of the predicting model: those of the joint fit with all effects whose parts agree, so far as they do.
     fn settle(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
         let factors: Vec<f64> = ways.iter().map(|w| self.factor(w)).collect();
         let kept = ways.iter().zip(&factors).filter(|(_, f)| **f > 0.0);
         let kept: Vec<Chosen> = kept.map(|(w, _)| w.verified.chosen.clone()).collect();
         let estimates = self.estimates(&kept)?;
-        let mut at = self.declared.len();
+        let mut at = self.prepared.unknowns.len();
         for (way, factor) in ways.iter_mut().zip(factors).filter(|(_, f)| *f > 0.0) {
             let count = way.verified.amplitude.len();
             let own = estimates.values.rows(at, count);
@@ -135,21 +114,18 @@ impl Judging<'_> {
     }
 
     fn estimates(&self, effects: &[Chosen]) -> Result<Estimates, DiagnoseError> {
-        let nothing = DiagnoseError::NothingDetermined {
-            unknowns: self.prepared.unknowns.len(),
-        };
-        let rows = self.prepared.case.prior.rows_per_independent;
-        Estimates::of(&self.field, self.declared, effects, rows).ok_or(nothing)
+        let found = Estimates::of(&self.field, effects);
+        found.ok_or_else(|| self.prepared.nothing_determined())
     }
 
     /// Part of an effect's amplitude that predicts. What a person can measure is whole or is not there.
     fn factor(&self, way: &Way) -> f64 {
         let s = way.verified.agreement.s;
-        let effect = &self.field.candidates[way.verified.chosen.candidate].effect;
+        let effect = self.field.effect(&way.verified.chosen);
         match (way.accepted, effect.law.entry.measurable) {
             (true, _) => 1.0,
             (false, false) => s,
-            (false, true) if s > self.numbers().confirmed => 1.0,
+            (false, true) if s > self.field.numbers().confirmed => 1.0,
             (false, true) => 0.0,
         }
     }
@@ -158,16 +134,12 @@ impl Judging<'_> {
     fn written(&self, ways: &[Way], all: bool) -> Result<AugmentedModel, DiagnoseError> {
         let effects: Vec<_> = ways.iter().filter(|w| all || !w.vetoed).collect();
         match effects.iter().any(|w| w.amplitude.is_some()) {
-            true => {
-                let fitted = self.prepared.refit(&self.fitted(&effects))?;
-                Ok(self.based(fitted))
-            }
+            true => Ok(self.based(self.prepared.refit(&self.fitted(&effects))?)),
             false => Ok(self.prepared.case.given.clone()),
         }
     }
 
-    /// A model with effects, its declared numbers as given but for what the effects change: where these data do not ask
-    /// for others, those of other data stay.
+    /// A model with effects, its declared numbers as given but for what the effects change, unless these data want others.
     fn based(&self, model: AugmentedModel) -> AugmentedModel {
         match self.refit {
             true => model,
@@ -189,7 +161,7 @@ impl Judging<'_> {
         let (given, fitted) = (&self.prepared.case.given, &self.prepared.fitted.model);
         let off = |u: &Unknown| value(given, *u) - value(fitted, *u);
         let off: Vec<f64> = unknowns.list.iter().map(off).collect();
-        super::problem::unknowns::step(&mut model, unknowns, &off);
+        step(&mut model, unknowns, &off);
         model
     }
 
@@ -199,18 +171,12 @@ impl Judging<'_> {
     }
 
     fn fitted(&self, ways: &[&Way]) -> AugmentedModel {
-        let own = ways
-            .iter()
-            .filter_map(|w| Some((&w.verified.chosen, w.amplitude.clone()?)));
-        let own: Vec<_> = own.collect();
-        let values = tables::beside(&self.field, self.declared, &own);
-        let about = (self.about, &self.prepared.unknowns);
-        tables::model(&self.field, about, &values, &own)
+        let own = ways.iter();
+        let own = own.filter_map(|w| Some((&w.verified.chosen, w.amplitude.clone()?)));
+        tables::model(&self.field, &own.collect::<Vec<_>>())
     }
 
-    /// Compares held-out errors with and without every effect, the others kept and refitted, and takes out what makes a
-    /// joint worse, the worst first; then the one that gains least, for as long as the model as it would be written is
-    /// worse on held-out data than the given one.
+    /// Takes out what makes a joint worse on held-out data, the worst first; then what gains least, while all are worse.
     fn look(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
         let roles = &self.prepared.case.roles;
         let vetoing = match roles.contains(&LogRole::Veto) {
@@ -226,8 +192,8 @@ impl Judging<'_> {
             let with = self.with(&all);
             let mut found = Vec::new();
             for i in &kept {
-                let others: Vec<&Way> =
-                    kept.iter().filter(|k| *k != i).map(|k| &ways[*k]).collect();
+                let others = kept.iter().filter(|k| *k != i);
+                let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
                 let without = self.with(&others);
                 let change = |role| self.prepared.held_out(role).change([&without, &with]);
                 found.push((*i, change(LogRole::Holdout)?, change(vetoing)?));
@@ -268,10 +234,9 @@ impl Judging<'_> {
         if !self.prepared.case.wishes.cautious || model.effects.len() == given.effects.len() {
             return model;
         }
-        let half: Vec<f64> = (self.prepared.unknowns.list.iter())
-            .map(|u: &Unknown| 0.5 * (value(given, *u) - value(&model, *u)))
-            .collect();
-        super::problem::unknowns::step(&mut model, &self.prepared.unknowns, &half);
+        let half = |u: &Unknown| 0.5 * (value(given, *u) - value(&model, *u));
+        let half: Vec<f64> = self.prepared.unknowns.list.iter().map(half).collect();
+        step(&mut model, &self.prepared.unknowns, &half);
         for effect in &mut model.effects[given.effects.len()..] {
             effect.linear.iter_mut().for_each(|x| *x *= 0.5);
         }
@@ -308,7 +273,7 @@ impl Judging<'_> {
             steps.push(step);
         }
         Ok(Judged {
-            estimates: moved(self.about, unknowns, &estimates.values),
+            estimates: moved(&self.field.summed.about, unknowns, &estimates.values),
             covariance: estimates.covariance,
             information: estimates.information,
             steps,
@@ -325,7 +290,7 @@ impl Judging<'_> {
         let held_out = self.prepared.case.roles.contains(&LogRole::Holdout);
         let confirms = way.change.as_ref().is_some_and(EffectChange::confirms);
         let status = match agreement.s {
-            s if s > self.numbers().confirmed && (confirms || !held_out) && !way.vetoed => {
+            s if s > self.field.numbers().confirmed && (confirms || !held_out) && !way.vetoed => {
                 StepStatus::Confirmed
             }
             s if s > 0.0 => StepStatus::Indicated,

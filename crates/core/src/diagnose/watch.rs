@@ -1,5 +1,7 @@
 //! What a diagnosis says while it works, and whether it is to end.
 
+use super::error::DiagnoseError;
+
 /// What a diagnosis says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Heard<'a> {
@@ -26,6 +28,14 @@ pub const UNWATCHED: Watch = Watch {
 };
 
 impl<'a> Watch<'a> {
+    /// An error where the search is to end.
+    pub(crate) fn unless_stopped(self) -> Result<(), DiagnoseError> {
+        match (self.stop)() {
+            true => Err(DiagnoseError::Interrupted),
+            false => Ok(()),
+        }
+    }
+
     /// Begins a part of `steps` steps, which ends when the guard is dropped.
     pub(crate) fn part(self, name: &str, steps: usize) -> Part<'a> {
         (self.tell)(Heard::Begin(name, steps as u64));

@@ -68,7 +68,7 @@ impl<'a> FitToAll<'a> {
 
     /// Its weighted squared error in some rows.
     pub fn error_of(&self, sums: &[DMatrix<f64>]) -> f64 {
-        self.weigh(&self.squares(sums, &self.values))
+        self.terms.weigh(&self.squares(sums, &self.values))
     }
 
     /// Whether an error of which this is the least is surely above `most`: sums of products hold half of a number's digits of
@@ -98,7 +98,7 @@ impl<'a> FitToAll<'a> {
             }
             let values = self.without(block(b))?;
             let errors = self.squares(block(b), &values);
-            so_far += self.weigh(&errors);
+            so_far += self.terms.weigh(&errors);
             to_come -= self.error_of(block(b));
             out.errors[b] = errors;
             out.without[b] = values;
@@ -113,11 +113,6 @@ impl<'a> FitToAll<'a> {
         let (mut matrix, mut side) = others;
         self.terms.firm(&mut matrix, &mut side, &self.diagonal);
         cholesky::solve(&mut matrix, &mut side).then_some(side)
-    }
-
-    fn weigh(&self, squares: &[f64]) -> f64 {
-        let pairs = squares.iter().zip(&self.terms.weights);
-        pairs.map(|(s, w)| s * w).sum()
     }
 
     /// Adds sums so many times to the lower half of a normal matrix, and to its right side.

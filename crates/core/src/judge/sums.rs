@@ -200,6 +200,12 @@ impl Terms {
         Some(factor.solve(&factor.solve(&prior).transpose()))
     }
 
+    /// Sum over joints in their weights.
+    pub fn weigh(&self, squares: &[f64]) -> f64 {
+        let pairs = squares.iter().zip(&self.weights);
+        pairs.map(|(s, w)| s * w).sum()
+    }
+
     /// Squared residual of each joint at some values.
     pub fn squares(&self, sums: &[DMatrix<f64>], values: &DVector<f64>) -> Vec<f64> {
         let of_joint = |(j, sums): (usize, &DMatrix<f64>)| {

@@ -14,7 +14,6 @@ use crate::diagnose::search::Chosen;
 use crate::diagnose::searched::SearchedCase;
 use crate::diagnose::steps::{Judged, judge};
 use crate::diagnose::tables::beside_the_others;
-use crate::diagnose::watch::UNWATCHED;
 use crate::effect::formula::{Definition, Shape};
 use crate::effect::{Added, Place, own};
 use crate::judge::Bound;
@@ -125,13 +124,11 @@ impl PreparedCase<'_> {
         let summed = self.summed(about, &candidates, &searched.directions)?;
         let summed = self.polished(&mut candidates, &summed, &chosen, &searched.directions)?;
         let first = chosen.len() - taken.len();
-        let field = self.field(&candidates, &summed, UNWATCHED);
+        let field = self.field(&candidates, &summed);
         for at in first..chosen.len() {
-            let judged = beside_the_others(&field, &summed.declared, &chosen, at);
-            let judged = judged.ok_or(DiagnoseError::NothingDetermined {
-                unknowns: self.unknowns.len(),
-            })?;
-            (chosen[at].gain, chosen[at].error) = judged;
+            let judged = beside_the_others(&field, &chosen, at);
+            (chosen[at].gain, chosen[at].error) =
+                judged.ok_or_else(|| self.nothing_determined())?;
         }
         let case = SearchedCase {
             noisier: Some(self.noisier(&summed, &candidates)?),

@@ -6,9 +6,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::columns::RowsOfJoint;
 use super::term::{FormulaTerm, Names};
 use crate::diagnose::problem::formula_numbers::FormulaNumbers;
-use crate::diagnose::problem::pass::RowsOfJoint;
 use crate::judge::{BlockSums, BlocksLeftOut, Bound, ErrorGain, Numbers, Term, Terms};
 
 /// Terms with sums of products of their columns, the declared ones and the residual.

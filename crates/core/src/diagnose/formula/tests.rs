@@ -4,8 +4,7 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::RowsOfJoint;
-use super::columns::Columns;
+use super::columns::{Columns, RowsOfJoint};
 use super::select::{Products, Selected, gram};
 use super::term::{Factor, FormulaTerm, Function, Names, Source, named};
 use crate::diagnose::problem::formula_numbers::FORMULA_NUMBERS;

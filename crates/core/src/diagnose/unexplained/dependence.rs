@@ -284,6 +284,7 @@ impl Taken {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::unexplained::normal;
 
     #[test]
     fn what_a_residual_depends_on_takes_up_its_share_and_what_it_does_not_takes_up_nothing() {
@@ -296,8 +297,7 @@ mod tests {
             })
             .collect();
         let signs = Signs::of(&pieces, 1);
-        let mut chance = ChaCha8Rng::seed_from_u64(3);
-        let mut noise = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
+        let mut noise = normal(3);
         let signal: Vec<f64> = (0..n).map(|k| (0.0137 * k as f64).sin()).collect();
         let other: Vec<f64> = (0..n).map(|k| (0.0091 * k as f64 + 1.0).sin()).collect();
         let residual: Vec<f64> = signal

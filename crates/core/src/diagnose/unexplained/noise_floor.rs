@@ -11,6 +11,8 @@
 //! frequency is underrated, and then some of it is called structure: the safe side.
 
 use super::period::{period, unrepeated};
+use crate::diagnose::problem::case::Case;
+use crate::effect::stationary_joints;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
@@ -18,17 +20,23 @@ use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
 /// Borders of the bands that are looked at, over the cut-off.
 const BORDERS: [f64; 3] = [1.5, 2.25, 3.0];
 
-/// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]`. `averaged`
-/// where each torque is the mean of two rows, as by a zero-order hold.
-///
-/// # Errors
-/// [`MotionError`] of the filters.
+/// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]` along some stretches.
 pub fn floor(
+    case: &Case,
+    residuals: &[Vec<Vec<f64>>],
+    stretches: &[Stretch],
+) -> Result<Vec<f64>, MotionError> {
+    let stationary = stationary_joints(&case.given.model.robot, stretches);
+    let band = (case.cutoff_hz, case.averaged);
+    floor_of(residuals, stretches, &case.filters, band, &stationary)
+}
+
+/// The same with each part by itself; `averaged` where each torque is the mean of two rows.
+fn floor_of(
     residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
     filters: &ParallelFilters,
-    cutoff_hz: f64,
-    averaged: bool,
+    (cutoff_hz, averaged): (f64, bool),
     stationary: &[Vec<bool>],
 ) -> Result<Vec<f64>, MotionError> {
     // logs of one rate together
@@ -281,8 +289,28 @@ impl Middle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::unexplained::normal;
     use crate::motion::FilterSettings;
-    use rand::{RngExt, SeedableRng};
+
+    /// The floor of raw residuals of one joint, each with its time step, and the mean square of their rows.
+    fn floor_and_power(raw: &[(f64, Vec<f64>)]) -> [f64; 2] {
+        let stretch = |(dt, raw): &(f64, Vec<f64>)| Stretch {
+            dt: *dt,
+            q: vec![vec![0.0; raw.len()]],
+            t: vec![0.0; raw.len()],
+            ..Stretch::default()
+        };
+        let stretches: Vec<Stretch> = raw.iter().map(stretch).collect();
+        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
+        let residuals: Vec<_> = raw.iter().map(|(_, x)| vec![x.clone()]).collect();
+        let still = vec![vec![false]; raw.len()];
+        let found = floor_of(&residuals, &stretches, &filters, (10.0, false), &still);
+        let rows = stretches.iter().zip(raw);
+        let rows = rows.flat_map(|(s, (_, x))| filters.of(s).run(&[x]).unwrap().remove(0));
+        let squares: Vec<f64> = rows.map(|x| x * x).collect();
+        let power = squares.iter().sum::<f64>() / squares.len() as f64;
+        [found.unwrap()[0], power]
+    }
 
     #[test]
     fn noise_that_rises_is_told_from_white_noise_and_what_it_hides_is_its_standard_error() {
@@ -311,118 +339,54 @@ mod tests {
 
     #[test]
     fn a_middle_has_the_standard_error_of_a_median() {
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(9);
-        let mut draw = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
-        let found: Vec<Middle> = (0..2000)
-            .map(|_| Middle::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY))
-            .collect();
+        let mut draw = normal(9);
+        let mut middle = |_| Middle::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY);
+        let found: Vec<Middle> = (0..2000).map(&mut middle).collect();
         let scatter = found.iter().map(|m| (m.value - 3.0).powi(2)).sum::<f64>() / 2000.0;
         let shown = found.iter().map(|m| m.error).sum::<f64>() / 2000.0;
-        assert!(
-            (shown / scatter.sqrt() - 1.0).abs() < 0.1,
-            "{shown} {scatter}"
-        );
+        let off = (shown / scatter.sqrt() - 1.0).abs();
+        assert!(off < 0.1, "{shown} {scatter}");
     }
 
-    /// White noise beside noise that rises much higher beyond the band: the floor is that of both, in one log
-    /// or cut in four.
     #[test]
     fn white_noise_beside_an_encoders_has_its_floor_in_one_log_and_in_four() {
-        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(12);
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let mut normal = normal(12);
         let n = 80_000;
         let rounding: Vec<f64> = (0..n + 2).map(|_| normal()).collect();
-        let noise: Vec<f64> = (0..n)
-            .map(|k| {
-                let twice = rounding[k] - 2.0 * rounding[k + 1] + rounding[k + 2];
-                normal() + 60.0 * twice
-            })
-            .collect();
-        let mut filtered = noise.clone();
-        parallel.smooth(&mut filtered).unwrap();
-        let inner = &filtered[500..n - 500];
-        let wanted = inner.iter().map(|x| x * x).sum::<f64>() / inner.len() as f64;
+        // the encoder's noise rises much higher beyond the band
+        let twice = |w: &[f64]| w[0] - 2.0 * w[1] + w[2];
+        let noise = rounding.windows(3).map(|w| normal() + 60.0 * twice(w));
+        let noise: Vec<f64> = noise.collect();
         let of = |parts: usize| {
-            let pieces: Vec<Vec<Vec<f64>>> = noise
-                .chunks_exact(n / parts)
-                .map(|part| vec![part.to_vec()])
-                .collect();
-            let stretch = Stretch {
-                dt: 1e-3,
-                q: vec![vec![0.0; n / parts]],
-                t: vec![0.0; n / parts],
-                ..Stretch::default()
-            };
-            let stretches = vec![stretch; parts];
-            let stationary = vec![vec![false]; parts];
-            let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
-            floor(&pieces, &stretches, &filters, 10.0, false, &stationary).unwrap()[0]
+            let pieces = noise.chunks_exact(n / parts);
+            let pieces: Vec<_> = pieces.map(|part| (1e-3, part.to_vec())).collect();
+            floor_and_power(&pieces)
         };
-        let (whole, four) = (of(1), of(4));
+        let ([whole, wanted], [four, _]) = (of(1), of(4));
         assert!((whole / wanted - 1.0).abs() < 0.3, "{whole} {wanted}");
         assert!((four / whole - 1.0).abs() < 0.15, "{four} {whole}");
     }
 
     #[test]
     fn white_noise_is_its_own_floor_and_a_smooth_residual_adds_nothing() {
-        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(3);
-        let n = 40_000;
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
-        let noise: Vec<f64> = (0..n).map(|_| 0.3 * normal()).collect();
-        let stretch = Stretch {
-            dt: 1e-3,
-            q: vec![vec![0.0; n]],
-            t: vec![0.0; n],
-            ..Stretch::default()
-        };
-        let mut filtered = noise.clone();
-        parallel.smooth(&mut filtered).unwrap();
-        let seen = filtered[500..n - 500].iter().map(|x| x * x).sum::<f64>() / (n - 1000) as f64;
-        let smooth: Vec<f64> = noise
-            .iter()
-            .enumerate()
-            .map(|(k, x)| x + 2.0 * (0.02 * k as f64).sin())
-            .collect();
-        let stretches = [stretch];
-        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
-        for raw in [noise, smooth] {
-            let found = floor(
-                &[vec![raw]],
-                &stretches,
-                &filters,
-                10.0,
-                false,
-                &[vec![false]],
-            )
-            .unwrap()[0];
-            assert!((found / seen - 1.0).abs() < 0.1, "{found} {seen}");
+        let mut normal = normal(3);
+        let noise: Vec<f64> = (0..40_000).map(|_| 0.3 * normal()).collect();
+        let wave = |(k, x): (usize, &f64)| x + 2.0 * (0.02 * k as f64).sin();
+        let smooth = noise.iter().enumerate().map(wave).collect();
+        let [beside, _] = floor_and_power(&[(1e-3, smooth)]);
+        let [alone, power] = floor_and_power(&[(1e-3, noise)]);
+        for found in [alone, beside] {
+            assert!((found / power - 1.0).abs() < 0.1, "{found} {power}");
         }
     }
 
     /// The same torque noise per sample, logged at 1000 and at 400 Hz: the filter lets more of the slow log through.
     #[test]
     fn logs_of_two_rates_have_the_floor_of_each_by_its_rows() {
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let mut normal = normal(5);
         let logs = [(1e-3, 60_000), (2.5e-3, 24_000)];
-        let stretches = logs.map(|(dt, n)| Stretch {
-            dt,
-            q: vec![vec![0.0; n]],
-            t: vec![0.0; n],
-            ..Stretch::default()
-        });
-        let noise = logs.map(|(_, n)| vec![(0..n).map(|_| normal()).collect::<Vec<f64>>()]);
-        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
-        let stationary = vec![vec![false]; 2];
-        let found = floor(&noise, &stretches, &filters, 10.0, false, &stationary).unwrap()[0];
-        let (mut squares, mut rows) = (0.0, 0.0);
-        for (stretch, noise) in stretches.iter().zip(&noise) {
-            let kept = filters.of(stretch).run(&[&noise[0]]).unwrap();
-            squares += kept[0].iter().map(|x| x * x).sum::<f64>();
-            rows += kept[0].len() as f64;
-        }
-        assert!((found / (squares / rows) - 1.0).abs() < 0.1);
+        let logs = logs.map(|(dt, n)| (dt, (0..n).map(|_| normal()).collect()));
+        let [found, power] = floor_and_power(&logs);
+        assert!((found / power - 1.0).abs() < 0.1, "{found} {power}");
     }
 }

@@ -83,7 +83,7 @@ fn apart(x: &[f64], lag: usize, stride: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{RngExt, SeedableRng};
+    use crate::diagnose::unexplained::normal;
 
     fn motion(samples: usize, period: f64) -> Vec<Vec<f64>> {
         let wave = |n: f64, phase: f64| {
@@ -118,9 +118,8 @@ mod tests {
 
     #[test]
     fn what_does_not_repeat_is_the_noise_and_what_repeats_does_not_count() {
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let n = 40_000;
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let mut normal = normal(5);
         let structure = &motion(n, 5000.0)[0];
         let signal: Vec<f64> = structure.iter().map(|s| 3.0 * s + 0.2 * normal()).collect();
         let found = unrepeated(&signal, 100..n - 100, 5000).unwrap();
