@@ -31,8 +31,7 @@ pub struct BlockErrors {
 }
 
 impl<'a> FitToAll<'a> {
-    /// Of blocks with these sums: columns of the terms, then what a joint's torque is the sum of in the weights `torques`. The
-    /// terms have no bounds.
+    /// Of blocks with these sums: columns of the terms, which have no bounds, then those that add up to a torque by `torques`.
     pub fn new(total: &[DMatrix<f64>], torques: &'a [DVector<f64>], terms: &'a Terms) -> Self {
         let u = terms.len();
         let mut out = Self {
@@ -71,9 +70,9 @@ impl<'a> FitToAll<'a> {
         self.terms.weigh(&self.squares(sums, &self.values))
     }
 
-    /// Whether an error of which this is the least is surely above `most`: sums of products hold half of a number's digits of
-    /// an error.
+    /// Whether an error of which this is the least is surely above `most`.
     fn is_above(&self, least: f64, most: f64) -> bool {
+        // sums of products hold half of a number's digits of an error
         let rounding = f64::EPSILON.sqrt();
         self.least().is_some() && least > most * (1.0 + rounding) + rounding
     }

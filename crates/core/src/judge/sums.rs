@@ -185,18 +185,18 @@ impl Terms {
         (normal, right)
     }
 
-    /// What the fit has of its prior: the covariance of its values by that of the prior, over the squared unit in which
-    /// information counts.
-    pub fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {
+    /// Normal matrix and right side with what is known beforehand; a ridge holds what the data do not determine at all.
+    pub(super) fn firm_normal(&self, sums: &[DMatrix<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let (mut normal, mut right) = self.normal(sums);
         let diagonal: Vec<f64> = normal.diagonal().iter().map(|x| x.max(1e-300)).collect();
         self.firm(&mut normal, &mut right, &diagonal);
-        let known = self.prior.1.len();
-        let mut prior = DMatrix::zeros(self.len(), self.len());
-        prior
-            .view_mut((0, 0), (known, known))
-            .copy_from(&self.prior.0);
-        let factor = normal.cholesky()?;
+        (normal, right)
+    }
+
+    /// The covariance of a fit's values by that of its prior, over the squared unit in which information counts.
+    pub fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {
+        let prior = self.prior.0.clone().resize(self.len(), self.len(), 0.0);
+        let factor = self.firm_normal(sums).0.cholesky()?;
         Some(factor.solve(&factor.solve(&prior).transpose()))
     }
 

@@ -45,49 +45,33 @@ impl PreparedCase<'_> {
             let (_, judged) =
                 self.with_formulas(searched, (confirmed, &proposed), &definitions, &all)?;
             let first = judged.steps.len() - proposed.len();
-            let each = proposed
-                .iter()
-                .zip(&definitions)
-                .zip(&judged.steps[first..]);
-            for ((p, definition), step) in each {
-                let mut told = self.told(searched, confirmed, (p, definition), step.clone());
+            let each = proposed.iter().zip(&definitions);
+            for ((p, definition), step) in each.zip(&judged.steps[first..]) {
+                let mut found = self.found(searched, confirmed, (p, definition), step.clone());
                 if let Some(place) = step.judged {
                     let held = OnHeldOut::of(self, (&judged.judge, place), p.joint)?;
-                    told.picture = held.picture(&told.signals);
-                    told.at_reversals = held.at_reversals();
+                    found.picture = held.picture(&found.signals);
+                    found.at_reversals = held.at_reversals();
                 }
-                formulas.push(told);
+                formulas.push(found);
             }
         }
-        let robot = &self.case.given.model.robot;
-        let wanted = |i: &usize| {
-            let joint = &robot.joint_names()[proposed[*i].joint];
-            self.case.wishes.wants_formula(joint)
-        };
+        let wishes = &self.case.wishes;
+        let names = self.case.given.model.robot.joint_names();
+        let joint = |i: &usize| names[proposed[*i].joint].as_str();
+        let wanted = |i: &usize| wishes.wants_formula(joint(i));
         let accepted: Vec<usize> = all.into_iter().filter(wanted).collect();
-        let asked = self.case.wishes.accepted.iter();
-        let found = |joint: &Option<String>| {
-            let joint = joint.as_deref();
-            accepted
-                .iter()
-                .any(|i| Some(robot.joint_names()[proposed[*i].joint].as_str()) == joint)
-        };
-        let mut missing = asked.filter(|w| self.case.wishes.is_formula(w) && !found(&w.1));
-        if let Some((name, joint)) = missing.next() {
+        let found = |of: Option<&str>| accepted.iter().any(|i| Some(joint(i)) == of);
+        let mut asked = wishes.accepted.iter().filter(|w| wishes.is_formula(w));
+        if let Some((name, joint)) = asked.find(|w| !found(w.1.as_deref())) {
             return Err(DiagnoseError::Accept {
                 name: format!("{name}:{}", joint.as_deref().unwrap_or("JOINT")),
                 why: "no formula was found there: see `formulas` in the JSON document".into(),
             });
         }
-        let accepted = match accepted.is_empty() {
-            true => None,
-            false => Some(self.with_formulas(
-                searched,
-                (confirmed, &proposed),
-                &definitions,
-                &accepted,
-            )?),
-        };
+        let accepted = (!accepted.is_empty())
+            .then(|| self.with_formulas(searched, (confirmed, &proposed), &definitions, &accepted));
+        let accepted = accepted.transpose()?;
         Ok(SearchedFormulas { formulas, accepted })
     }
 
@@ -152,22 +136,15 @@ impl PreparedCase<'_> {
     ) -> Result<Candidate, DiagnoseError> {
         let robot = &self.case.given.model.robot;
         let law = own::law(definition, robot)?;
-        let shape = self.shapes(of).iter().map(|s| s.value).collect();
-        let effect = Added::new(
-            law,
-            Place::Joint(of.joint),
-            shape,
-            vec![0.0; law.linear.len()],
-        );
+        let shapes = self.with_names(of.joint, |names| named(&of.terms, names));
+        let shape = shapes.iter().map(|s| s.value).collect();
+        let linear = vec![0.0; law.linear.len()];
+        let effect = Added::new(law, Place::Joint(of.joint), shape, linear);
         Ok(Candidate {
             bounds: vec![Bound::NONE; law.linear.len()],
             slopes: refined_shapes(&self.fitted.model, self.case, &self.cover, &effect),
             effect,
         })
-    }
-
-    fn shapes(&self, of: &Proposed) -> Vec<ShapeNumber> {
-        self.with_names(of.joint, |names| named(&of.terms, names))
     }
 
     /// What names and units there are at a joint.
@@ -195,17 +172,14 @@ impl PreparedCase<'_> {
                 }
             }
             let joint = &names.joints[of.joint];
+            let mut sources = of.terms.iter().flat_map(FormulaTerm::sources);
             Definition {
                 name: self.free_name(&formula_name(joint)),
                 joints: Some(vec![joint.clone()]),
                 coefficients,
                 shapes: shapes.iter().map(range).collect(),
                 friction: self.symmetry(of).odd > 0.5,
-                at_rest: of
-                    .terms
-                    .iter()
-                    .flat_map(FormulaTerm::sources)
-                    .all(Source::is_position),
+                at_rest: sources.all(Source::is_position),
                 meaning: "a formula of what was left, found by diagnose --search".to_owned(),
             }
         })
@@ -223,7 +197,7 @@ impl PreparedCase<'_> {
         Symmetry::of(&of.terms, &of.selected.squares, of.joint)
     }
 
-    fn told(
+    fn found(
         &self,
         searched: &SearchedCase,
         confirmed: &[Chosen],
@@ -257,31 +231,29 @@ impl PreparedCase<'_> {
 }
 
 fn range(shape: &ShapeNumber) -> Shape {
-    let [from, to] = if shape.name.starts_with('n') {
-        WAVE
-    } else {
-        AROUND
+    let around = match shape.name.starts_with('n') {
+        true => WAVE,
+        false => AROUND,
     };
     Shape {
         name: shape.name.clone(),
         unit: shape.unit.clone(),
-        range: [from * shape.value, to * shape.value],
+        range: around.map(|times| times * shape.value),
     }
 }
 
 /// Signals that terms are functions of, each once, those of the first terms first.
 fn signals(terms: &[FormulaTerm]) -> Vec<(FormulaSignal, usize)> {
     let mut all = Vec::new();
-    for source in terms.iter().flat_map(FormulaTerm::sources) {
-        let own = match source {
-            Source::Signal(of, j) | Source::State(of, j, _) => vec![(of, j)],
-            Source::Sum(i, j) => vec![(FormulaSignal::Position, i), (FormulaSignal::Position, j)],
-        };
-        all.extend(
-            own.into_iter()
-                .filter(|s| !all.contains(s))
-                .collect::<Vec<_>>(),
-        );
+    let own = |source| match source {
+        Source::Signal(of, j) | Source::State(of, j, _) => vec![(of, j)],
+        Source::Sum(i, j) => [i, j].map(|j| (FormulaSignal::Position, j)).to_vec(),
+    };
+    let sources = terms.iter().flat_map(FormulaTerm::sources);
+    for signal in sources.flat_map(own) {
+        if !all.contains(&signal) {
+            all.push(signal);
+        }
     }
     all
 }

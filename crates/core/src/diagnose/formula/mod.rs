@@ -194,7 +194,6 @@ impl PreparedCase<'_> {
         let warm = known.map(|k| (k, spread(k)));
         let moves = |k: &usize| !self.cover.joints[*k].stationary;
         Around {
-            joint: names.joint,
             cover: &self.cover,
             names,
             moving: joints.filter(moves).collect(),

@@ -68,14 +68,14 @@ fn over_rates(bands: &[Bands], noise: &[Vec<StretchNoise>]) -> f64 {
         let rows = samples / bands.parallel.decimation as f64;
         (rows, together(noise, bands.seen, bands.kept))
     };
-    let all: Vec<(f64, f64)> = bands.iter().zip(noise).map(of_rate).collect();
-    let known = || all.iter().filter(|(rows, _)| *rows > 0.0);
-    match (known().next(), known().count()) {
-        (None, _) => 0.0,
-        (Some((_, variance)), 1) => *variance,
+    let all = bands.iter().zip(noise).map(of_rate);
+    let known: Vec<(f64, f64)> = all.filter(|(rows, _)| *rows > 0.0).collect();
+    match known.as_slice() {
+        [] => 0.0,
+        [(_, variance)] => *variance,
         _ => {
-            let rows: f64 = known().map(|(rows, _)| rows).sum();
-            known().map(|(r, variance)| r * variance).sum::<f64>() / rows
+            let rows: f64 = known.iter().map(|(rows, _)| rows).sum();
+            known.iter().map(|(r, v)| r * v).sum::<f64>() / rows
         }
     }
 }
@@ -109,17 +109,15 @@ impl<'a> Bands<'a> {
             let cutoff = times * top * cutoff_hz;
             Ok(ZeroPhase::new(Sos::butterworth(4, cutoff, rate)?))
         };
+        let [near, middle, far] = BORDERS.map(low_pass);
+        let passes = [near?, middle?, far?];
         let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
         let width = top * cutoff_hz * (BORDERS[1] - BORDERS[0]);
         let mut bands = Bands {
             parallel,
             seen: [[0.0; 2]; 2],
             kept: [0.0; 2],
-            passes: [
-                low_pass(BORDERS[0])?,
-                low_pass(BORDERS[1])?,
-                low_pass(BORDERS[2])?,
-            ],
+            passes,
             block,
             freedom: 2.0 * width * block as f64 / rate,
             // 1 + 16 + 36 + 16 + 1 = 70; of the mean of two neighbours (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7
@@ -136,7 +134,7 @@ impl<'a> Bands<'a> {
 
     /// A signal in each of the two bands.
     fn parted(&self, x: &[f64]) -> Result<[Vec<f64>; 2], MotionError> {
-        let mut below = [x.to_vec(), x.to_vec(), x.to_vec()];
+        let mut below = [(); 3].map(|()| x.to_vec());
         for (pass, x) in self.passes.iter().zip(&mut below) {
             pass.run(x, 1)?;
         }
@@ -206,8 +204,7 @@ struct StretchNoise {
     repeated: Option<f64>,
 }
 
-/// Variance of the noise in the band that is kept, over all stretches by their rows; 0 of none. Bands are taken
-/// together before anything is solved for, so that their errors average out.
+/// Variance of the noise in the band that is kept, over all stretches by their rows; 0 of none.
 fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> f64 {
     let rows: f64 = stretches.iter().map(|s| s.weight).sum();
     if rows <= 0.0 {
@@ -216,6 +213,7 @@ fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> 
     let mean = |of: &dyn Fn(&StretchNoise) -> f64| {
         stretches.iter().map(|s| s.weight * of(s)).sum::<f64>() / rows
     };
+    // bands are taken together before anything is solved for, so that their errors average out
     let near = [0, 1].map(|band: usize| Middle {
         value: mean(&|s| s.near[band].value),
         error: (mean(&|s| s.weight * s.near[band].error.powi(2)) / rows).sqrt(),
