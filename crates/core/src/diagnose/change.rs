@@ -14,7 +14,7 @@ const REPORTED: f64 = 3.0;
 pub fn friction_changes(prepared: &PreparedCase, searched: &SearchedCase) -> Vec<FrictionChange> {
     let field = prepared.field(&searched.candidates, &searched.summed);
     let terms = field.terms(&searched.chosen);
-    let Some(left_out) = field.left_out(&terms) else {
+    let Ok(left_out) = field.left_out(&terms) else {
         return Vec::new();
     };
     let joints = 0..prepared.case.given.model.robot.joints();
@@ -22,10 +22,8 @@ pub fn friction_changes(prepared: &PreparedCase, searched: &SearchedCase) -> Vec
         let of_law =
             |u: &Unknown| matches!(*u, Unknown::Friction { joint, k } if joint == j && k < 2);
         let declared = prepared.unknowns.list.iter().zip(&terms.list);
-        let columns: Vec<_> = declared
-            .filter(|(u, _)| of_law(u))
-            .map(|(_, term)| term.clone())
-            .collect();
+        let own = declared.filter(|(u, _)| of_law(u));
+        let columns: Vec<_> = own.map(|(_, term)| term.clone()).collect();
         let blocks = &prepared.blocks.list;
         let begins = (1..blocks.len()).filter(|b| blocks[*b].log == blocks[b - 1].log);
         let gains = begins.map(|b| {

@@ -10,7 +10,6 @@ use crate::effect::{Added, AugmentedModel};
 use crate::judge::Term;
 use crate::motion::MotionError;
 
-/// Most steps.
 const STEPS: usize = 6;
 /// A step that takes less than this part off the squares is the last.
 const SETTLED: f64 = 1e-5;

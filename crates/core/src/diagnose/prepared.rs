@@ -25,7 +25,6 @@ use crate::robot::model::JointFriction;
 /// The declared model fitted, and the data divided.
 pub struct PreparedCase<'a> {
     pub case: &'a Case,
-    pub split: &'a DataSplit,
     pub data: Data<'a>,
     pub unknowns: Unknowns,
     pub fitted: Fitted,
@@ -46,7 +45,6 @@ pub struct Summed {
     pub directions: Vec<Added>,
     pub layout: ColumnLayout,
     pub sums: BlockSums,
-    /// The declared terms.
     pub declared: Terms,
 }
 
@@ -72,7 +70,6 @@ impl<'a> PreparedCase<'a> {
         let prepared = PreparedCase {
             together: 1,
             case,
-            split,
             data,
             unknowns: case.unknowns(),
             fitted,
@@ -94,7 +91,7 @@ impl<'a> PreparedCase<'a> {
 
     /// Divided into blocks beside which a residual's memory \[s\] is short.
     fn divided(mut self, logs: &[LogRows], memory: f64) -> Self {
-        let (case, split) = (self.case, self.split);
+        let (case, split) = (self.case, self.data.split);
         let numbers = &case.numbers;
         let reach = |s: &Stretch| case.filters.of(s).trim as f64 * s.dt;
         let reach = case.stretches.iter().map(reach).fold(0.0, f64::max);
@@ -130,10 +127,20 @@ impl<'a> PreparedCase<'a> {
             linear: values.as_slice()[self.unknowns.len()..].to_vec(),
             ..candidate.effect.clone()
         });
-        Ok(memory_s(&filtered(&with, &self.data)?, logs, self.split))
+        Ok(memory_s(
+            &filtered(&with, &self.data)?,
+            logs,
+            self.data.split,
+        ))
     }
 
-    /// Blocks that only judge.
+    pub fn nothing_determined(&self) -> DiagnoseError {
+        DiagnoseError::NothingDetermined {
+            unknowns: self.unknowns.len(),
+        }
+    }
+
+    /// Number of blocks that only judge.
     pub fn judging(&self) -> usize {
         self.all_blocks.len() - self.blocks.list.len()
     }
@@ -166,7 +173,7 @@ impl<'a> PreparedCase<'a> {
     pub fn held_out(&self, role: LogRole) -> HeldOutRows<'_> {
         HeldOutRows {
             case: self.case,
-            split: self.split,
+            split: self.data.split,
             role,
             moving: false,
             together: self.together,
@@ -174,7 +181,7 @@ impl<'a> PreparedCase<'a> {
     }
 
     pub fn split_errors(&self, model: &AugmentedModel) -> Result<SplitErrors, DiagnoseError> {
-        split_errors((self.case, self.split, self.together), model)
+        split_errors((self.case, self.data.split, self.together), model)
     }
 
     /// Errors without the rows in which friction at rest takes whatever the torque is.

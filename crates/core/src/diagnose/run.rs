@@ -90,7 +90,7 @@ impl PreparedCase<'_> {
         let added = judged.written.effects.len() > case.given.effects.len();
         let last = if added { &judged.written } else { alone };
         let left = self.what_is_left(last)?;
-        let residual_std = rms_of(&filtered(last, &self.data)?, self.split);
+        let residual_std = rms_of(&filtered(last, &self.data)?, self.data.split);
         Ok(Diagnosis {
             left,
             left_alone: added.then(|| self.what_is_left(alone)).transpose()?,
@@ -107,7 +107,7 @@ impl PreparedCase<'_> {
             refitted,
             after,
             selected: selected.transpose()?,
-            set_aside: self.split.set_aside.clone(),
+            set_aside: self.data.split.set_aside.clone(),
             residual_std,
             fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
             together: self.together,

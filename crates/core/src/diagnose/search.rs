@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, exclude, is_friction_law};
+use super::error::DiagnoseError;
 use super::prepared::{PreparedCase, Summed};
 use super::watch::Watch;
 use crate::effect::{Added, Place};
@@ -20,7 +21,6 @@ pub struct Field<'a> {
 /// A candidate that gained most in its turn.
 #[derive(Debug, Clone)]
 pub struct Chosen {
-    /// Its index.
     pub candidate: usize,
     /// Gain beside those before it.
     pub gain: ErrorGain,
@@ -59,7 +59,7 @@ impl<'a> Field<'a> {
         &self,
         mut chosen: Vec<Chosen>,
         watch: Watch,
-    ) -> Option<(Vec<Chosen>, Vec<Looked>)> {
+    ) -> Result<(Vec<Chosen>, Vec<Looked>), DiagnoseError> {
         loop {
             let terms = self.terms(&chosen);
             let left_out = self.left_out(&terms)?;
@@ -89,7 +89,7 @@ impl<'a> Field<'a> {
                 false => self.best(&looked, &room),
             };
             let Some(mut next) = next else {
-                return Some((chosen, looked));
+                return Ok((chosen, looked));
             };
             next.error = left_out.error();
             chosen.push(next);
@@ -104,12 +104,13 @@ impl<'a> Field<'a> {
             .with(&own.cloned().collect::<Vec<Term>>())
     }
 
-    /// Fits of terms with each block left out; none where these data determine nothing.
-    pub fn left_out<'t>(&self, terms: &'t Terms) -> Option<BlocksLeftOut<'t>>
+    /// Fits of terms with each block left out.
+    pub fn left_out<'t>(&self, terms: &'t Terms) -> Result<BlocksLeftOut<'t>, DiagnoseError>
     where
         'a: 't,
     {
-        BlocksLeftOut::new(&self.summed.sums, self.prepared.judging(), terms)
+        let found = BlocksLeftOut::new(&self.summed.sums, self.prepared.judging(), terms);
+        found.ok_or_else(|| self.prepared.nothing_determined())
     }
 
     /// Sums of all fitted blocks.
@@ -128,7 +129,9 @@ impl<'a> Field<'a> {
         let value = |a: &&Looked, b: &&Looked| a.gain.value.total_cmp(&b.gain.value);
         let best = admissible.iter().copied().max_by(value)?;
         let near = |l: &&Looked| {
-            share_joints(effect(l).place, effect(best).place) && l.gain.is_near(&best.gain, same)
+            let [own, place] = [effect(l).place, effect(best).place];
+            let mut joints = 0..self.prepared.cover.joints.len();
+            joints.any(|j| own.touches(j) && place.touches(j)) && l.gain.is_near(&best.gain, same)
         };
         let mut alike: Vec<&Looked> = admissible.iter().copied().filter(near).collect();
         alike.push(best);
@@ -158,16 +161,4 @@ pub fn own_joint(place: Place) -> Option<usize> {
         Place::Joint(j) | Place::Pair { on: j, .. } => Some(j),
         Place::Actuator(_) | Place::Geared { .. } | Place::All => None,
     }
-}
-
-/// Whether two places act on a joint together.
-fn share_joints(a: Place, b: Place) -> bool {
-    let joints = |place: Place| match place {
-        Place::Joint(j) | Place::Pair { on: j, .. } => vec![j],
-        Place::Geared { motor, other } => vec![motor, other],
-        Place::Actuator(_) => vec![2, 3],
-        Place::All => Vec::new(),
-    };
-    let (a, b) = (joints(a), joints(b));
-    a.is_empty() || b.is_empty() || a.iter().any(|j| b.contains(j))
 }

@@ -14,7 +14,7 @@ use super::tables::verified;
 use super::watch::Watch;
 use crate::effect::{Added, AugmentedModel};
 use crate::explain::ErrorText;
-use crate::judge::{BlockSums, BlocksLeftOut, LEAST_PARTS, compare, weighted};
+use crate::judge::{BlockSums, LEAST_PARTS, compare, weighted};
 use crate::motion::{MotionError, Stretch};
 
 /// What the search came to.
@@ -22,7 +22,6 @@ pub struct SearchedCase {
     /// Those that were chosen in their best shape.
     pub candidates: Vec<Candidate>,
     pub not_tried: Vec<NotTried>,
-    /// Sums of what was chosen.
     pub summed: Summed,
     pub chosen: Vec<Chosen>,
     pub looked: Vec<Looked>,
@@ -105,33 +104,24 @@ impl PreparedCase<'_> {
         }
     }
 
-    pub fn nothing_determined(&self) -> DiagnoseError {
-        DiagnoseError::NothingDetermined {
-            unknowns: self.unknowns.len(),
-        }
-    }
-
     /// Chooses what gains, and what the user wants.
     pub fn search(&self, watch: Watch) -> Result<SearchedCase, DiagnoseError> {
         let model = &self.fitted.model;
         let (mut candidates, not_tried) = candidates(model, self.case, &self.cover);
         let mut summed = self.summed(model.clone(), &candidates, &[])?;
-        let nothing = || self.nothing_determined();
         if !determines_some(&summed.sums, &summed.declared) && !self.case.keep {
-            return Err(nothing());
+            return Err(self.nothing_determined());
         }
-        let numbers = &self.case.numbers;
-        let alone = BlocksLeftOut::new(&summed.sums, self.judging(), &summed.declared);
-        let errors = alone.ok_or_else(nothing)?.errors();
+        let field = self.field(&candidates, &summed);
+        let errors = field.left_out(&summed.declared)?.errors();
         let weights = &summed.declared.weights;
-        let determined =
-            compare(&torque_squares(&summed), &errors, weights).is_beyond(numbers.screen, None);
+        let gain = compare(&torque_squares(&summed.sums), &errors, weights);
+        let determined = gain.is_beyond(self.case.numbers.screen, None);
         let error = weighted(&errors, weights);
         let (mut chosen, mut looked) = (Vec::new(), Vec::new());
         let mut directions = Vec::new();
         if self.blocks.parts >= LEAST_PARTS {
-            let field = self.field(&candidates, &summed);
-            (chosen, looked) = field.search(Vec::new(), watch).ok_or_else(nothing)?;
+            (chosen, looked) = field.search(Vec::new(), watch)?;
             let smooth = |c: &&Chosen| {
                 let effect = field.effect(c);
                 is_friction_law(effect) && effect.law.direction.is_some()
@@ -141,7 +131,7 @@ impl PreparedCase<'_> {
             if !directions.is_empty() {
                 summed = self.summed(model.clone(), &candidates, &directions)?;
                 let field = self.field(&candidates, &summed);
-                (chosen, looked) = field.search(laws, watch).ok_or_else(nothing)?;
+                (chosen, looked) = field.search(laws, watch)?;
             }
         }
         self.accept(&candidates, &looked, error, &mut chosen)?;
@@ -189,13 +179,9 @@ impl PreparedCase<'_> {
         error: f64,
         chosen: &mut Vec<Chosen>,
     ) -> Result<(), DiagnoseError> {
-        let robot = &self.case.given.model.robot;
         let wishes = &self.case.wishes;
         for wanted in wishes.accepted.iter().filter(|w| !wishes.is_formula(w)) {
-            let is = |c: usize| {
-                let effect = &candidates[c].effect;
-                effect.name() == wanted.0 && effect.place.name(robot) == wanted.1
-            };
+            let is = |c: usize| self.case.is_named(&candidates[c].effect, wanted);
             if chosen.iter().any(|c| is(c.candidate)) {
                 continue;
             }
@@ -221,12 +207,9 @@ fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
     }
 }
 
-/// Squared torque of every block, `[block][joint]`.
-fn torque_squares(summed: &Summed) -> Vec<Vec<f64>> {
-    let square = |(s, torque): (&DMatrix<f64>, &usize)| s[(*torque, *torque)];
-    let of_block = |joints: &Vec<_>| {
-        let torques = summed.layout.torques.iter();
-        joints.iter().zip(torques).map(square).collect()
-    };
-    summed.sums.blocks.iter().map(of_block).collect()
+/// Squared torque of every block, `[block][joint]`: it stands before the residual, which is last.
+fn torque_squares(sums: &BlockSums) -> Vec<Vec<f64>> {
+    let square = |s: &DMatrix<f64>| s[(s.nrows() - 2, s.nrows() - 2)];
+    let of_block = |joints: &Vec<_>| joints.iter().map(square).collect();
+    sums.blocks.iter().map(of_block).collect()
 }

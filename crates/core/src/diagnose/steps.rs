@@ -44,7 +44,7 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
         field: prepared.field(&searched.candidates, &searched.summed),
         refit: true,
     };
-    let mut ways = work.ways(searched)?;
+    let mut ways = work.ways(searched);
     work.settle(&mut ways)?;
     work.refit = work.wants_other_numbers(&ways)?;
     let judge = work.written(&ways, true)?;
@@ -66,14 +66,14 @@ struct Judging<'a> {
 
 impl Judging<'_> {
     /// The effects that were chosen, and those that the user wants.
-    fn ways(&self, searched: &SearchedCase) -> Result<Vec<Way>, DiagnoseError> {
+    fn ways(&self, searched: &SearchedCase) -> Vec<Way> {
         let case = self.prepared.case;
-        let robot = &case.given.model.robot;
-        let is = |effect: &Added, (name, joint): &(String, Option<String>)| {
-            effect.name() == name && effect.place.name(robot) == *joint
+        let named = |effect: &Added| {
+            let mut wanted = case.wishes.accepted.iter();
+            wanted.any(|w| case.is_named(effect, w))
         };
         let formula_wanted = |effect: &Added| {
-            let joint = effect.place.name(robot);
+            let joint = effect.place.name(&case.given.model.robot);
             let own = |name: &String| effect.name().starts_with(name);
             joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
         };
@@ -82,15 +82,14 @@ impl Judging<'_> {
         let way = |verified: Verified| {
             let effect = self.field.effect(&verified.chosen);
             Way {
-                accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted))
-                    || effect.law.formula.is_some() && formula_wanted(effect),
+                accepted: named(effect) || effect.law.formula.is_some() && formula_wanted(effect),
                 verified,
                 amplitude: None,
                 change: None,
                 vetoed: false,
             }
         };
-        Ok(verified.into_iter().map(way).collect())
+        verified.into_iter().map(way).collect()
     }
 
     /// Amplitudes of the predicting model: those of the joint fit with all effects whose parts agree, so far as they do.
@@ -98,7 +97,7 @@ impl Judging<'_> {
         let factors: Vec<f64> = ways.iter().map(|w| self.factor(w)).collect();
         let kept = ways.iter().zip(&factors).filter(|(_, f)| **f > 0.0);
         let kept: Vec<Chosen> = kept.map(|(w, _)| w.verified.chosen.clone()).collect();
-        let estimates = self.estimates(&kept)?;
+        let estimates = Estimates::of(&self.field, &kept)?;
         let mut at = self.prepared.unknowns.len();
         for (way, factor) in ways.iter_mut().zip(factors).filter(|(_, f)| *f > 0.0) {
             let count = way.verified.amplitude.len();
@@ -111,11 +110,6 @@ impl Judging<'_> {
             at += count;
         }
         Ok(())
-    }
-
-    fn estimates(&self, effects: &[Chosen]) -> Result<Estimates, DiagnoseError> {
-        let found = Estimates::of(&self.field, effects);
-        found.ok_or_else(|| self.prepared.nothing_determined())
     }
 
     /// Part of an effect's amplitude that predicts. What a person can measure is whole or is not there.
@@ -178,13 +172,15 @@ impl Judging<'_> {
 
     /// Takes out what makes a joint worse on held-out data, the worst first; then what gains least, while all are worse.
     fn look(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
-        let roles = &self.prepared.case.roles;
-        let vetoing = match roles.contains(&LogRole::Veto) {
+        let case = self.prepared.case;
+        let vetoing = match case.roles.contains(&LogRole::Veto) {
             true => LogRole::Veto,
             false => LogRole::Holdout,
         };
+        let rows = self.prepared.held_out(vetoing);
+        let holdout = self.prepared.held_out(LogRole::Holdout);
         // blocks that are set aside are as the rest of their log: of single joints they measure
-        let given = roles.contains(&vetoing);
+        let given = case.roles.contains(&vetoing);
         loop {
             let in_it = |w: &Way| w.amplitude.is_some() && !w.vetoed;
             let kept: Vec<usize> = (0..ways.len()).filter(|i| in_it(&ways[*i])).collect();
@@ -195,8 +191,8 @@ impl Judging<'_> {
                 let others = kept.iter().filter(|k| *k != i);
                 let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
                 let without = self.with(&others);
-                let change = |role| self.prepared.held_out(role).change([&without, &with]);
-                found.push((*i, change(LogRole::Holdout)?, change(vetoing)?));
+                let models = [&without, &with];
+                found.push((*i, holdout.change(models)?, rows.change(models)?));
             }
             let mut worse: Vec<(usize, f64)> = Vec::new();
             let mut costs: Vec<(usize, f64)> = Vec::new();
@@ -208,7 +204,7 @@ impl Judging<'_> {
                 worse.extend(veto.worst().filter(|_| given).map(|by| (i, by)));
                 costs.push((i, veto.mean[1] - veto.mean[0]));
             }
-            if worse.is_empty() && self.rises(&with, vetoing)? {
+            if worse.is_empty() && rows.mean_error(&with)? > rows.mean_error(&case.given)? {
                 worse = costs;
             }
             match worse.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -216,16 +212,6 @@ impl Judging<'_> {
                 None => return Ok(()),
             }
         }
-    }
-
-    /// Whether a model is worse than the given one on rows of a use.
-    fn rises(&self, model: &AugmentedModel, role: LogRole) -> Result<bool, DiagnoseError> {
-        let rows = self.prepared.held_out(role);
-        let [before, after] = [
-            rows.mean_error(&self.prepared.case.given)?,
-            rows.mean_error(model)?,
-        ];
-        Ok(after > before)
     }
 
     /// The midpoint to the given model, where the user wants it.
@@ -251,7 +237,7 @@ impl Judging<'_> {
     ) -> Result<Judged, DiagnoseError> {
         let kept = ways.iter().filter(|w| w.amplitude.is_some());
         let kept: Vec<Chosen> = kept.map(|w| w.verified.chosen.clone()).collect();
-        let estimates = self.estimates(&kept)?;
+        let estimates = Estimates::of(&self.field, &kept)?;
         let unknowns = &self.prepared.unknowns;
         let before = self.prepared.case.given.effects.len();
         let (mut judged, mut in_file) = (before, before);

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::error::DiagnoseError;
 use super::prepared::moved;
 use super::search::{Chosen, Field, own_joint};
 use crate::effect::{Added, AugmentedModel};
@@ -68,7 +69,7 @@ pub fn verified(field: &Field, chosen: &[Chosen], noisier: Option<&BlockSums>) -
         // beside all the others, those that came after it too
         let gain = beside_the_others(field, chosen, at);
         let joint = own_joint(effect.place);
-        if !gain.is_some_and(|(gain, _)| gain.is_beyond(numbers.screen, joint)) {
+        if !gain.is_ok_and(|(gain, _)| gain.is_beyond(numbers.screen, joint)) {
             agreement.s = 0.0;
         }
         Verified {
@@ -95,19 +96,23 @@ fn by_noise(
     agreement.part(&DVector::from_vec(own.collect()))
 }
 
-/// Gain of an effect beside all the others, and the squared error without it; none where these data determine nothing.
-pub fn beside_the_others(field: &Field, chosen: &[Chosen], at: usize) -> Option<(ErrorGain, f64)> {
+/// Gain of an effect beside all the others, and the squared error without it.
+pub fn beside_the_others(
+    field: &Field,
+    chosen: &[Chosen],
+    at: usize,
+) -> Result<(ErrorGain, f64), DiagnoseError> {
     let mut others = chosen.to_vec();
     let own = others.remove(at).candidate;
     let terms = field.terms(&others);
     let left_out = field.left_out(&terms)?;
     let gain = left_out.gain(field.terms_of(own));
-    Some((gain, left_out.error()))
+    Ok((gain, left_out.error()))
 }
 
 impl Estimates {
-    /// The joint fit with some effects; none where these data determine nothing.
-    pub fn of(field: &Field, effects: &[Chosen]) -> Option<Self> {
+    /// The joint fit with some effects.
+    pub fn of(field: &Field, effects: &[Chosen]) -> Result<Self, DiagnoseError> {
         let rows_per_independent = field.prepared.case.prior.rows_per_independent;
         let total = field.total();
         let values = field.terms(effects).fit(&total, &[]).values;
@@ -122,8 +127,10 @@ impl Estimates {
             let off = x - &mean;
             covariance.ger((count - 1.0) / count, &off, &off, 1.0);
         }
-        covariance += terms.known_before(&total)? * rows_per_independent;
-        Some(Estimates {
+        let known = terms.known_before(&total);
+        let known = known.ok_or_else(|| field.prepared.nothing_determined())?;
+        covariance += known * rows_per_independent;
+        Ok(Estimates {
             values,
             covariance,
             information: field.summed.declared.information(&total) / rows_per_independent,

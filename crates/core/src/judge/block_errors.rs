@@ -77,8 +77,7 @@ impl<'a> FitToAll<'a> {
         self.least().is_some() && least > most * (1.0 + rounding) + rounding
     }
 
-    /// Fits without each block, in this order; none where the others determine nothing, or where the weighted error is surely
-    /// above `most`.
+    /// Fits without each block, in this order; none where one determines nothing, or the weighted error is surely above `most`.
     pub fn blocks<'b>(
         self,
         (order, block): (&[usize], impl Fn(usize) -> &'b [DMatrix<f64>]),

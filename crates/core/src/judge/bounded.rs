@@ -27,8 +27,7 @@ impl Bound {
     }
 }
 
-/// Minimises x' A x - 2 x' b within bounds; terms with nothing on the diagonal stay at zero. Terms that leave their
-/// bounds are held there, the farthest first.
+/// Minimises x' A x - 2 x' b; terms that leave their bounds are held there, the farthest first; those without a diagonal stay 0.
 pub fn solve(a: &DMatrix<f64>, b: &DVector<f64>, bounds: &[Bound]) -> DVector<f64> {
     let n = b.len();
     let silent = |x: f64| (x.is_nan() || x <= 0.0).then_some(0.0);

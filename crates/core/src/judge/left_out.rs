@@ -209,10 +209,8 @@ impl<'a> BlocksLeftOut<'a> {
                 change += step * (through - 2.0 * without.pull[j][k]);
             }
         }
-        let added = more
-            .iter()
-            .zip(amplitude.iter())
-            .filter(|(_, x)| **x != 0.0);
+        let added = more.iter().zip(amplitude.iter());
+        let added = added.filter(|(_, x)| **x != 0.0);
         let added = added.filter_map(|(term, x)| Some((term.column(j)?, *x)));
         let added: Vec<(usize, f64)> = added.collect();
         for &(c, x) in &added {

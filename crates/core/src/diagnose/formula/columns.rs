@@ -12,6 +12,7 @@ use crate::effect::{AugmentedModel, Scene, shifted};
 use crate::motion::MotionError;
 
 /// What the columns of terms are products of.
+#[derive(Default)]
 pub struct Columns {
     factors: Vec<Factor>,
     /// A wave's source, number and whether it is the cosine.
@@ -22,29 +23,21 @@ pub struct Columns {
 
 impl Columns {
     pub fn of(terms: &[FormulaTerm]) -> Self {
-        let mut all = Columns {
-            factors: Vec::new(),
-            waves: Vec::new(),
-            of: Vec::new(),
-        };
+        let mut all = Columns::default();
         for factor in terms.iter().flat_map(|t| &t.factors) {
             place(&mut all.factors, *factor);
         }
         let first = all.factors.len();
         for term in terms {
-            let own: Vec<usize> = term
-                .factors
-                .iter()
-                .map(|f| place(&mut all.factors, *f))
-                .collect();
-            match term.wave {
-                None => all.of.push(own),
-                Some((source, n)) => {
-                    for cosine in [false, true] {
-                        let wave = first + place(&mut all.waves, (source, n, cosine));
-                        all.of.push([own.as_slice(), &[wave]].concat());
-                    }
-                }
+            let own = term.factors.iter();
+            let own: Vec<usize> = own.map(|f| place(&mut all.factors, *f)).collect();
+            let Some((source, n)) = term.wave else {
+                all.of.push(own);
+                continue;
+            };
+            for cosine in [false, true] {
+                let wave = first + place(&mut all.waves, (source, n, cosine));
+                all.of.push([own.as_slice(), &[wave]].concat());
             }
         }
         all
@@ -86,12 +79,10 @@ fn place<T: PartialEq>(list: &mut Vec<T>, own: T) -> usize {
     })
 }
 
-/// Rows of one joint.
 pub struct RowsOfJoint {
     /// Of unknowns, of candidates, the torque and the residual.
     pub declared: DMatrix<f64>,
     pub more: DMatrix<f64>,
-    /// Rows of each block.
     pub blocks: Vec<Range<usize>>,
 }
 
@@ -145,7 +136,6 @@ impl PreparedCase<'_> {
 }
 
 impl Columns {
-    /// Rows of all columns of a joint in a window.
     fn rows(&self, window: &Window, j: usize) -> Result<Vec<Vec<f64>>, MotionError> {
         let series = self.series(&window.scene());
         let (weights, late) = (window.weights(j), window.late(j));

@@ -110,9 +110,7 @@ impl PreparedCase<'_> {
         let first = chosen.len() - taken.len();
         let field = self.field(&candidates, &summed);
         for at in first..chosen.len() {
-            let judged = beside_the_others(&field, &chosen, at);
-            (chosen[at].gain, chosen[at].error) =
-                judged.ok_or_else(|| self.nothing_determined())?;
+            (chosen[at].gain, chosen[at].error) = beside_the_others(&field, &chosen, at)?;
         }
         let case = SearchedCase {
             noisier: Some(self.noisier(&summed, &candidates)?),
@@ -136,7 +134,7 @@ impl PreparedCase<'_> {
     ) -> Result<Candidate, DiagnoseError> {
         let robot = &self.case.given.model.robot;
         let law = own::law(definition, robot)?;
-        let shapes = self.with_names(of.joint, |names| named(&of.terms, names));
+        let shapes = named(&of.terms, &self.names(of.joint));
         let shape = shapes.iter().map(|s| s.value).collect();
         let linear = vec![0.0; law.linear.len()];
         let effect = Added::new(law, Place::Joint(of.joint), shape, linear);
@@ -147,42 +145,40 @@ impl PreparedCase<'_> {
         })
     }
 
-    /// What names and units there are at a joint.
-    pub(super) fn with_names<T>(&self, joint: usize, of: impl FnOnce(&Names) -> T) -> T {
+    pub(super) fn names(&self, joint: usize) -> Names<'_> {
         let robot = &self.case.given.model.robot;
-        let kinds = (0..robot.joints()).map(|k| robot.joint_kind(k).position_unit());
-        of(&Names {
+        let units = (0..robot.joints()).map(|k| robot.joint_kind(k).position_unit());
+        Names {
             joint,
             joints: robot.joint_names(),
-            positions: &kinds.collect::<Vec<_>>(),
+            positions: units.collect(),
             torques: &self.case.units,
-        })
+        }
     }
 
     /// A formula as an effect of the user's own: its name is that of its joint.
     fn definition(&self, of: &Proposed) -> Definition {
-        self.with_names(of.joint, |names| {
-            let shapes = named(&of.terms, names);
-            let mut coefficients: Vec<[String; 3]> = Vec::new();
-            for term in &of.terms {
-                let unit = term.unit(names).unwrap_or_default();
-                for text in term.texts(names, &shapes) {
-                    let name = format!("c{}", coefficients.len() + 1);
-                    coefficients.push([name, unit.clone(), text]);
-                }
+        let names = &self.names(of.joint);
+        let shapes = named(&of.terms, names);
+        let mut coefficients: Vec<[String; 3]> = Vec::new();
+        for term in &of.terms {
+            let unit = term.unit(names).unwrap_or_default();
+            for text in term.texts(names, &shapes) {
+                let name = format!("c{}", coefficients.len() + 1);
+                coefficients.push([name, unit.clone(), text]);
             }
-            let joint = &names.joints[of.joint];
-            let mut sources = of.terms.iter().flat_map(FormulaTerm::sources);
-            Definition {
-                name: self.free_name(&formula_name(joint)),
-                joints: Some(vec![joint.clone()]),
-                coefficients,
-                shapes: shapes.iter().map(range).collect(),
-                friction: self.symmetry(of).odd > 0.5,
-                at_rest: sources.all(Source::is_position),
-                meaning: "a formula of what was left, found by diagnose --search".to_owned(),
-            }
-        })
+        }
+        let joint = &names.joints[of.joint];
+        let mut sources = of.terms.iter().flat_map(FormulaTerm::sources);
+        Definition {
+            name: self.free_name(&formula_name(joint)),
+            joints: Some(vec![joint.clone()]),
+            coefficients,
+            shapes: shapes.iter().map(range).collect(),
+            friction: self.symmetry(of).odd > 0.5,
+            at_rest: sources.all(Source::is_position),
+            meaning: "a formula of what was left, found by diagnose --search".to_owned(),
+        }
     }
 
     /// A name, numbered where the given model has an effect that is called so.

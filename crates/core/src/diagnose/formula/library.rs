@@ -180,7 +180,7 @@ fn of_position(source: Source) -> [FormulaTerm; 4] {
     [Plain, Square, Cube, Abs].map(|f| single(f, source))
 }
 
-fn wave(source: Source, n: f64) -> FormulaTerm {
+pub(super) fn wave(source: Source, n: f64) -> FormulaTerm {
     FormulaTerm {
         factors: Vec::new(),
         wave: Some((source, n)),

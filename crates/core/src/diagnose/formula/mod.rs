@@ -14,15 +14,6 @@
 //! (`symbolic_regression` 0.12, after SymbolicRegression.jl, is the best kept): no declared parameter is refitted beside a tree, no
 //! block is left out, and a null of 99 searches would take hours. `exmex` evaluates what is found, as it does a user's
 //! formulas.
-//!
-//! | file | does |
-//! |---|---|
-//! | `term` | functions of signals, products of them, units, names |
-//! | `library` | the terms that are searched |
-//! | `select` | few of them |
-//! | `judged` | a formula as an effect of the user's own, before the judge |
-//! | `symmetry` | what kind of physics it is, whatever its terms |
-//! | `picture` | it on data set aside: over its first signal, and next to reversals |
 
 mod columns;
 mod judged;
@@ -92,8 +83,7 @@ impl PreparedCase<'_> {
         self.judged_formulas(searched, &confirmed, proposed)
     }
 
-    /// The formula of a joint that is to be judged: beside what the catalogue found at the joint, or in its place where it
-    /// explains as much by itself.
+    /// The formula of a joint beside what the catalogue found there, or in its place where it explains as much by itself.
     fn proposed(
         &self,
         searched: &SearchedCase,
@@ -101,7 +91,7 @@ impl PreparedCase<'_> {
         j: usize,
     ) -> Result<Option<Proposed>, DiagnoseError> {
         let of_joint = OfJoint::of(self, searched, confirmed, j);
-        let terms = self.with_names(j, |names| library(&self.around(names)));
+        let terms = library(&self.around(&self.names(j)));
         let about = &searched.summed.about;
         let rows = self.joint_rows(about, &of_joint.candidates, &terms, j)?;
         let gram = gram(&rows.more);
@@ -153,7 +143,7 @@ impl PreparedCase<'_> {
         j: usize,
     ) -> Option<Products<'t>> {
         let ridge = self.case.numbers.ridge;
-        self.with_names(j, |names| Products::of(terms, rows, names, ridge))
+        Products::of(terms, rows, &self.names(j), ridge)
     }
 
     /// Terms chosen anew of these and of others with shapes near theirs, twice: what made good for a wrong shape falls out.
@@ -229,7 +219,6 @@ impl PreparedCase<'_> {
 /// What the model has at a joint beside a formula.
 struct OfJoint {
     joint: usize,
-    /// Effects that are confirmed.
     candidates: Vec<Candidate>,
     /// Of each declared column: whether it is of an effect of the joint itself.
     own: Vec<bool>,

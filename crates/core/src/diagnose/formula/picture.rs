@@ -9,7 +9,6 @@ use crate::effect::cover::{TURN, reversals};
 use crate::effect::{AugmentedModel, Torques};
 use crate::robot::FormulaSignal;
 
-/// Rows that are kept of it, about.
 const MOST: usize = 700;
 
 /// Time about a reversal [s] within which hysteresis is judged by itself.
@@ -31,7 +30,7 @@ impl<'a> OnHeldOut<'a> {
         (model, place): (&'a AugmentedModel, usize),
         joint: usize,
     ) -> Result<Self, DiagnoseError> {
-        let (split, data) = (&prepared.split, &prepared.data);
+        let (split, data) = (prepared.data.split, &prepared.data);
         let mut without = model.clone();
         without.effects[place].linear.fill(0.0);
         let [without, with] = [filtered(&without, data)?, filtered(model, data)?];

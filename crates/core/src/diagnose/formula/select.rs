@@ -14,7 +14,6 @@ use crate::judge::{BlockSums, BlocksLeftOut, Bound, ErrorGain, Numbers, Term, Te
 /// Terms with sums of products of their columns, the declared ones and the residual.
 pub struct Products<'a> {
     pub terms: &'a [FormulaTerm],
-    /// Columns of each term.
     columns: Vec<Range<usize>>,
     /// Names and values of the shapes of each.
     shapes: Vec<Vec<String>>,
@@ -38,12 +37,9 @@ struct BlockProducts {
     square: f64,
 }
 
-/// Terms that were chosen.
 #[derive(Debug, Clone)]
 pub struct Selected {
-    /// Their indices.
     pub terms: Vec<usize>,
-    /// Gain of all of them.
     pub gain: ErrorGain,
     /// Squared error of blocks left out without any, and of each block with them.
     pub error: f64,

@@ -16,7 +16,6 @@ pub enum Source {
     State(FormulaSignal, usize, f64),
 }
 
-/// A function of one source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Function {
     Plain,
@@ -33,7 +32,6 @@ pub enum Function {
     Bell(f64),
 }
 
-/// A function of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factor {
     pub source: Source,
@@ -48,7 +46,6 @@ pub struct FormulaTerm {
     pub wave: Option<(Source, f64)>,
 }
 
-/// Powers of units.
 pub type Powers = BTreeMap<String, i32>;
 
 /// Names and units on a robot, at one joint.
@@ -56,7 +53,7 @@ pub struct Names<'a> {
     pub joint: usize,
     pub joints: &'a [String],
     /// m or rad of each joint, and the unit of its torque.
-    pub positions: &'a [&'static str],
+    pub positions: Vec<&'static str>,
     pub torques: &'a [String],
 }
 
@@ -177,7 +174,6 @@ impl Function {
 }
 
 impl Factor {
-    /// A signal of a joint itself.
     pub fn plain(signal: FormulaSignal, joint: usize) -> Self {
         Self::of(Function::Plain, Source::Signal(signal, joint))
     }
@@ -186,7 +182,6 @@ impl Factor {
         Self { source, function }
     }
 
-    /// Its values along a scene.
     pub fn series(&self, scene: &Scene) -> Vec<f64> {
         let mut x = self.source.series(scene);
         x.iter_mut().for_each(|x| *x = self.function.value(*x));
@@ -200,19 +195,17 @@ impl Factor {
 
     /// The same with its scales times a number, each by itself.
     fn reshaped(&self, by: f64) -> Vec<Self> {
-        let function = match self.function {
-            Function::Tanh(w) => Some(Function::Tanh(by * w)),
-            Function::Decay(w) => Some(Function::Decay(by * w)),
-            Function::Bell(w) => Some(Function::Bell(by * w)),
-            _ => None,
-        };
-        let source = match self.source {
-            Source::State(of, j, way) => Some(Source::State(of, j, by * way)),
-            _ => None,
-        };
-        let functions = function.map(|function| Factor { function, ..*self });
-        let sources = source.map(|source| Factor { source, ..*self });
-        functions.into_iter().chain(sources).collect()
+        let (mut function, mut source) = (*self, *self);
+        let mut all = Vec::new();
+        if let Function::Tanh(w) | Function::Decay(w) | Function::Bell(w) = &mut function.function {
+            *w *= by;
+            all.push(function);
+        }
+        if let Source::State(_, _, way) = &mut source.source {
+            *way *= by;
+            all.push(source);
+        }
+        all
     }
 
     fn text(&self, names: &Names, shapes: &[ShapeNumber]) -> String {
@@ -278,14 +271,12 @@ impl FormulaTerm {
         }
     }
 
-    /// Times one more factor.
     pub fn times(&self, factor: Factor) -> Self {
         let mut all = self.clone();
         all.factors.push(factor);
         all
     }
 
-    /// Columns that it has.
     pub fn count(&self) -> usize {
         1 + usize::from(self.wave.is_some())
     }
@@ -316,7 +307,6 @@ impl FormulaTerm {
         self.factors.iter().map(function).sum::<usize>() + 2 * usize::from(self.wave.is_some())
     }
 
-    /// What its functions are of.
     pub fn sources(&self) -> impl Iterator<Item = Source> + '_ {
         let wave = self.wave.iter().map(|(source, _)| *source);
         self.factors.iter().map(|f| f.source).chain(wave)
@@ -348,7 +338,6 @@ impl FormulaTerm {
         Some(unit_text(&all))
     }
 
-    /// Numbers that shape it.
     pub fn shapes(&self, names: &Names) -> Vec<ShapeNumber> {
         let mut all: Vec<ShapeNumber> = self.factors.iter().flat_map(|f| f.shapes(names)).collect();
         if let Some((source, n)) = self.wave.filter(|(_, n)| !is_whole(*n)) {
@@ -359,7 +348,6 @@ impl FormulaTerm {
         all
     }
 
-    /// Formulas of its coefficients.
     pub fn texts(&self, names: &Names, shapes: &[ShapeNumber]) -> Vec<String> {
         let factors: Vec<String> = self.factors.iter().map(|f| f.text(names, shapes)).collect();
         let Some((source, n)) = self.wave else {

@@ -4,7 +4,7 @@ use super::data_split::{DataSplit, LogRole};
 use super::formula_numbers::FormulaNumbers;
 use super::prior::ParameterPrior;
 use super::unknowns::{FreeParameters, Unknowns};
-use crate::effect::{AugmentedModel, Law};
+use crate::effect::{Added, AugmentedModel, Law};
 use crate::judge::Numbers;
 use crate::motion::{ParallelFilters, Stretch};
 use crate::robot::drive::JointDrive;
@@ -85,6 +85,15 @@ impl Case {
         let robot = &self.given.model.robot;
         let filters = (&self.filters, self.cutoff_hz);
         DataSplit::of(robot, &self.stretches, &self.roles, filters)
+    }
+
+    /// Whether an effect is the one that is named, at the joint that is named.
+    pub(crate) fn is_named(
+        &self,
+        effect: &Added,
+        (name, joint): &(String, Option<String>),
+    ) -> bool {
+        effect.name() == name && effect.place.name(&self.given.model.robot) == *joint
     }
 
     /// The stretches of logs with a role.

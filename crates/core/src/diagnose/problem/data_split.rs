@@ -19,7 +19,6 @@ pub enum LogRole {
     Holdout,
 }
 
-/// A piece of one stretch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Piece {
     pub stretch: usize,
@@ -37,7 +36,6 @@ pub struct SetAside {
     pub to_s: f64,
 }
 
-/// All pieces.
 #[derive(Debug, Clone, Default)]
 pub struct DataSplit {
     pub pieces: Vec<Piece>,
@@ -108,7 +106,6 @@ impl DataSplit {
         split
     }
 
-    /// Divides a range of rows into pieces.
     fn cut(&mut self, stretch: usize, range: Range<usize>, role: LogRole, length: usize) {
         let count = (range.len() / length).max(1);
         for i in 0..count {
@@ -151,7 +148,6 @@ impl DataSplit {
         logs
     }
 
-    /// Rows with a role.
     pub(crate) fn rows_of(&self, role: LogRole) -> usize {
         let pieces = self.pieces.iter().filter(|p| p.role == role);
         pieces.map(|p| p.rows.len()).sum()

@@ -76,7 +76,6 @@ impl Candidate {
 
 /// Where the columns of unknowns and candidates stand in the rows of each joint.
 pub struct ColumnLayout {
-    /// Terms of the declared unknowns.
     pub declared: Vec<Term>,
     /// Terms of each candidate, as many as it has coefficients.
     pub candidates: Vec<Vec<Term>>,
@@ -87,7 +86,6 @@ pub struct ColumnLayout {
 }
 
 impl ColumnLayout {
-    /// Of unknowns and candidates.
     pub fn of(unknowns: &Unknowns, candidates: &[Candidate]) -> Self {
         let joints = unknowns.columns.len();
         let term = |bound| Term {

@@ -39,7 +39,6 @@ const REPORTED: usize = 4;
 /// Part by which two signals must take up more than the better of them alone.
 const TOGETHER: f64 = 1.2;
 
-/// Rows of one joint with their blocks.
 struct Rows {
     residual: Vec<f64>,
     block: Vec<usize>,
@@ -55,9 +54,7 @@ pub struct Left<'a> {
     pub torques: &'a [Torques],
 }
 
-/// Draws of random signs.
 const DRAWS: usize = 199;
-/// Seed of the signs.
 const SEED: u64 = 19_931_983;
 
 /// Blocks of fitted rows, and the signs that each draw gives them.
@@ -90,8 +87,7 @@ impl Signs {
     }
 }
 
-/// Dependences of the residuals of `joints`, the strongest of each joint first; `together` pieces have no memory of
-/// one another.
+/// Dependences of the residuals of `joints`, the strongest of each first; `together` pieces share the residual's memory.
 pub fn dependences(left: &Left, joints: &[usize], together: usize) -> Vec<Dependence> {
     let signs = Signs::of(&left.data.split.pieces, together);
     let of_joint = |j: &usize| of_joint(left, &signs, *j);

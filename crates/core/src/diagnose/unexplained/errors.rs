@@ -95,7 +95,6 @@ pub struct PieceErrors {
 /// Relative change of an error below which it is not reported as worse.
 const NOTICEABLE: f64 = 0.01;
 
-/// Seed of the bootstrap.
 const SEED: u64 = 20_020_520;
 
 /// Errors of a model over the pieces of a role, all rows of them or without those in which a joint stands.

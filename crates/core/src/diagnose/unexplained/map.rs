@@ -18,7 +18,6 @@ pub struct ResidualMap {
 
 /// Cells along each signal.
 const CELLS: usize = 20;
-/// Bins of the curve.
 const BINS: usize = 24;
 /// Part of the rows beyond each end.
 const BEYOND: f64 = 0.005;

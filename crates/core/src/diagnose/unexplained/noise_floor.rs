@@ -87,7 +87,6 @@ struct Bands<'a> {
     seen: [[f64; 2]; 2],
     /// What the band that is kept sees of them.
     kept: [f64; 2],
-    /// Low-pass filters at the borders.
     passes: [ZeroPhase; 3],
     /// Samples of a block, some periods of the band.
     block: usize,
@@ -194,7 +193,6 @@ impl<'a> Bands<'a> {
 
 /// What one stretch shows of a joint's noise.
 struct StretchNoise {
-    /// Its rows.
     weight: f64,
     /// Power in the two bands.
     near: [Middle; 2],
@@ -224,16 +222,14 @@ fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> 
     mean(&|s| s.repeated.map_or(beyond, |r| (r + rising).min(beyond)))
 }
 
-/// Variances of white noise and of rising noise in the band that is kept, from that in two bands beyond it, of
-/// which `seen[band][source]` is what each band sees of each. White noise that the rising noise hides there is
-/// anything up to its standard error, and is taken to be that, for what is no more is no structure; but it is
-/// no more than all that a band has.
+/// Variances of white and of rising noise in the band that is kept, from those in two bands, which see `seen[band][source]`.
 fn carried_on(near: [Middle; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> [f64; 2] {
     let [[w, r], [x, s]] = seen;
     let determinant = w * s - r * x;
     let [first, second] = near.map(|n| n.value);
     let white = (first * s - r * second) / determinant;
     let rising = (w * second - first * x) / determinant;
+    // white noise that the rising noise hides is taken to be its standard error: what is no more is no structure
     let error = (near[0].error * s).hypot(near[1].error * r) / determinant.abs();
     let alone = |source: usize| {
         let of_band = |band: usize| near[band].value / seen[band][source];
@@ -254,8 +250,7 @@ fn power(x: &[f64]) -> f64 {
 /// Blocks below which their spread says nothing of the median's error.
 const MIN_BLOCKS: usize = 8;
 
-/// Median of blocks with its standard error, as if they were normal between their quartiles; of few blocks it
-/// is no more than an order of magnitude.
+/// Median of blocks with its standard error, as if they were normal between their quartiles.
 #[derive(Debug, Clone, Copy, Default)]
 struct Middle {
     value: f64,
@@ -263,8 +258,7 @@ struct Middle {
 }
 
 impl Middle {
-    /// Of powers with so many independent numbers in each: their median lies below their mean (Wilson and Hilferty
-    /// 1931), which is what is reported. 0 of none.
+    /// Of powers with so many independent numbers in each; 0 of none.
     fn of(mut values: Vec<f64>, freedom: f64) -> Self {
         values.sort_by(f64::total_cmp);
         let n = values.len();
@@ -274,6 +268,7 @@ impl Middle {
         };
         // quartiles of a normal distribution are 1.349 apart, and its median has 1.2533 times the mean's error
         let spread = (at(0.75) - at(0.25)) / 1.349;
+        // the median lies below the mean (Wilson and Hilferty 1931), which is reported
         let below = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
         let value = at(0.5) / below;
         let error = match n < MIN_BLOCKS {
@@ -378,10 +373,10 @@ mod tests {
         }
     }
 
-    /// The same torque noise per sample, logged at 1000 and at 400 Hz: the filter lets more of the slow log through.
     #[test]
     fn logs_of_two_rates_have_the_floor_of_each_by_its_rows() {
         let mut normal = normal(5);
+        // the same noise per sample: the filter lets more of the slow log through
         let logs = [(1e-3, 60_000), (2.5e-3, 24_000)];
         let logs = logs.map(|(dt, n)| (dt, (0..n).map(|_| normal()).collect()));
         let [found, power] = floor_and_power(&logs);
