@@ -21,12 +21,6 @@ pub struct Watch<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Nobody is informed, and nothing ends the search.
-pub const UNWATCHED: Watch = Watch {
-    tell: &|_| {},
-    stop: &|| false,
-};
-
 impl<'a> Watch<'a> {
     /// An error where the search is to end.
     pub(crate) fn unless_stopped(self) -> Result<(), DiagnoseError> {
@@ -70,7 +64,7 @@ mod tests {
         let tell = |h: Heard| heard.lock().unwrap().push(format!("{h:?}"));
         let watch = Watch {
             tell: &tell,
-            ..UNWATCHED
+            stop: &|| false,
         };
         let part = watch.part("round 1", 2);
         part.step();

@@ -43,9 +43,7 @@ impl<'a> FitToAll<'a> {
             values: DVector::zeros(0),
             error: 0.0,
         };
-        let mut normal = std::mem::take(&mut out.normal);
-        out.add(total, 1.0, &mut normal);
-        out.normal = normal;
+        out.normal = out.plus(total, 1.0);
         let all = out.normal.0.diagonal();
         out.diagonal = all.iter().map(|x| x.max(1e-300)).collect();
         let (mut matrix, mut side) = out.normal.clone();
@@ -106,20 +104,14 @@ impl<'a> FitToAll<'a> {
     }
 
     fn without(&self, block: &[DMatrix<f64>]) -> Option<DVector<f64>> {
-        let mut others = self.normal.clone();
-        self.add(block, -1.0, &mut others);
-        let (mut matrix, mut side) = others;
+        let (mut matrix, mut side) = self.plus(block, -1.0);
         self.terms.firm(&mut matrix, &mut side, &self.diagonal);
         cholesky::solve(&mut matrix, &mut side).then_some(side)
     }
 
-    /// Adds sums so many times to the lower half of a normal matrix, and to its right side.
-    fn add(
-        &self,
-        sums: &[DMatrix<f64>],
-        times: f64,
-        (normal, right): &mut (DMatrix<f64>, DVector<f64>),
-    ) {
+    /// The lower half of its normal matrix, and its right side, with sums added so many times.
+    fn plus(&self, sums: &[DMatrix<f64>], times: f64) -> (DMatrix<f64>, DVector<f64>) {
+        let (mut normal, mut right) = self.normal.clone();
         let joints = self.own.iter().zip(sums).zip(self.torques);
         for (((own, sums), torque), w) in joints.zip(&self.terms.weights) {
             let (w, first) = (times * w, sums.ncols() - torque.len());
@@ -136,6 +128,7 @@ impl<'a> FitToAll<'a> {
                 }
             }
         }
+        (normal, right)
     }
 
     /// Squared residual of each joint at some values.

@@ -15,16 +15,6 @@ impl Bound {
         least: f64::NEG_INFINITY,
         most: f64::INFINITY,
     };
-
-    /// How far a value is beyond.
-    pub(super) fn excess(self, x: f64) -> f64 {
-        (self.least - x).max(x - self.most).max(0.0)
-    }
-
-    /// The nearest value that it may have.
-    pub fn nearest(self, x: f64) -> f64 {
-        x.max(self.least).min(self.most)
-    }
 }
 
 /// Minimises x' A x - 2 x' b; terms that leave their bounds are held there, the farthest first; those without a diagonal stay 0.
@@ -34,11 +24,13 @@ pub fn solve(a: &DMatrix<f64>, b: &DVector<f64>, bounds: &[Bound]) -> DVector<f6
     let mut held: Vec<Option<f64>> = (0..n).map(|i| silent(a[(i, i)])).collect();
     loop {
         let x = with_held(a, b, &held);
-        let off = |i: &usize| bounds[*i].excess(x[*i]) * a[(*i, *i)].max(0.0).sqrt();
+        let nearest = |i: usize| x[i].max(bounds[i].least).min(bounds[i].most);
+        let excess = |i: usize| (bounds[i].least - x[i]).max(x[i] - bounds[i].most).max(0.0);
+        let off = |i: &usize| excess(*i) * a[(*i, *i)].max(0.0).sqrt();
         let free = (0..n).filter(|i| held[*i].is_none());
         let worst = free.max_by(|i, j| off(i).total_cmp(&off(j)));
         match worst.filter(|i| off(i) > 0.0) {
-            Some(i) => held[i] = Some(bounds[i].nearest(x[i])),
+            Some(i) => held[i] = Some(nearest(i)),
             None => return x,
         }
     }

@@ -52,7 +52,7 @@ impl ErrorGain {
     }
 
     /// Whether it is that of another within so many standard errors of their difference.
-    pub fn is_near(&self, other: &ErrorGain, errors: f64) -> bool {
+    pub(crate) fn is_near(&self, other: &ErrorGain, errors: f64) -> bool {
         let pairs = self.blocks.iter().zip(&other.blocks);
         let [value, se] = sum_and_error(pairs.map(|(a, b)| a - b));
         value.abs() <= errors * se
@@ -137,7 +137,7 @@ impl<'a> BlocksLeftOut<'a> {
     }
 
     /// Squared error of all blocks and joints, in the weights of the joints.
-    pub fn error(&self) -> f64 {
+    pub(crate) fn error(&self) -> f64 {
         weighted(&self.errors(), &self.terms.weights)
     }
 
@@ -153,7 +153,7 @@ impl<'a> BlocksLeftOut<'a> {
     }
 
     /// The same of terms that are there in some blocks alone.
-    pub fn gain_within(&self, more: &[Term], there: Range<usize>) -> ErrorGain {
+    pub(crate) fn gain_within(&self, more: &[Term], there: Range<usize>) -> ErrorGain {
         self.gain_of(more, self.within(more, &there), &|b| there.contains(&b))
     }
 
@@ -225,7 +225,7 @@ impl<'a> BlocksLeftOut<'a> {
     }
 
     /// Amplitudes of terms that are there in some blocks alone, beside those in use over all fitted blocks.
-    pub fn amplitude_within(&self, more: &[Term], there: Range<usize>) -> DVector<f64> {
+    pub(crate) fn amplitude_within(&self, more: &[Term], there: Range<usize>) -> DVector<f64> {
         let (normal, right) = self.terms.firm_normal(&self.total);
         let all = self.within(more, &there);
         let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();

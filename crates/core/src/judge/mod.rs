@@ -22,8 +22,10 @@ mod tests;
 pub use block_errors::{BlockErrors, FitToAll};
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
-pub use left_out::{BlocksLeftOut, ErrorGain, compare, weighted};
-pub use parts::{Agreement, LEAST_PARTS, agreement, agreement_on_share};
+pub(crate) use left_out::weighted;
+pub use left_out::{BlocksLeftOut, ErrorGain, compare};
+pub use parts::{Agreement, agreement_on_share};
+pub(crate) use parts::{LEAST_PARTS, agreement};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 
 /// The numbers that decide.

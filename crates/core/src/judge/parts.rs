@@ -21,7 +21,7 @@ pub struct Agreement {
 
 impl Agreement {
     /// The part that a change is of the amplitude, along it.
-    pub fn part(&self, change: &DVector<f64>) -> f64 {
+    pub(crate) fn part(&self, change: &DVector<f64>) -> f64 {
         let (amplitude, information) = &self.whole;
         let along = information * amplitude;
         let size = amplitude.dot(&along);
@@ -32,7 +32,7 @@ impl Agreement {
     }
 
     /// Counts an error of this part of the amplitude, which all parts of the data share, to their scatter.
-    pub fn doubt(&mut self, part: f64, numbers: &Numbers) {
+    pub(crate) fn doubt(&mut self, part: f64, numbers: &Numbers) {
         let shape = (self.parts.len(), self.whole.0.len());
         if self.z > 0.0 && part != 0.0 {
             self.z = 1.0 / (1.0 / self.z + shape.0 as f64 * part * part);

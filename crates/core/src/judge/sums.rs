@@ -35,7 +35,7 @@ pub struct BlockSums {
 
 impl BlockSums {
     /// Zeros for so many blocks of joints with so many columns each, the torque not counted.
-    pub fn zeros(blocks: usize, columns: &[usize]) -> Self {
+    pub(crate) fn zeros(blocks: usize, columns: &[usize]) -> Self {
         let of_joint = |c: &usize| DMatrix::zeros(c + 1, c + 1);
         let of_block = |_| columns.iter().map(of_joint).collect();
         Self {
@@ -57,7 +57,7 @@ impl BlockSums {
     }
 
     /// The mean with other sums of the same blocks.
-    pub fn mean(mut self, other: &BlockSums) -> Self {
+    pub(crate) fn mean(mut self, other: &BlockSums) -> Self {
         let pairs = self.blocks.iter_mut().zip(&other.blocks);
         for (own, other) in pairs.flat_map(|(own, other)| own.iter_mut().zip(other)) {
             *own = (&*own + other) * 0.5;
@@ -66,7 +66,7 @@ impl BlockSums {
     }
 
     /// Rows of each joint in all blocks.
-    pub fn rows_of(&self, joint: usize) -> f64 {
+    pub(crate) fn rows_of(&self, joint: usize) -> f64 {
         self.rows.iter().map(|rows| rows[joint]).sum()
     }
 }
@@ -92,14 +92,8 @@ pub struct TermFit {
 }
 
 impl Terms {
-    /// Number of terms.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.list.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.list.is_empty()
     }
 
     /// Weighted normal matrix and right side of joints' sums, without prior and ridge.
@@ -174,7 +168,7 @@ impl Terms {
     }
 
     /// Information matrix of the terms: that of joints' sums and of what is known beforehand, in weighted rows.
-    pub fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
+    pub(crate) fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
         self.firmed(sums).0
     }
 
@@ -194,14 +188,14 @@ impl Terms {
     }
 
     /// The covariance of a fit's values by that of its prior, over the squared unit in which information counts.
-    pub fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {
+    pub(crate) fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {
         let prior = self.prior.0.clone().resize(self.len(), self.len(), 0.0);
         let factor = self.firm_normal(sums).0.cholesky()?;
         Some(factor.solve(&factor.solve(&prior).transpose()))
     }
 
     /// Sum over joints in their weights.
-    pub fn weigh(&self, squares: &[f64]) -> f64 {
+    pub(crate) fn weigh(&self, squares: &[f64]) -> f64 {
         let pairs = squares.iter().zip(&self.weights);
         pairs.map(|(s, w)| s * w).sum()
     }

@@ -37,17 +37,13 @@ impl PreparedCase<'_> {
         confirmed: &[Chosen],
         proposed: Vec<Proposed>,
     ) -> Result<SearchedFormulas, DiagnoseError> {
-        let definitions = proposed.iter().map(|p| self.definition(p));
-        let definitions: Vec<Definition> = definitions.collect();
-        let all: Vec<usize> = (0..proposed.len()).collect();
+        let all: Vec<&Proposed> = proposed.iter().collect();
         let mut formulas = Vec::new();
-        if !proposed.is_empty() {
-            let (_, judged) =
-                self.with_formulas(searched, (confirmed, &proposed), &definitions, &all)?;
-            let first = judged.steps.len() - proposed.len();
-            let each = proposed.iter().zip(&definitions);
-            for ((p, definition), step) in each.zip(&judged.steps[first..]) {
-                let mut found = self.found(searched, confirmed, (p, definition), step.clone());
+        if !all.is_empty() {
+            let (_, judged) = self.with_formulas(searched, confirmed, &all)?;
+            let first = judged.steps.len() - all.len();
+            for (p, step) in all.iter().zip(&judged.steps[first..]) {
+                let mut found = self.found(searched, confirmed, p, step.clone());
                 if let Some(place) = step.judged {
                     let held = OnHeldOut::of(self, (&judged.judge, place), p.joint)?;
                     found.picture = held.picture(&found.signals);
@@ -58,10 +54,10 @@ impl PreparedCase<'_> {
         }
         let wishes = &self.case.wishes;
         let names = self.case.given.model.robot.joint_names();
-        let joint = |i: &usize| names[proposed[*i].joint].as_str();
-        let wanted = |i: &usize| wishes.wants_formula(joint(i));
-        let accepted: Vec<usize> = all.into_iter().filter(wanted).collect();
-        let found = |of: Option<&str>| accepted.iter().any(|i| Some(joint(i)) == of);
+        let joint = |p: &Proposed| names[p.joint].as_str();
+        let mut accepted = all;
+        accepted.retain(|p| wishes.wants_formula(joint(p)));
+        let found = |of: Option<&str>| accepted.iter().any(|p| Some(joint(p)) == of);
         let mut asked = wishes.accepted.iter().filter(|w| wishes.is_formula(w));
         if let Some((name, joint)) = asked.find(|w| !found(w.1.as_deref())) {
             return Err(DiagnoseError::Accept {
@@ -69,8 +65,8 @@ impl PreparedCase<'_> {
                 why: "no formula was found there: see `formulas` in the JSON document".into(),
             });
         }
-        let accepted = (!accepted.is_empty())
-            .then(|| self.with_formulas(searched, (confirmed, &proposed), &definitions, &accepted));
+        let some = !accepted.is_empty();
+        let accepted = some.then(|| self.with_formulas(searched, confirmed, &accepted));
         let accepted = accepted.transpose()?;
         Ok(SearchedFormulas { formulas, accepted })
     }
@@ -79,13 +75,12 @@ impl PreparedCase<'_> {
     fn with_formulas(
         &self,
         searched: &SearchedCase,
-        (confirmed, proposed): (&[Chosen], &[Proposed]),
-        definitions: &[Definition],
-        taken: &[usize],
+        confirmed: &[Chosen],
+        taken: &[&Proposed],
     ) -> Result<(SearchedCase, Judged), DiagnoseError> {
         let stays = |c: &&Chosen| {
             let same = |own: &Chosen| own.candidate == c.candidate;
-            taken.iter().all(|i| proposed[*i].beside.iter().any(same))
+            taken.iter().all(|p| p.beside.iter().any(same))
         };
         let mut chosen: Vec<Chosen> = confirmed.iter().filter(stays).cloned().collect();
         let mut candidates = searched.candidates.clone();
@@ -95,14 +90,14 @@ impl PreparedCase<'_> {
                 candidate.slopes.clear();
             }
         }
-        for i in taken {
+        for p in taken {
             chosen.push(Chosen {
                 candidate: candidates.len(),
-                gain: proposed[*i].selected.gain.clone(),
-                error: proposed[*i].selected.error,
+                gain: p.selected.gain.clone(),
+                error: p.selected.error,
                 alternatives: Vec::new(),
             });
-            candidates.push(self.candidate(&proposed[*i], &definitions[*i])?);
+            candidates.push(self.candidate(p)?);
         }
         let about = searched.summed.about.clone();
         let summed = self.summed(about, &candidates, &searched.directions)?;
@@ -127,13 +122,8 @@ impl PreparedCase<'_> {
         Ok((case, judged))
     }
 
-    fn candidate(
-        &self,
-        of: &Proposed,
-        definition: &Definition,
-    ) -> Result<Candidate, DiagnoseError> {
-        let robot = &self.case.given.model.robot;
-        let law = own::law(definition, robot)?;
+    fn candidate(&self, of: &Proposed) -> Result<Candidate, DiagnoseError> {
+        let law = own::law(&self.definition(of), &self.case.given.model.robot)?;
         let shapes = named(&of.terms, &self.names(of.joint));
         let shape = shapes.iter().map(|s| s.value).collect();
         let linear = vec![0.0; law.linear.len()];
@@ -197,7 +187,7 @@ impl PreparedCase<'_> {
         &self,
         searched: &SearchedCase,
         confirmed: &[Chosen],
-        (of, definition): (&Proposed, &Definition),
+        of: &Proposed,
         step: FoundEffect,
     ) -> FoundFormula {
         let stays = |c: &&Chosen| !of.beside.iter().any(|own| own.candidate == c.candidate);
@@ -211,7 +201,7 @@ impl PreparedCase<'_> {
         FoundFormula {
             joint: of.joint,
             end,
-            definition: definition.clone(),
+            definition: self.definition(of),
             step,
             p_value: of.p_value,
             share: of.selected.gain.value / of.selected.error.max(f64::MIN_POSITIVE),

@@ -65,12 +65,12 @@ pub struct JointChange {
 
 impl JointChange {
     /// Whether the interval lies below zero.
-    pub fn improved(&self) -> bool {
+    pub(crate) fn improved(&self) -> bool {
         self.interval_95[1] < 0.0
     }
 
     /// Whether it worsened by an amount that shows in a report: with rows enough any change is surely above zero.
-    pub fn noticeably_worse(&self) -> bool {
+    pub(crate) fn noticeably_worse(&self) -> bool {
         self.worsened && self.after - self.before > NOTICEABLE * self.before
     }
 }
