@@ -35,7 +35,7 @@ pub struct BlockSums {
 
 impl BlockSums {
     /// Zeros for so many blocks of joints with so many columns each, the torque not counted.
-    pub(crate) fn zeros(blocks: usize, columns: &[usize]) -> Self {
+    pub fn zeros(blocks: usize, columns: &[usize]) -> Self {
         let of_joint = |c: &usize| DMatrix::zeros(c + 1, c + 1);
         let of_block = |_| columns.iter().map(of_joint).collect();
         Self {
