@@ -279,22 +279,21 @@ impl<'a> Reconstruction<'a> {
         let mut full = settings.clone();
         full.decimation = Some(1);
         let parallel = Parallel::design(&full, stretch.dt)?;
-        let movement = |(v, speed): (&Vec<f64>, &f64)| -> Vec<f64> {
-            v.iter().map(|v| rest::movement(*v, *speed)).collect()
+        let speeds = || self.rest_speed.iter().enumerate();
+        let movement = |(j, speed): (usize, &f64)| {
+            let v = stretch.v[j].iter();
+            v.map(|v| rest::movement(*v, *speed)).collect()
         };
-        let moving = stretch.v.iter().zip(&self.rest_speed);
-        let moving: Vec<Vec<f64>> = moving.map(movement).collect();
-        let speeds = self.rest_speed.iter().enumerate();
-        let weights: Vec<Vec<f64>> = speeds
-            .map(|(j, speed)| parallel.weights(stretch, j, *speed))
-            .collect();
-        let weighted = |channels: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            let pairs = channels.iter().zip(&weights);
-            pairs
-                .map(|(x, w)| x.iter().zip(w).map(|(x, w)| x * w).collect())
-                .collect()
+        let moving: Vec<Vec<f64>> = speeds().map(movement).collect();
+        let weights = speeds().map(|(j, speed)| parallel.weights(stretch, j, *speed));
+        let weights: Vec<Vec<f64>> = weights.collect();
+        let weighted = |(x, w): (&Vec<f64>, &Vec<f64>)| {
+            let pairs = x.iter().zip(w);
+            pairs.map(|(x, w)| x * w).collect()
         };
-        let by_weight = [weighted(&stretch.tau), weighted(reconstructed)].concat();
+        let torques = stretch.tau.iter().chain(reconstructed);
+        let by_weight = torques.clone().zip(weights.iter().cycle());
+        let by_weight: Vec<Vec<f64>> = by_weight.map(weighted).collect();
         let mut widths = vec![vec![0.0; stretch.len()]; n];
         if let Some(band) = self.band {
             let [mut q, mut v, mut a, mut tau, mut width] = [(); 5].map(|()| vec![0.0; n]);
@@ -309,8 +308,7 @@ impl<'a> Reconstruction<'a> {
                 }
             }
         }
-        let channels = stretch.tau.iter().chain(reconstructed);
-        let channels = channels.chain(&moving).chain(&widths).chain(&by_weight);
+        let channels = torques.chain(&moving).chain(&widths).chain(&by_weight);
         let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
         let mut taken = Taken::new(settings);
@@ -407,46 +405,27 @@ impl<'a> Reconstruction<'a> {
             joint: robot.joint_names()[j].clone(),
             unit: robot.joint_unit(j),
             rmse: (s.error / s.rows.max(1) as f64).sqrt(),
-            relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
-            relative_error_moving: ratio(s.moving[0], s.moving[1], s.rows - s.resting),
-            relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
-            relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
+            relative_error: ratio([s.error, s.torque], 1).unwrap_or(f64::NAN),
+            relative_error_moving: ratio(s.moving, s.rows - s.resting),
+            relative_error_rest: ratio(s.rest, s.resting),
+            relative_error_raw: known(ratio([s.raw_error, s.raw_torque], 1)),
             coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
             half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
             max_abs: known(Some(s.largest)),
-            r2: if s.scatter > 0.0 && !self.summed {
-                1.0 - s.error / s.scatter
-            } else {
-                f64::NAN
+            r2: match s.scatter > 0.0 && !self.summed {
+                true => 1.0 - s.error / s.scatter,
+                false => f64::NAN,
             },
             samples: s.rows,
             resting: s.resting,
         };
         let joints: Vec<JointError> = all.iter().enumerate().map(joint).collect();
         let one_unit = joints.iter().all(|e| e.unit == joints[0].unit);
-        // squared error and torque over all joints, then those of movement and of rest
-        let mut pooled = [0.0; 6];
-        let (mut moving, mut resting) = (0, 0);
-        for s in &all {
-            let parts = [[s.error, s.torque], s.moving, s.rest];
-            for (sum, x) in pooled.iter_mut().zip(parts.as_flattened()) {
-                *sum += x;
-            }
-            moving += s.rows - s.resting;
-            resting += s.resting;
-        }
-        let [
-            error,
-            torque,
-            in_motion,
-            torque_in_motion,
-            at_rest,
-            torque_at_rest,
-        ] = pooled;
-        let part = |error: f64, torque: f64, rows: u64| {
-            one_unit
-                .then(|| ratio(error.max(0.0), torque, rows))
-                .flatten()
+        let mut pooled = ErrorSums::default();
+        all.iter().for_each(|s| pooled.merge(s));
+        let part = |[error, torque]: [f64; 2], rows: u64| {
+            let of_all = ratio([error.max(0.0), torque], rows);
+            of_all.filter(|_| one_unit)
         };
         let any = joints.iter().any(JointError::moves);
         let counted = joints.iter().filter(|e| e.moves() || !any);
@@ -454,9 +433,9 @@ impl<'a> Reconstruction<'a> {
         let mean = squares.iter().sum::<f64>() / squares.len() as f64;
         TorqueErrors {
             overall: Overall {
-                relative_error: one_unit.then(|| (error / torque).sqrt()),
-                relative_error_moving: part(in_motion, torque_in_motion, moving),
-                relative_error_rest: part(at_rest, torque_at_rest, resting),
+                relative_error: one_unit.then(|| (pooled.error / pooled.torque).sqrt()),
+                relative_error_moving: part(pooled.moving, pooled.rows - pooled.resting),
+                relative_error_rest: part(pooled.rest, pooled.resting),
                 mean_relative_error: mean.sqrt(),
             },
             joints,

@@ -58,24 +58,18 @@ pub fn candidates(
             if !beside(place) || known(model, law, place) {
                 continue;
             }
-            let touched = (0..robot.joints()).filter(|j| place.touches(*j));
-            if touched.clone().all(|j| cover.joints[j].stationary) {
-                let lacking =
-                    "the joint is held in these logs: move it to see what it does".to_owned();
-                not_tried.push(NotTried {
-                    law,
-                    place,
-                    lacking,
-                });
-                continue;
-            }
-            match law.starts_on(cover, place) {
+            let mut touched = (0..robot.joints()).filter(|j| place.touches(*j));
+            let shapes = match touched.all(|j| cover.joints[j].stationary) {
+                true => {
+                    Err("the joint is held in these logs: move it to see what it does".to_owned())
+                }
+                false => law.starts_on(cover, place),
+            };
+            match shapes {
                 Ok(shapes) => {
                     let seen = seen(model, cover, case, place);
-                    let own = shapes
-                        .into_iter()
-                        .filter_map(|shape| candidate(law, place, shape, &seen));
-                    out.extend(own);
+                    let shapes = shapes.into_iter();
+                    out.extend(shapes.filter_map(|shape| candidate(law, place, shape, &seen)));
                 }
                 Err(lacking) => not_tried.push(NotTried {
                     law,
@@ -119,19 +113,11 @@ fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> O
         // of coefficients that are all one they are the shape's
         Number::Ratio(..) | Number::Weight => false,
     };
-    if effect
-        .broken(seen, &|rule| of_coefficients(&rule.of))
-        .is_some()
-    {
-        return None;
-    }
-    let bounds = law
-        .linear
-        .iter()
-        .map(|key| bound(&effect, key, seen))
-        .collect();
+    let broken = effect.broken(seen, &|rule| of_coefficients(&rule.of));
+    let bounds = law.linear.iter().map(|key| bound(&effect, key, seen));
+    let bounds = bounds.collect();
     let linear = vec![0.0; law.linear.len()];
-    Some(Candidate {
+    broken.is_none().then_some(Candidate {
         effect: Added { linear, ..effect },
         bounds,
         slopes: Vec::new(),

@@ -6,26 +6,24 @@ use super::outcome::FrictionChange;
 use super::prepared::PreparedCase;
 use super::problem::unknowns::Unknown;
 use super::searched::SearchedCase;
-use super::watch::UNWATCHED;
-use crate::judge::BlocksLeftOut;
 
 /// Standard errors from which on a change is reported: there are as many places as blocks and joints.
-const TOLD: f64 = 3.0;
+const REPORTED: f64 = 3.0;
 
 /// The greatest change of each joint, where it is beyond doubt. It is reported as a change, and no law of it is fitted.
 pub fn friction_changes(prepared: &PreparedCase, searched: &SearchedCase) -> Vec<FrictionChange> {
-    let field = prepared.field(&searched.candidates, &searched.summed, UNWATCHED);
-    let declared = &searched.summed.declared;
-    let terms = declared.with(&field.terms_of(&searched.chosen));
-    let Some(left_out) = BlocksLeftOut::new(field.sums, field.judging, &terms) else {
+    let field = prepared.field(&searched.candidates, &searched.summed);
+    let terms = field.terms(&searched.chosen);
+    let Ok(left_out) = field.left_out(&terms) else {
         return Vec::new();
     };
     let joints = 0..prepared.case.given.model.robot.joints();
     let of_joint = |j: usize| {
-        let own: Vec<usize> = (0..prepared.unknowns.len())
-            .filter(|i| matches!(prepared.unknowns.list[*i], Unknown::Friction { joint, k } if joint == j && k < 2))
-            .collect();
-        let columns: Vec<_> = own.iter().map(|i| declared.list[*i].clone()).collect();
+        let of_law =
+            |u: &Unknown| matches!(*u, Unknown::Friction { joint, k } if joint == j && k < 2);
+        let declared = prepared.unknowns.list.iter().zip(&terms.list);
+        let own = declared.filter(|(u, _)| of_law(u));
+        let columns: Vec<_> = own.map(|(_, term)| term.clone()).collect();
         let blocks = &prepared.blocks.list;
         let begins = (1..blocks.len()).filter(|b| blocks[*b].log == blocks[b - 1].log);
         let gains = begins.map(|b| {
@@ -35,12 +33,11 @@ pub fn friction_changes(prepared: &PreparedCase, searched: &SearchedCase) -> Vec
             (b, left_out.gain_within(&columns, b..until), until)
         });
         let (b, gain, until) = gains.max_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
-        if columns.is_empty() || !gain.is_beyond(TOLD, Some(j)) {
+        if columns.is_empty() || !gain.is_beyond(REPORTED, Some(j)) {
             return None;
         }
         let amplitude = left_out.amplitude_within(&columns, b..until);
-        let v = prepared.cover.joints[j].speed_rms;
-        let gradient = [v, 1.0];
+        let gradient = [prepared.cover.joints[j].speed_rms, 1.0];
         let by = amplitude.iter().zip(gradient).map(|(x, g)| x * g).sum();
         let (stretch, rows) = blocks[b].pieces.first()?;
         let s = &prepared.case.stretches[*stretch];

@@ -4,8 +4,7 @@ use super::error::DiagnoseError;
 use super::outcome::SplitErrors;
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
-use super::problem::unknowns::Unknowns;
-use super::unexplained::errors::{self, Counted, Errors, JointChange, Pieces};
+use super::unexplained::errors::{self, Errors, JointChange, Pieces};
 use crate::effect::AugmentedModel;
 use crate::motion::MotionError;
 
@@ -15,6 +14,8 @@ pub struct HeldOutRows<'a> {
     pub case: &'a Case,
     pub split: &'a DataSplit,
     pub role: LogRole,
+    /// Without those in which friction at rest takes whatever the torque is.
+    pub moving: bool,
     /// Neighbouring pieces that a bootstrap draws together.
     pub together: usize,
 }
@@ -28,13 +29,14 @@ pub fn split_errors(
         case,
         split,
         role,
+        moving: false,
         together,
     };
     let train = of(LogRole::Train).errors(model)?;
     Ok(SplitErrors {
         train: train.ok_or_else(|| DiagnoseError::TooFewRows {
             rows: 0,
-            unknowns: Unknowns::of(&case.given, &case.open, case.keep).len(),
+            unknowns: case.unknowns().len(),
         })?,
         holdout: of(LogRole::Holdout).errors(model)?,
     })
@@ -64,21 +66,13 @@ impl EffectChange {
 
 impl HeldOutRows<'_> {
     fn pieces(&self, model: &AugmentedModel) -> Result<Pieces, MotionError> {
-        let case = self.case;
-        errors::pieces(
-            model,
-            &case.stretches,
-            (&case.filters, &case.rest_speed),
-            self.split,
-            (self.role, Counted::All),
-        )
+        errors::pieces(model, self.case, self.split, (self.role, self.moving))
     }
 
     /// Errors of a model; none where there are no such rows.
     pub fn errors(&self, model: &AugmentedModel) -> Result<Option<Errors>, MotionError> {
         let pieces = self.pieces(model)?;
-        let units = &self.case.units;
-        Ok(errors::summed(model, units, (&pieces, self.together)))
+        Ok(errors::summed(self.case, (&pieces, self.together)))
     }
 
     /// Mean relative error of a model over the joints; none where there are no such rows.

@@ -6,8 +6,7 @@ use crate::judge::LogRows;
 /// Least rows over which a time is looked for, in lags.
 const ROWS: usize = 4;
 
-/// The 1/e time of the residual of the joint in the middle, about its mean over a log \[s\]: on a joint that lacks an
-/// effect the residual remembers as long as the motion does. `residual` is filtered, `[stretch][joint][row]`.
+/// The 1/e time of the filtered residual, `[stretch][joint][row]`, of the joint in the middle, about its mean over a log \[s\].
 pub fn memory_s(residual: &[Vec<Vec<f64>>], logs: &[LogRows], split: &DataSplit) -> f64 {
     let joints = residual.first().map_or(0, Vec::len);
     let of_joint = |j: usize| {
@@ -21,6 +20,7 @@ pub fn memory_s(residual: &[Vec<Vec<f64>>], logs: &[LogRows], split: &DataSplit)
         step * lag(&own) as f64
     };
     let mut times: Vec<f64> = (0..joints).map(of_joint).filter(|t| *t > 0.0).collect();
+    // on a joint that lacks an effect the residual remembers as long as the motion does
     times.sort_by(f64::total_cmp);
     times.get(times.len() / 2).copied().unwrap_or(0.0)
 }

@@ -16,9 +16,6 @@ const PEAKS: usize = 6;
 const MIN_WAVES: f64 = 1.5;
 
 /// Fills the orders of a cover from the raw residuals of a model, `[stretch][joint][sample]`.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
 pub fn find(
     cover: &mut Cover,
     residuals: &[Vec<Vec<f64>>],
@@ -41,9 +38,9 @@ pub fn find(
         };
         let (mut plain, mut flipped) = (Vec::new(), Vec::new());
         for residual in [&filtered, &raw] {
-            let bins = Binned::of(&cover.joints[j], j, stretches, residual);
-            plain.extend(peaks(&bins.plain, &bins.count));
-            flipped.extend(peaks(&bins.flipped, &bins.count));
+            let [as_is, signed, count] = binned(&cover.joints[j], j, stretches, residual);
+            plain.extend(peaks(&as_is, &count));
+            flipped.extend(peaks(&signed, &count));
         }
         let orders = |mut waves: Vec<f64>| -> Vec<f64> {
             waves.sort_by(f64::total_cmp);
@@ -56,35 +53,27 @@ pub fn find(
     Ok(())
 }
 
-/// A residual summed over position, as it is and times the sign of the speed.
-struct Binned {
-    plain: Vec<f64>,
-    flipped: Vec<f64>,
-    count: Vec<f64>,
-}
-
-impl Binned {
-    fn of(joint: &JointCover, j: usize, stretches: &[Stretch], residual: &[Vec<f64>]) -> Self {
-        let (low, range) = (joint.position[0], joint.range());
-        let slow = 0.02 * joint.speed_rms;
-        let mut bins = Binned {
-            plain: vec![0.0; BINS],
-            flipped: vec![0.0; BINS],
-            count: vec![0.0; BINS],
-        };
-        for (s, e) in stretches.iter().zip(residual) {
-            for ((q, v), e) in s.q[j].iter().zip(&s.v[j]).zip(e) {
-                if v.abs() <= slow {
-                    continue;
-                }
-                let bin = (((q - low) / range * BINS as f64) as usize).min(BINS - 1);
-                bins.plain[bin] += e;
-                bins.flipped[bin] += e * v.signum();
-                bins.count[bin] += 1.0;
-            }
+/// A residual summed over position: as it is, times the sign of the speed, and the number of its rows.
+fn binned(
+    joint: &JointCover,
+    j: usize,
+    stretches: &[Stretch],
+    residual: &[Vec<f64>],
+) -> [Vec<f64>; 3] {
+    let (low, range) = (joint.position[0], joint.range());
+    let slow = 0.02 * joint.speed_rms;
+    let mut bins = [(); 3].map(|()| vec![0.0; BINS]);
+    for (s, e) in stretches.iter().zip(residual) {
+        let rows = s.q[j].iter().zip(&s.v[j]).zip(e);
+        for ((q, v), e) in rows.filter(|((_, v), _)| v.abs() > slow) {
+            let bin = (((q - low) / range * BINS as f64) as usize).min(BINS - 1);
+            let row = [*e, e * v.signum(), 1.0];
+            bins.iter_mut()
+                .zip(row)
+                .for_each(|(sums, x)| sums[bin] += x);
         }
-        bins
     }
+    bins
 }
 
 /// Orders that are summed side by side.
@@ -120,19 +109,20 @@ fn peaks(sums: &[f64], count: &[f64]) -> Vec<f64> {
     let mean = total / rows;
     let free: Vec<f64> = sums.iter().zip(count).map(|(s, c)| s - mean * c).collect();
     let last = (bins as f64 / 8.0 / SPACING) as usize;
-    let power: Vec<f64> = (0..last)
-        .step_by(LANES)
-        .flat_map(|first| powers(&free, first))
-        .take(last)
-        .collect();
+    let power = (0..last).step_by(LANES);
+    let power = power.flat_map(|first| powers(&free, first)).take(last);
+    let power: Vec<f64> = power.collect();
     let first = (MIN_WAVES / SPACING) as usize;
-    let mut found: Vec<(f64, f64)> = (first.max(1)..last.saturating_sub(1))
-        .filter(|&i| power[i] >= power[i - 1] && power[i] >= power[i + 1] || i == first)
-        .map(|i| (power[i], i as f64 * SPACING))
+    let is_peak = |i: &usize| {
+        let i = *i;
+        power[i] >= power[i - 1] && power[i] >= power[i + 1] || i == first
+    };
+    let mut found: Vec<usize> = (first.max(1)..last.saturating_sub(1))
+        .filter(is_peak)
         .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
     found.truncate(PEAKS);
-    found.into_iter().map(|(_, waves)| waves).collect()
+    found.iter().map(|i| *i as f64 * SPACING).collect()
 }
 
 #[cfg(test)]
@@ -144,12 +134,11 @@ mod tests {
         for waves in [3.0f64, 17.25, 120.0] {
             let bins = 4096;
             let count = vec![5.0; bins];
-            let sums: Vec<f64> = (0..bins)
-                .map(|b| {
-                    let x = b as f64 / bins as f64;
-                    5.0 * (std::f64::consts::TAU * waves * x + 0.4).sin() + 2.0
-                })
-                .collect();
+            let sum = |b| {
+                let x = f64::from(b) / bins as f64;
+                5.0 * (std::f64::consts::TAU * waves * x + 0.4).sin() + 2.0
+            };
+            let sums: Vec<f64> = (0..bins as u32).map(sum).collect();
             let found = peaks(&sums, &count)[0];
             assert!((found - waves).abs() <= SPACING, "{found} {waves}");
         }

@@ -4,14 +4,12 @@
 use nalgebra::DVector;
 
 use super::candidates::{Candidate, refined_shapes};
-use super::prepared::{PreparedCase, moved};
+use super::prepared::{PreparedCase, Summed, moved};
 use super::search::Chosen;
-use super::searched::Summed;
-use super::watch::UNWATCHED;
 use crate::effect::{Added, AugmentedModel};
+use crate::judge::Term;
 use crate::motion::MotionError;
 
-/// Most steps.
 const STEPS: usize = 6;
 /// A step that takes less than this part off the squares is the last.
 const SETTLED: f64 = 1e-5;
@@ -30,8 +28,7 @@ struct Point {
 }
 
 impl PreparedCase<'_> {
-    /// Moves the shapes of chosen candidates to where all blocks together want them. Returns sums of these candidates
-    /// alone, about the declared model that was fitted with them.
+    /// Moves the shapes of chosen candidates to where all blocks want them: sums of these alone, about the model fitted with them.
     pub fn polished(
         &self,
         candidates: &mut [Candidate],
@@ -39,9 +36,8 @@ impl PreparedCase<'_> {
         chosen: &[Chosen],
         directions: &[Added],
     ) -> Result<Summed, MotionError> {
-        let field = self.field(candidates, summed, UNWATCHED);
-        let terms = summed.declared.with(&field.terms_of(chosen));
-        let values = terms.fit(&field.total(), &[]).values;
+        let field = self.field(candidates, summed);
+        let values = field.terms(chosen).fit(&field.total(), &[]).values;
         let mut list = candidates.to_vec();
         for (i, candidate) in list.iter_mut().enumerate() {
             if !chosen.iter().any(|c| c.candidate == i) {
@@ -133,15 +129,14 @@ impl PreparedCase<'_> {
         };
         let directions: Vec<Added> = directions.iter().map(present).collect();
         let summed = self.summed(about, &candidates, &directions)?;
-        let field = self.field(&candidates, &summed, UNWATCHED);
-        let total = field.total();
-        let terms = summed.declared.with(&field.terms_of(chosen));
+        let field = self.field(&candidates, &summed);
+        let (total, terms) = (field.total(), field.terms(chosen));
         let fit = terms.fit(&total, &[]);
-        let weighted = fit.squares.iter().zip(&terms.weights);
-        let with_slopes = terms.with(&field.slopes_of(chosen));
-        let all = with_slopes.fit(&total, &[]).values;
+        let slopes = |c: &Chosen| summed.layout.slopes[c.candidate].clone();
+        let slopes: Vec<Term> = chosen.iter().flat_map(slopes).collect();
+        let all = terms.with(&slopes).fit(&total, &[]).values;
         Ok(Point {
-            squares: weighted.map(|(s, w)| s * w).sum(),
+            squares: terms.weigh(&fit.squares),
             step: all.iter().skip(terms.len()).copied().collect(),
             values: fit.values,
             summed,

@@ -11,21 +11,21 @@ use super::orders;
 use super::outcome::SplitErrors;
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole, Piece};
-use super::problem::fit::{Declared, Fitted, fit};
-use super::problem::pass::Data;
+use super::problem::fit::{Fitted, fit};
+use super::problem::pass::{ColumnLayout, Data};
 use super::problem::unknowns::{Unknowns, step};
-use super::unexplained::errors::{self, Counted, Errors};
+use super::unexplained::errors::Errors;
 use crate::effect::{Added, AugmentedModel, Cover};
-use crate::judge::{Blocks, BlocksLeftOut, LogRows, Term, TimeBlock, compare, divide};
+use crate::judge::{
+    BlockSums, Blocks, BlocksLeftOut, LogRows, Term, Terms, TimeBlock, compare, divide,
+};
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
 /// The declared model fitted, and the data divided.
 pub struct PreparedCase<'a> {
     pub case: &'a Case,
-    pub split: &'a DataSplit,
     pub data: Data<'a>,
-    pub declared: Declared<'a>,
     pub unknowns: Unknowns,
     pub fitted: Fitted,
     pub cover: Cover,
@@ -37,15 +37,20 @@ pub struct PreparedCase<'a> {
     pub together: usize,
 }
 
+/// Sums of products about a model.
+pub struct Summed {
+    /// The declared model that they are about.
+    pub about: AugmentedModel,
+    /// Friction laws by whose direction friction goes.
+    pub directions: Vec<Added>,
+    pub layout: ColumnLayout,
+    pub sums: BlockSums,
+    pub declared: Terms,
+}
+
 impl<'a> PreparedCase<'a> {
     pub fn of(case: &'a Case, split: &'a DataSplit) -> Result<Self, DiagnoseError> {
         let numbers = &case.numbers;
-        let declared = Declared {
-            open: &case.open,
-            prior: &case.prior,
-            keep: case.keep,
-            ridge: numbers.ridge,
-        };
         let data = Data {
             stretches: &case.stretches,
             filters: &case.filters,
@@ -54,9 +59,8 @@ impl<'a> PreparedCase<'a> {
         };
         let logs = split.logs(&case.stretches, LogRole::Train);
         let whole = divide(&logs, f64::INFINITY, numbers).list;
-        let fitted = fit(&case.given, declared, (&data, &whole), None)?;
+        let fitted = fit(case, &case.given, (&data, &whole), None)?;
         let train = case.stretches_of(LogRole::Train);
-        let unknowns = Unknowns::of(&case.given, &case.open, case.keep);
         let mut cover = Cover::of(&case.given.model.robot, &train, case.cutoff_hz);
         let raw = residuals(&fitted.model, &train);
         orders::find(&mut cover, &raw, &train, &case.filters)?;
@@ -66,29 +70,28 @@ impl<'a> PreparedCase<'a> {
         let prepared = PreparedCase {
             together: 1,
             case,
-            split,
             data,
-            declared,
-            unknowns,
+            unknowns: case.unknowns(),
             fitted,
             cover,
             blocks: Blocks::default(),
             all_blocks: Vec::new(),
         };
-        let mut prepared = prepared.divided(&logs, memory);
-        if prepared.blocks.parts < numbers.parts {
-            let rest = prepared.memory_of_rest(&logs)?;
-            prepared = prepared.divided(&logs, rest.min(memory));
-            if prepared.blocks.parts < numbers.parts {
-                prepared = prepared.divided(&logs, memory);
-            }
+        let prepared = prepared.divided(&logs, memory);
+        if prepared.blocks.parts >= numbers.parts {
+            return Ok(prepared);
         }
-        Ok(prepared)
+        let rest = prepared.memory_of_rest(&logs)?;
+        let finer = prepared.divided(&logs, rest.min(memory));
+        Ok(match finer.blocks.parts < numbers.parts {
+            true => finer.divided(&logs, memory),
+            false => finer,
+        })
     }
 
     /// Divided into blocks beside which a residual's memory \[s\] is short.
     fn divided(mut self, logs: &[LogRows], memory: f64) -> Self {
-        let (case, split) = (self.case, self.split);
+        let (case, split) = (self.case, self.data.split);
         let numbers = &case.numbers;
         let reach = |s: &Stretch| case.filters.of(s).trim as f64 * s.dt;
         let reach = case.stretches.iter().map(reach).fold(0.0, f64::max);
@@ -103,19 +106,15 @@ impl<'a> PreparedCase<'a> {
         self
     }
 
-    /// Memory \[s\] of the residual beside the one effect that explains most: what an effect leaves remembers as long
-    /// as the motion does, and is no noise. One effect is too few numbers to whiten noise.
+    /// Memory \[s\] of the residual beside the one effect that explains most: too few numbers to whiten noise.
     fn memory_of_rest(&self, logs: &[LogRows]) -> Result<f64, DiagnoseError> {
         let model = &self.fitted.model;
         let (candidates, _) = candidates(model, self.case, &self.cover);
         let summed = self.summed(model.clone(), &candidates, &[])?;
-        let fitted = self.all_blocks.len() - self.judging();
-        let total = summed.sums.over(0..fitted);
-        let weights = &summed.declared.weights;
+        let total = self.field(&candidates, &summed).total();
         let beside = |own: &Vec<Term>| {
             let fit = summed.declared.with(own).fit(&total, &[]);
-            let square = fit.squares.iter().zip(weights).map(|(e, w)| e * w);
-            (square.sum::<f64>(), fit.values)
+            (summed.declared.weigh(&fit.squares), fit.values)
         };
         let terms = summed.layout.candidates.par_iter();
         let fits: Vec<_> = terms.map(beside).collect();
@@ -128,10 +127,20 @@ impl<'a> PreparedCase<'a> {
             linear: values.as_slice()[self.unknowns.len()..].to_vec(),
             ..candidate.effect.clone()
         });
-        Ok(memory_s(&filtered(&with, &self.data)?, logs, self.split))
+        Ok(memory_s(
+            &filtered(&with, &self.data)?,
+            logs,
+            self.data.split,
+        ))
     }
 
-    /// Blocks that only judge.
+    pub fn nothing_determined(&self) -> DiagnoseError {
+        DiagnoseError::NothingDetermined {
+            unknowns: self.unknowns.len(),
+        }
+    }
+
+    /// Number of blocks that only judge.
     pub fn judging(&self) -> usize {
         self.all_blocks.len() - self.blocks.list.len()
     }
@@ -139,11 +148,10 @@ impl<'a> PreparedCase<'a> {
     /// The declared model fitted anew beside effects that are held.
     pub fn refit(&self, start: &AugmentedModel) -> Result<AugmentedModel, MotionError> {
         let data = (&self.data, self.blocks.list.as_slice());
-        Ok(fit(start, self.declared, data, Some(&self.fitted.weights))?.model)
+        Ok(fit(self.case, start, data, Some(&self.fitted.weights))?.model)
     }
 
-    /// Whether the declared numbers of a model that was fitted to these data gain on blocks left out over those of
-    /// another.
+    /// Whether the declared numbers of a fitted model gain on blocks left out over those of another.
     pub fn is_better(
         &self,
         fitted: &AugmentedModel,
@@ -153,10 +161,8 @@ impl<'a> PreparedCase<'a> {
         let fitted = self.summed(fitted.clone(), &[], &[])?;
         let weights = &fitted.declared.weights;
         let nothing = DVector::zeros(self.unknowns.len());
-        let as_given = given.sums.blocks.iter();
-        let as_given: Vec<_> = as_given
-            .map(|block| given.declared.squares(block, &nothing))
-            .collect();
+        let squares = |block: &Vec<_>| given.declared.squares(block, &nothing);
+        let as_given: Vec<_> = given.sums.blocks.iter().map(squares).collect();
         let left_out = BlocksLeftOut::new(&fitted.sums, self.judging(), &fitted.declared);
         Ok(left_out.is_some_and(|left_out| {
             let gain = compare(&as_given, &left_out.errors(), weights);
@@ -167,34 +173,29 @@ impl<'a> PreparedCase<'a> {
     pub fn held_out(&self, role: LogRole) -> HeldOutRows<'_> {
         HeldOutRows {
             case: self.case,
-            split: self.split,
+            split: self.data.split,
             role,
+            moving: false,
             together: self.together,
         }
     }
 
     pub fn split_errors(&self, model: &AugmentedModel) -> Result<SplitErrors, DiagnoseError> {
-        split_errors((self.case, self.split, self.together), model)
+        split_errors((self.case, self.data.split, self.together), model)
     }
 
+    /// Errors without the rows in which friction at rest takes whatever the torque is.
     pub fn moving(
         &self,
         model: &AugmentedModel,
         role: LogRole,
     ) -> Result<Option<Errors>, MotionError> {
-        let case = self.case;
-        let counted = match case.given.model.friction.iter().any(JointFriction::jumps) {
-            true => Counted::Moving,
-            false => Counted::All,
+        let friction = &self.case.given.model.friction;
+        let rows = HeldOutRows {
+            moving: friction.iter().any(JointFriction::jumps),
+            ..self.held_out(role)
         };
-        let pieces = errors::pieces(
-            model,
-            &case.stretches,
-            (&case.filters, &case.rest_speed),
-            self.split,
-            (role, counted),
-        )?;
-        Ok(errors::summed(model, &case.units, (&pieces, self.together)))
+        rows.errors(model)
     }
 }
 

@@ -10,36 +10,29 @@ use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors, WhatIsL
 use super::prepared::{PreparedCase, filtered, residuals};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
-use super::problem::unknowns::Unknowns;
 use super::searched::SearchedCase;
 use super::steps::{Judged, judge};
 use super::unexplained::dependence::{Left, dependences};
-use super::unexplained::{noise, part_unexplained, unexplained};
+use super::unexplained::noise_floor::floor;
+use super::unexplained::{part_unexplained, unexplained};
 use super::watch::Watch;
-use crate::effect::{AugmentedModel, Search, Torques};
+use crate::effect::{AugmentedModel, Search};
 use crate::judge::Numbers;
-use crate::motion::{MotionError, Stretch};
+use crate::motion::Stretch;
 
 /// Diagnoses; `watch` hears of every step and is asked now and then whether to stop.
 ///
 /// # Errors
 /// [`DiagnoseError`].
 pub fn diagnose(case: &Case, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
-    let robot = &case.given.model.robot;
-    let split = DataSplit::of(
-        robot,
-        &case.stretches,
-        &case.roles,
-        &case.filters,
-        case.cutoff_hz,
-    );
+    let split = case.split();
     check(case, &split)?;
     let prepared = PreparedCase::of(case, &split)?;
-    unless_stopped(watch)?;
+    watch.unless_stopped()?;
     let searched = prepared.search(watch)?;
-    unless_stopped(watch)?;
+    watch.unless_stopped()?;
     let judged = judge(&prepared, &searched)?;
-    unless_stopped(watch)?;
+    watch.unless_stopped()?;
     let mut found = prepared.evaluate(&searched, judged.clone())?;
     if case.wishes.search {
         let formulas = prepared.formulas((&searched, &judged), &found, watch)?;
@@ -60,26 +53,12 @@ pub fn errors_of(
     together: usize,
     model: &AugmentedModel,
 ) -> Result<SplitErrors, DiagnoseError> {
-    let split = DataSplit::of(
-        &case.given.model.robot,
-        &case.stretches,
-        &case.roles,
-        &case.filters,
-        case.cutoff_hz,
-    );
-    split_errors((case, &split, together), model)
-}
-
-fn unless_stopped(watch: Watch) -> Result<(), DiagnoseError> {
-    match (watch.stop)() {
-        true => Err(DiagnoseError::Interrupted),
-        false => Ok(()),
-    }
+    split_errors((case, &case.split(), together), model)
 }
 
 /// Refuses what cannot be fitted.
 fn check(case: &Case, split: &DataSplit) -> Result<(), DiagnoseError> {
-    let unknowns = Unknowns::of(&case.given, &case.open, case.keep).len();
+    let unknowns = case.unknowns().len();
     let rows = split.rows_of(LogRole::Train);
     if rows < 10 * unknowns {
         return Err(DiagnoseError::TooFewRows { rows, unknowns });
@@ -87,9 +66,8 @@ fn check(case: &Case, split: &DataSplit) -> Result<(), DiagnoseError> {
     for (j, joint) in case.given.model.robot.joint_names().iter().enumerate() {
         let silent = |s: &Stretch| s.tau[j].iter().all(|x| *x == 0.0);
         if case.stretches.iter().all(silent) {
-            return Err(DiagnoseError::NoTorque {
-                joint: joint.clone(),
-            });
+            let joint = joint.clone();
+            return Err(DiagnoseError::NoTorque { joint });
         }
     }
     Ok(())
@@ -106,22 +84,18 @@ impl PreparedCase<'_> {
         let refitted = self.split_errors(&self.fitted.model)?.train;
         let after = self.split_errors(&judged.judge)?;
         let had_a_say = judged.steps.iter().any(FoundEffect::vetoed);
-        let selected = match had_a_say {
-            true => Some(self.split_errors(&judged.written)?),
-            false => None,
-        };
+        let selected = had_a_say.then(|| self.split_errors(&judged.written));
         // what is left is looked at with the numbers refitted: those that other logs gave are no missing physics
         let alone = &self.fitted.model;
         let added = judged.written.effects.len() > case.given.effects.len();
         let last = if added { &judged.written } else { alone };
-        let numbers = &case.numbers;
         let left = self.what_is_left(last)?;
-        let residual_std = rms_of(&filtered(last, &self.data)?, self.split);
+        let residual_std = rms_of(&filtered(last, &self.data)?, self.data.split);
         Ok(Diagnosis {
             left,
             left_alone: added.then(|| self.what_is_left(alone)).transpose()?,
             changes: friction_changes(self, searched),
-            candidates: left_candidates(searched, numbers),
+            candidates: left_candidates(searched, &case.numbers),
             determined: searched.determined,
             model: judged.written,
             estimates: judged.estimates,
@@ -132,14 +106,14 @@ impl PreparedCase<'_> {
             before,
             refitted,
             after,
-            selected,
-            set_aside: self.split.set_aside.clone(),
+            selected: selected.transpose()?,
+            set_aside: self.data.split.set_aside.clone(),
             residual_std,
             fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
             together: self.together,
             parts: self.blocks.parts,
             block_s: self.blocks.least_s,
-            parts_needed: numbers.parts,
+            parts_needed: case.numbers.parts,
             formulas: Vec::new(),
         })
     }
@@ -147,12 +121,11 @@ impl PreparedCase<'_> {
     /// What a model leaves of the torques, beside the noise.
     fn what_is_left(&self, model: &AugmentedModel) -> Result<WhatIsLeft, DiagnoseError> {
         let case = self.case;
-        let floor_of = |role| -> Result<Option<Vec<f64>>, MotionError> {
+        let floor_of = |role| {
             let own = case.stretches_of(role);
-            match own.is_empty() {
-                true => Ok(None),
-                false => noise(&residuals(model, &own), case, &own).map(Some),
-            }
+            let some = !own.is_empty();
+            some.then(|| floor(case, &residuals(model, &own), &own))
+                .transpose()
         };
         let floor = floor_of(LogRole::Train)?.unwrap_or_default();
         let floor_unseen = floor_of(LogRole::Holdout)?;
@@ -167,17 +140,13 @@ impl PreparedCase<'_> {
         };
         let unseen = self.moving(model, LogRole::Holdout)?;
         let unexplained = unexplained(&found, &floor, unseen.as_ref().zip(floor_unseen));
-        let structured = unexplained.iter().enumerate();
-        let structured = structured.filter(|(_, l)| l.is_structure()).map(|(j, _)| j);
+        let structured = (0..unexplained.len()).filter(|j| unexplained[*j].is_structure());
         let structured: Vec<usize> = structured.collect();
-        let residual = filtered(model, &self.data)?;
-        let torques: Vec<Torques> = (case.stretches.par_iter())
-            .map(|s| model.torques(s))
-            .collect();
+        let torques = case.stretches.par_iter().map(|s| model.torques(s));
         let left = Left {
             data: &self.data,
-            residual: &residual,
-            torques: &torques,
+            residual: &filtered(model, &self.data)?,
+            torques: &torques.collect::<Vec<_>>(),
         };
         Ok(WhatIsLeft {
             dependence: dependences(&left, &structured, self.together),
@@ -189,7 +158,6 @@ impl PreparedCase<'_> {
 
 /// Root mean square of each joint's residual over the fitted rows.
 fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
-    let joints = residual.first().map_or(0, Vec::len);
     let of_joint = |j: usize| {
         let train = split.pieces.iter().filter(|p| p.role == LogRole::Train);
         let own = train.filter(|p| !split.is_stationary(p.stretch, j));
@@ -197,6 +165,7 @@ fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
         let (sum, count) = rows.fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
         (sum / f64::max(count, 1.0)).sqrt()
     };
+    let joints = residual.first().map_or(0, Vec::len);
     (0..joints).map(of_joint).collect()
 }
 
@@ -204,20 +173,13 @@ fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
 fn left_candidates(searched: &SearchedCase, numbers: &Numbers) -> Vec<LeftCandidate> {
     let mut out: Vec<LeftCandidate> = Vec::new();
     let effect = |i: usize| &searched.candidates[i].effect;
-    let chosen: Vec<_> = searched
-        .chosen
-        .iter()
-        .map(|c| effect(c.candidate))
-        .collect();
     for l in &searched.looked {
         let own = effect(l.candidate);
         let score = l.gain.value / searched.error.max(f64::MIN_POSITIVE);
         let waves = own.law.entry.search == Search::Orders;
-        let same = |c: &LeftCandidate| c.law.entry.name == own.name() && c.place == own.place;
-        let known = chosen
-            .iter()
-            .any(|c| c.name() == own.name() && c.place == own.place);
-        if known && !waves {
+        let same = |name: &str, place| name == own.name() && place == own.place;
+        let mut chosen = searched.chosen.iter().map(|c| effect(c.candidate));
+        if !waves && chosen.any(|c| same(c.name(), c.place)) {
             continue;
         }
         let reason = match l.gain.value > 0.0 {
@@ -228,18 +190,23 @@ fn left_candidates(searched: &SearchedCase, numbers: &Numbers) -> Vec<LeftCandid
                 numbers.screen
             ),
         };
-        match out.iter_mut().find(|c| same(c)) {
+        let found = LeftCandidate {
+            law: own.law,
+            place: own.place,
+            effect: Some(own.clone()),
+            score: Some(score),
+            reason,
+        };
+        let alike = |c: &&mut LeftCandidate| same(c.law.entry.name, c.place);
+        match out.iter_mut().find(alike) {
             Some(best) if best.score.is_some_and(|s| s >= score) => {}
             Some(best) => {
-                (best.effect, best.score, best.reason) = (Some(own.clone()), Some(score), reason)
+                *best = LeftCandidate {
+                    law: best.law,
+                    ..found
+                };
             }
-            None => out.push(LeftCandidate {
-                law: own.law,
-                place: own.place,
-                effect: Some(own.clone()),
-                score: Some(score),
-                reason,
-            }),
+            None => out.push(found),
         }
     }
     let not_tried = searched.not_tried.iter();

@@ -1,40 +1,27 @@
 //! What is chosen of all candidates: one pass over the rows, then the search; once more about the friction laws that
 //! are found, for what goes by a joint's direction goes by its law.
 
-use crate::explain::ErrorText;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, NotTried, candidates, is_friction_law};
 use super::error::DiagnoseError;
-use super::prepared::PreparedCase;
-use super::problem::fit::determines_some;
+use super::prepared::{PreparedCase, Summed};
+use super::problem::fit::{declared_terms, determines_some};
 use super::problem::pass::{ColumnLayout, Data, pass};
 use super::search::{Chosen, Field, Looked};
 use super::tables::verified;
-use super::watch::{UNWATCHED, Watch};
+use super::watch::Watch;
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{BlockSums, BlocksLeftOut, LEAST_PARTS, Terms, compare, weighted};
+use crate::explain::ErrorText;
+use crate::judge::{BlockSums, LEAST_PARTS, compare, weighted};
 use crate::motion::{MotionError, Stretch};
-
-/// Sums of products about a model.
-pub struct Summed {
-    /// The declared model that they are about.
-    pub about: AugmentedModel,
-    /// Friction laws by whose direction friction goes.
-    directions: Vec<Added>,
-    pub layout: ColumnLayout,
-    pub sums: BlockSums,
-    /// The declared terms.
-    pub declared: Terms,
-}
 
 /// What the search came to.
 pub struct SearchedCase {
     /// Those that were chosen in their best shape.
     pub candidates: Vec<Candidate>,
     pub not_tried: Vec<NotTried>,
-    /// Sums of what was chosen.
     pub summed: Summed,
     pub chosen: Vec<Chosen>,
     pub looked: Vec<Looked>,
@@ -57,7 +44,7 @@ impl PreparedCase<'_> {
         directions: &[Added],
     ) -> Result<Summed, MotionError> {
         let layout = ColumnLayout::of(&self.unknowns, candidates);
-        let mut declared = self.declared.terms(&self.unknowns, &layout, &about);
+        let mut declared = declared_terms(self.case, &self.unknowns, &layout, &about);
         declared.weights.clone_from(&self.fitted.weights);
         let mut summed = Summed {
             about,
@@ -109,21 +96,11 @@ impl PreparedCase<'_> {
         Ok(with(1.0)?.mean(&with(-1.0)?))
     }
 
-    /// What is searched, by sums of products.
-    pub fn field<'b>(
-        &'b self,
-        candidates: &'b [Candidate],
-        summed: &'b Summed,
-        watch: Watch<'b>,
-    ) -> Field<'b> {
+    pub fn field<'b>(&'b self, candidates: &'b [Candidate], summed: &'b Summed) -> Field<'b> {
         Field {
+            prepared: self,
             candidates,
-            terms: &summed.layout.candidates,
-            slopes: &summed.layout.slopes,
-            sums: &summed.sums,
-            judging: self.judging(),
-            numbers: &self.case.numbers,
-            watch,
+            summed,
         }
     }
 
@@ -132,46 +109,37 @@ impl PreparedCase<'_> {
         let model = &self.fitted.model;
         let (mut candidates, not_tried) = candidates(model, self.case, &self.cover);
         let mut summed = self.summed(model.clone(), &candidates, &[])?;
-        let nothing = || DiagnoseError::NothingDetermined {
-            unknowns: self.unknowns.len(),
-        };
         if !determines_some(&summed.sums, &summed.declared) && !self.case.keep {
-            return Err(nothing());
+            return Err(self.nothing_determined());
         }
-        let numbers = &self.case.numbers;
-        let alone = BlocksLeftOut::new(&summed.sums, self.judging(), &summed.declared);
-        let errors = alone.ok_or_else(nothing)?.errors();
+        let field = self.field(&candidates, &summed);
+        let errors = field.left_out(&summed.declared)?.errors();
         let weights = &summed.declared.weights;
-        let determined =
-            compare(&torque_squares(&summed), &errors, weights).is_beyond(numbers.screen, None);
+        let gain = compare(&torque_squares(&summed.sums), &errors, weights);
+        let determined = gain.is_beyond(self.case.numbers.screen, None);
         let error = weighted(&errors, weights);
         let (mut chosen, mut looked) = (Vec::new(), Vec::new());
         let mut directions = Vec::new();
         if self.blocks.parts >= LEAST_PARTS {
-            let field = self.field(&candidates, &summed, watch);
-            (chosen, looked) = field
-                .search(&summed.declared, Vec::new())
-                .ok_or_else(nothing)?;
+            (chosen, looked) = field.search(Vec::new(), watch)?;
             let smooth = |c: &&Chosen| {
-                let effect = &candidates[c.candidate].effect;
+                let effect = field.effect(c);
                 is_friction_law(effect) && effect.law.direction.is_some()
             };
             let laws: Vec<Chosen> = chosen.iter().filter(smooth).cloned().collect();
             directions = self.agreed(&mut candidates, &summed, &laws)?;
             if !directions.is_empty() {
                 summed = self.summed(model.clone(), &candidates, &directions)?;
-                let field = self.field(&candidates, &summed, watch);
-                (chosen, looked) = field.search(&summed.declared, laws).ok_or_else(nothing)?;
+                let field = self.field(&candidates, &summed);
+                (chosen, looked) = field.search(laws, watch)?;
             }
         }
         self.accept(&candidates, &looked, error, &mut chosen)?;
+        let mut noisier = None;
         if !chosen.is_empty() {
             summed = self.polished(&mut candidates, &summed, &chosen, &directions)?;
+            noisier = Some(self.noisier(&summed, &candidates)?);
         }
-        let noisier = match chosen.is_empty() {
-            true => None,
-            false => Some(self.noisier(&summed, &candidates)?),
-        };
         Ok(SearchedCase {
             noisier,
             error,
@@ -196,8 +164,8 @@ impl PreparedCase<'_> {
             return Ok(Vec::new());
         }
         let polished = self.polished(candidates, summed, laws, &[])?;
-        let field = self.field(candidates, &polished, UNWATCHED);
-        let found = verified(&field, &polished.declared, laws, &self.blocks, None);
+        let field = self.field(candidates, &polished);
+        let found = verified(&field, laws, None);
         let agreed = found.iter().filter(|v| v.agreement.s > 0.0);
         let effects = agreed.map(|v| candidates[v.chosen.candidate].effect.clone());
         Ok(effects.collect())
@@ -211,13 +179,9 @@ impl PreparedCase<'_> {
         error: f64,
         chosen: &mut Vec<Chosen>,
     ) -> Result<(), DiagnoseError> {
-        let robot = &self.case.given.model.robot;
         let wishes = &self.case.wishes;
         for wanted in wishes.accepted.iter().filter(|w| !wishes.is_formula(w)) {
-            let is = |c: usize| {
-                let effect = &candidates[c].effect;
-                effect.name() == wanted.0 && effect.place.name(robot) == wanted.1
-            };
+            let is = |c: usize| self.case.is_named(&candidates[c].effect, wanted);
             if chosen.iter().any(|c| is(c.candidate)) {
                 continue;
             }
@@ -243,14 +207,9 @@ fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
     }
 }
 
-/// Squared torque of every block, `[block][joint]`.
-fn torque_squares(summed: &Summed) -> Vec<Vec<f64>> {
-    let of_block = |joints: &Vec<DMatrix<f64>>| {
-        let square = |(j, s): (usize, &DMatrix<f64>)| {
-            let torque = summed.layout.torque(j);
-            s[(torque, torque)]
-        };
-        joints.iter().enumerate().map(square).collect()
-    };
-    summed.sums.blocks.iter().map(of_block).collect()
+/// Squared torque of every block, `[block][joint]`: it stands before the residual, which is last.
+fn torque_squares(sums: &BlockSums) -> Vec<Vec<f64>> {
+    let square = |s: &DMatrix<f64>| s[(s.nrows() - 2, s.nrows() - 2)];
+    let of_block = |joints: &Vec<_>| joints.iter().map(square).collect();
+    sums.blocks.iter().map(of_block).collect()
 }

@@ -8,13 +8,11 @@ use super::outcome::{FoundEffect, StepStatus};
 use super::prepared::{PreparedCase, moved};
 use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
-use super::problem::unknowns::{Unknown, value};
+use super::problem::unknowns::{Unknown, step, value};
 use super::search::{Chosen, Field};
 use super::searched::SearchedCase;
 use super::tables::{self, Estimates, TermPlaces, Verified};
-use super::watch::UNWATCHED;
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{Numbers, Terms};
 
 /// What is made of the effects that were chosen.
 #[derive(Clone)]
@@ -40,19 +38,13 @@ struct Way {
 }
 
 /// Asks the parts, then held-out data.
-///
-/// # Errors
-/// [`DiagnoseError`].
 pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
-    let summed = &searched.summed;
     let mut work = Judging {
         prepared,
-        field: prepared.field(&searched.candidates, summed, UNWATCHED),
-        declared: &summed.declared,
-        about: &summed.about,
+        field: prepared.field(&searched.candidates, &searched.summed),
         refit: true,
     };
-    let mut ways = work.ways(searched)?;
+    let mut ways = work.ways(searched);
     work.settle(&mut ways)?;
     work.refit = work.wants_other_numbers(&ways)?;
     let judge = work.written(&ways, true)?;
@@ -68,59 +60,45 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
 struct Judging<'a> {
     prepared: &'a PreparedCase<'a>,
     field: Field<'a>,
-    declared: &'a Terms,
-    /// The declared model that the sums are about.
-    about: &'a AugmentedModel,
     /// Whether these data want other declared numbers than those that were given.
     refit: bool,
 }
 
 impl Judging<'_> {
-    fn numbers(&self) -> &Numbers {
-        self.field.numbers
-    }
-
     /// The effects that were chosen, and those that the user wants.
-    fn ways(&self, searched: &SearchedCase) -> Result<Vec<Way>, DiagnoseError> {
+    fn ways(&self, searched: &SearchedCase) -> Vec<Way> {
         let case = self.prepared.case;
-        let robot = &case.given.model.robot;
-        let is = |effect: &Added, (name, joint): &(String, Option<String>)| {
-            effect.name() == name && effect.place.name(robot) == *joint
+        let named = |effect: &Added| {
+            let mut wanted = case.wishes.accepted.iter();
+            wanted.any(|w| case.is_named(effect, w))
         };
         let formula_wanted = |effect: &Added| {
-            let joint = effect.place.name(robot);
+            let joint = effect.place.name(&case.given.model.robot);
             let own = |name: &String| effect.name().starts_with(name);
             joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
         };
-        let verified = tables::verified(
-            &self.field,
-            self.declared,
-            &searched.chosen,
-            &self.prepared.blocks,
-            searched.noisier.as_ref(),
-        );
+        let noisier = searched.noisier.as_ref();
+        let verified = tables::verified(&self.field, &searched.chosen, noisier);
         let way = |verified: Verified| {
-            let effect = &searched.candidates[verified.chosen.candidate].effect;
+            let effect = self.field.effect(&verified.chosen);
             Way {
-                accepted: case.wishes.accepted.iter().any(|wanted| is(effect, wanted))
-                    || effect.law.formula.is_some() && formula_wanted(effect),
+                accepted: named(effect) || effect.law.formula.is_some() && formula_wanted(effect),
                 verified,
                 amplitude: None,
                 change: None,
                 vetoed: false,
             }
         };
-        Ok(verified.into_iter().map(way).collect())
+        verified.into_iter().map(way).collect()
     }
 
-    /// Amplitudes of the predicting model: those of the joint fit with all effects whose parts agree, as much of each as
-    /// they agree.
+    /// Amplitudes of the predicting model: those of the joint fit with all effects whose parts agree, so far as they do.
     fn settle(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
         let factors: Vec<f64> = ways.iter().map(|w| self.factor(w)).collect();
         let kept = ways.iter().zip(&factors).filter(|(_, f)| **f > 0.0);
         let kept: Vec<Chosen> = kept.map(|(w, _)| w.verified.chosen.clone()).collect();
-        let estimates = self.estimates(&kept)?;
-        let mut at = self.declared.len();
+        let estimates = Estimates::of(&self.field, &kept)?;
+        let mut at = self.prepared.unknowns.len();
         for (way, factor) in ways.iter_mut().zip(factors).filter(|(_, f)| *f > 0.0) {
             let count = way.verified.amplitude.len();
             let own = estimates.values.rows(at, count);
@@ -134,22 +112,14 @@ impl Judging<'_> {
         Ok(())
     }
 
-    fn estimates(&self, effects: &[Chosen]) -> Result<Estimates, DiagnoseError> {
-        let nothing = DiagnoseError::NothingDetermined {
-            unknowns: self.prepared.unknowns.len(),
-        };
-        let rows = self.prepared.case.prior.rows_per_independent;
-        Estimates::of(&self.field, self.declared, effects, rows).ok_or(nothing)
-    }
-
     /// Part of an effect's amplitude that predicts. What a person can measure is whole or is not there.
     fn factor(&self, way: &Way) -> f64 {
         let s = way.verified.agreement.s;
-        let effect = &self.field.candidates[way.verified.chosen.candidate].effect;
+        let effect = self.field.effect(&way.verified.chosen);
         match (way.accepted, effect.law.entry.measurable) {
             (true, _) => 1.0,
             (false, false) => s,
-            (false, true) if s > self.numbers().confirmed => 1.0,
+            (false, true) if s > self.field.numbers().confirmed => 1.0,
             (false, true) => 0.0,
         }
     }
@@ -158,16 +128,12 @@ impl Judging<'_> {
     fn written(&self, ways: &[Way], all: bool) -> Result<AugmentedModel, DiagnoseError> {
         let effects: Vec<_> = ways.iter().filter(|w| all || !w.vetoed).collect();
         match effects.iter().any(|w| w.amplitude.is_some()) {
-            true => {
-                let fitted = self.prepared.refit(&self.fitted(&effects))?;
-                Ok(self.based(fitted))
-            }
+            true => Ok(self.based(self.prepared.refit(&self.fitted(&effects))?)),
             false => Ok(self.prepared.case.given.clone()),
         }
     }
 
-    /// A model with effects, its declared numbers as given but for what the effects change: where these data do not ask
-    /// for others, those of other data stay.
+    /// A model with effects, its declared numbers as given but for what the effects change, unless these data want others.
     fn based(&self, model: AugmentedModel) -> AugmentedModel {
         match self.refit {
             true => model,
@@ -189,7 +155,7 @@ impl Judging<'_> {
         let (given, fitted) = (&self.prepared.case.given, &self.prepared.fitted.model);
         let off = |u: &Unknown| value(given, *u) - value(fitted, *u);
         let off: Vec<f64> = unknowns.list.iter().map(off).collect();
-        super::problem::unknowns::step(&mut model, unknowns, &off);
+        step(&mut model, unknowns, &off);
         model
     }
 
@@ -199,26 +165,22 @@ impl Judging<'_> {
     }
 
     fn fitted(&self, ways: &[&Way]) -> AugmentedModel {
-        let own = ways
-            .iter()
-            .filter_map(|w| Some((&w.verified.chosen, w.amplitude.clone()?)));
-        let own: Vec<_> = own.collect();
-        let values = tables::beside(&self.field, self.declared, &own);
-        let about = (self.about, &self.prepared.unknowns);
-        tables::model(&self.field, about, &values, &own)
+        let own = ways.iter();
+        let own = own.filter_map(|w| Some((&w.verified.chosen, w.amplitude.clone()?)));
+        tables::model(&self.field, &own.collect::<Vec<_>>())
     }
 
-    /// Compares held-out errors with and without every effect, the others kept and refitted, and takes out what makes a
-    /// joint worse, the worst first; then the one that gains least, for as long as the model as it would be written is
-    /// worse on held-out data than the given one.
+    /// Takes out what makes a joint worse on held-out data, the worst first; then what gains least, while all are worse.
     fn look(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
-        let roles = &self.prepared.case.roles;
-        let vetoing = match roles.contains(&LogRole::Veto) {
+        let case = self.prepared.case;
+        let vetoing = match case.roles.contains(&LogRole::Veto) {
             true => LogRole::Veto,
             false => LogRole::Holdout,
         };
+        let rows = self.prepared.held_out(vetoing);
+        let holdout = self.prepared.held_out(LogRole::Holdout);
         // blocks that are set aside are as the rest of their log: of single joints they measure
-        let given = roles.contains(&vetoing);
+        let given = case.roles.contains(&vetoing);
         loop {
             let in_it = |w: &Way| w.amplitude.is_some() && !w.vetoed;
             let kept: Vec<usize> = (0..ways.len()).filter(|i| in_it(&ways[*i])).collect();
@@ -226,11 +188,11 @@ impl Judging<'_> {
             let with = self.with(&all);
             let mut found = Vec::new();
             for i in &kept {
-                let others: Vec<&Way> =
-                    kept.iter().filter(|k| *k != i).map(|k| &ways[*k]).collect();
+                let others = kept.iter().filter(|k| *k != i);
+                let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
                 let without = self.with(&others);
-                let change = |role| self.prepared.held_out(role).change([&without, &with]);
-                found.push((*i, change(LogRole::Holdout)?, change(vetoing)?));
+                let models = [&without, &with];
+                found.push((*i, holdout.change(models)?, rows.change(models)?));
             }
             let mut worse: Vec<(usize, f64)> = Vec::new();
             let mut costs: Vec<(usize, f64)> = Vec::new();
@@ -242,7 +204,7 @@ impl Judging<'_> {
                 worse.extend(veto.worst().filter(|_| given).map(|by| (i, by)));
                 costs.push((i, veto.mean[1] - veto.mean[0]));
             }
-            if worse.is_empty() && self.rises(&with, vetoing)? {
+            if worse.is_empty() && rows.mean_error(&with)? > rows.mean_error(&case.given)? {
                 worse = costs;
             }
             match worse.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -252,26 +214,15 @@ impl Judging<'_> {
         }
     }
 
-    /// Whether a model is worse than the given one on rows of a use.
-    fn rises(&self, model: &AugmentedModel, role: LogRole) -> Result<bool, DiagnoseError> {
-        let rows = self.prepared.held_out(role);
-        let [before, after] = [
-            rows.mean_error(&self.prepared.case.given)?,
-            rows.mean_error(model)?,
-        ];
-        Ok(after > before)
-    }
-
     /// The midpoint to the given model, where the user wants it.
     fn halfway(&self, mut model: AugmentedModel) -> AugmentedModel {
         let given = &self.prepared.case.given;
         if !self.prepared.case.wishes.cautious || model.effects.len() == given.effects.len() {
             return model;
         }
-        let half: Vec<f64> = (self.prepared.unknowns.list.iter())
-            .map(|u: &Unknown| 0.5 * (value(given, *u) - value(&model, *u)))
-            .collect();
-        super::problem::unknowns::step(&mut model, &self.prepared.unknowns, &half);
+        let half = |u: &Unknown| 0.5 * (value(given, *u) - value(&model, *u));
+        let half: Vec<f64> = self.prepared.unknowns.list.iter().map(half).collect();
+        step(&mut model, &self.prepared.unknowns, &half);
         for effect in &mut model.effects[given.effects.len()..] {
             effect.linear.iter_mut().for_each(|x| *x *= 0.5);
         }
@@ -286,7 +237,7 @@ impl Judging<'_> {
     ) -> Result<Judged, DiagnoseError> {
         let kept = ways.iter().filter(|w| w.amplitude.is_some());
         let kept: Vec<Chosen> = kept.map(|w| w.verified.chosen.clone()).collect();
-        let estimates = self.estimates(&kept)?;
+        let estimates = Estimates::of(&self.field, &kept)?;
         let unknowns = &self.prepared.unknowns;
         let before = self.prepared.case.given.effects.len();
         let (mut judged, mut in_file) = (before, before);
@@ -308,7 +259,7 @@ impl Judging<'_> {
             steps.push(step);
         }
         Ok(Judged {
-            estimates: moved(self.about, unknowns, &estimates.values),
+            estimates: moved(&self.field.summed.about, unknowns, &estimates.values),
             covariance: estimates.covariance,
             information: estimates.information,
             steps,
@@ -325,7 +276,7 @@ impl Judging<'_> {
         let held_out = self.prepared.case.roles.contains(&LogRole::Holdout);
         let confirms = way.change.as_ref().is_some_and(EffectChange::confirms);
         let status = match agreement.s {
-            s if s > self.numbers().confirmed && (confirms || !held_out) && !way.vetoed => {
+            s if s > self.field.numbers().confirmed && (confirms || !held_out) && !way.vetoed => {
                 StepStatus::Confirmed
             }
             s if s > 0.0 => StepStatus::Indicated,

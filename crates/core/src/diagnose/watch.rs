@@ -1,5 +1,7 @@
 //! What a diagnosis says while it works, and whether it is to end.
 
+use super::error::DiagnoseError;
+
 /// What a diagnosis says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Heard<'a> {
@@ -19,13 +21,15 @@ pub struct Watch<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Nobody is informed, and nothing ends the search.
-pub const UNWATCHED: Watch = Watch {
-    tell: &|_| {},
-    stop: &|| false,
-};
-
 impl<'a> Watch<'a> {
+    /// An error where the search is to end.
+    pub(crate) fn unless_stopped(self) -> Result<(), DiagnoseError> {
+        match (self.stop)() {
+            true => Err(DiagnoseError::Interrupted),
+            false => Ok(()),
+        }
+    }
+
     /// Begins a part of `steps` steps, which ends when the guard is dropped.
     pub(crate) fn part(self, name: &str, steps: usize) -> Part<'a> {
         (self.tell)(Heard::Begin(name, steps as u64));
@@ -60,7 +64,7 @@ mod tests {
         let tell = |h: Heard| heard.lock().unwrap().push(format!("{h:?}"));
         let watch = Watch {
             tell: &tell,
-            ..UNWATCHED
+            stop: &|| false,
         };
         let part = watch.part("round 1", 2);
         part.step();

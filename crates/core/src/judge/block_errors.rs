@@ -31,8 +31,7 @@ pub struct BlockErrors {
 }
 
 impl<'a> FitToAll<'a> {
-    /// Of blocks with these sums: columns of the terms, then what a joint's torque is the sum of in the weights `torques`. The
-    /// terms have no bounds.
+    /// Of blocks with these sums: columns of the terms, which have no bounds, then those that add up to a torque by `torques`.
     pub fn new(total: &[DMatrix<f64>], torques: &'a [DVector<f64>], terms: &'a Terms) -> Self {
         let u = terms.len();
         let mut out = Self {
@@ -44,9 +43,7 @@ impl<'a> FitToAll<'a> {
             values: DVector::zeros(0),
             error: 0.0,
         };
-        let mut normal = std::mem::take(&mut out.normal);
-        out.add(total, 1.0, &mut normal);
-        out.normal = normal;
+        out.normal = out.plus(total, 1.0);
         let all = out.normal.0.diagonal();
         out.diagonal = all.iter().map(|x| x.max(1e-300)).collect();
         let (mut matrix, mut side) = out.normal.clone();
@@ -68,18 +65,17 @@ impl<'a> FitToAll<'a> {
 
     /// Its weighted squared error in some rows.
     pub fn error_of(&self, sums: &[DMatrix<f64>]) -> f64 {
-        self.weigh(&self.squares(sums, &self.values))
+        self.terms.weigh(&self.squares(sums, &self.values))
     }
 
-    /// Whether an error of which this is the least is surely above `most`: sums of products hold half of a number's digits of
-    /// an error.
+    /// Whether an error of which this is the least is surely above `most`.
     fn is_above(&self, least: f64, most: f64) -> bool {
+        // sums of products hold half of a number's digits of an error
         let rounding = f64::EPSILON.sqrt();
         self.least().is_some() && least > most * (1.0 + rounding) + rounding
     }
 
-    /// Fits without each block, in this order; none where the others determine nothing, or where the weighted error is surely
-    /// above `most`.
+    /// Fits without each block, in this order; none where one determines nothing, or the weighted error is surely above `most`.
     pub fn blocks<'b>(
         self,
         (order, block): (&[usize], impl Fn(usize) -> &'b [DMatrix<f64>]),
@@ -98,7 +94,7 @@ impl<'a> FitToAll<'a> {
             }
             let values = self.without(block(b))?;
             let errors = self.squares(block(b), &values);
-            so_far += self.weigh(&errors);
+            so_far += self.terms.weigh(&errors);
             to_come -= self.error_of(block(b));
             out.errors[b] = errors;
             out.without[b] = values;
@@ -108,25 +104,14 @@ impl<'a> FitToAll<'a> {
     }
 
     fn without(&self, block: &[DMatrix<f64>]) -> Option<DVector<f64>> {
-        let mut others = self.normal.clone();
-        self.add(block, -1.0, &mut others);
-        let (mut matrix, mut side) = others;
+        let (mut matrix, mut side) = self.plus(block, -1.0);
         self.terms.firm(&mut matrix, &mut side, &self.diagonal);
         cholesky::solve(&mut matrix, &mut side).then_some(side)
     }
 
-    fn weigh(&self, squares: &[f64]) -> f64 {
-        let pairs = squares.iter().zip(&self.terms.weights);
-        pairs.map(|(s, w)| s * w).sum()
-    }
-
-    /// Adds sums so many times to the lower half of a normal matrix, and to its right side.
-    fn add(
-        &self,
-        sums: &[DMatrix<f64>],
-        times: f64,
-        (normal, right): &mut (DMatrix<f64>, DVector<f64>),
-    ) {
+    /// The lower half of its normal matrix, and its right side, with sums added so many times.
+    fn plus(&self, sums: &[DMatrix<f64>], times: f64) -> (DMatrix<f64>, DVector<f64>) {
+        let (mut normal, mut right) = self.normal.clone();
         let joints = self.own.iter().zip(sums).zip(self.torques);
         for (((own, sums), torque), w) in joints.zip(&self.terms.weights) {
             let (w, first) = (times * w, sums.ncols() - torque.len());
@@ -143,6 +128,7 @@ impl<'a> FitToAll<'a> {
                 }
             }
         }
+        (normal, right)
     }
 
     /// Squared residual of each joint at some values.

@@ -114,8 +114,7 @@ mod tests {
     fn two_logs_give_twelve_parts_of_two_blocks_and_no_row_twice() {
         let logs = [log(0, 30.0, &[true]), log(1, 60.0, &[true])];
         let blocks = divide(&logs, 0.5, &NUMBERS);
-        assert_eq!(blocks.parts, 12);
-        assert_eq!(blocks.list.len(), 24);
+        assert_eq!((blocks.parts, blocks.list.len()), (12, 24));
         let rows = |b: &TimeBlock| b.pieces.iter().map(|p| p.1.len()).sum::<usize>();
         assert_eq!(blocks.list.iter().map(rows).sum::<usize>(), 9000);
         assert!(blocks.list.iter().all(|b| rows(b) == 375), "{blocks:?}");
@@ -140,8 +139,7 @@ mod tests {
     #[test]
     fn blocks_are_not_shorter_than_asked_where_the_log_is_not() {
         let blocks = divide(&[log(0, 10.0, &[true])], 3.0, &NUMBERS);
-        assert_eq!(blocks.parts, 3);
-        assert_eq!(blocks.list.len(), 3);
+        assert_eq!((blocks.parts, blocks.list.len()), (3, 3));
     }
 
     #[test]

@@ -15,46 +15,34 @@ impl Bound {
         least: f64::NEG_INFINITY,
         most: f64::INFINITY,
     };
-
-    /// How far a value is beyond.
-    pub(super) fn excess(self, x: f64) -> f64 {
-        (self.least - x).max(x - self.most).max(0.0)
-    }
-
-    /// The nearest value that it may have.
-    pub fn nearest(self, x: f64) -> f64 {
-        x.max(self.least).min(self.most)
-    }
 }
 
-/// Minimises x' A x - 2 x' b within bounds; terms with nothing on the diagonal stay at zero. Terms that leave their
-/// bounds are held there, the farthest first.
+/// Minimises x' A x - 2 x' b; terms that leave their bounds are held there, the farthest first; those without a diagonal stay 0.
 pub fn solve(a: &DMatrix<f64>, b: &DVector<f64>, bounds: &[Bound]) -> DVector<f64> {
     let n = b.len();
-    let mut held: Vec<Option<f64>> = (0..n)
-        .map(|i| (a[(i, i)].is_nan() || a[(i, i)] <= 0.0).then_some(0.0))
-        .collect();
+    let silent = |x: f64| (x.is_nan() || x <= 0.0).then_some(0.0);
+    let mut held: Vec<Option<f64>> = (0..n).map(|i| silent(a[(i, i)])).collect();
     loop {
         let x = with_held(a, b, &held);
-        let off = |i: &usize| bounds[*i].excess(x[*i]) * a[(*i, *i)].max(0.0).sqrt();
+        let nearest = |i: usize| x[i].max(bounds[i].least).min(bounds[i].most);
+        let excess = |i: usize| (bounds[i].least - x[i]).max(x[i] - bounds[i].most).max(0.0);
+        let off = |i: &usize| excess(*i) * a[(*i, *i)].max(0.0).sqrt();
         let free = (0..n).filter(|i| held[*i].is_none());
-        let worst = free
-            .max_by(|i, j| off(i).total_cmp(&off(j)))
-            .filter(|i| off(i) > 0.0);
-        match worst {
-            Some(i) => held[i] = Some(bounds[i].nearest(x[i])),
+        let worst = free.max_by(|i, j| off(i).total_cmp(&off(j)));
+        match worst.filter(|i| off(i) > 0.0) {
+            Some(i) => held[i] = Some(nearest(i)),
             None => return x,
         }
     }
 }
 
 /// The minimum with some terms held.
-pub fn with_held(a: &DMatrix<f64>, b: &DVector<f64>, held: &[Option<f64>]) -> DVector<f64> {
+fn with_held(a: &DMatrix<f64>, b: &DVector<f64>, held: &[Option<f64>]) -> DVector<f64> {
     let free: Vec<usize> = (0..b.len()).filter(|i| held[*i].is_none()).collect();
     let mut x = DVector::from_iterator(b.len(), held.iter().map(|h| h.unwrap_or(0.0)));
     let pulled = b - a * &x;
-    let own = DMatrix::from_fn(free.len(), free.len(), |i, j| a[(free[i], free[j])]);
-    let right = DVector::from_iterator(free.len(), free.iter().map(|i| pulled[*i]));
+    let own = a.select_rows(&free).select_columns(&free);
+    let right = pulled.select_rows(&free);
     // without a factor the matrix says nothing, and all stays where it is
     if let Some(factor) = own.cholesky() {
         for (i, value) in free.iter().zip(factor.solve(&right).iter()) {
@@ -76,14 +64,8 @@ mod tests {
         let x = solve(&a, &b, &free);
         assert!((x[0] - 7.0 / 3.0).abs() < 1e-12 && (x[1] + 5.0 / 3.0).abs() < 1e-12);
         assert_eq!(x[2], 0.0);
-        let above = [
-            Bound::NONE,
-            Bound {
-                least: 0.0,
-                most: 9.0,
-            },
-            Bound::NONE,
-        ];
+        let [least, most] = [0.0, 9.0];
+        let above = [Bound::NONE, Bound { least, most }, Bound::NONE];
         let x = solve(&a, &b, &above);
         assert!((x[0] - 1.5).abs() < 1e-12, "{x}");
         assert_eq!(x[1], 0.0);

@@ -52,7 +52,7 @@ impl ErrorGain {
     }
 
     /// Whether it is that of another within so many standard errors of their difference.
-    pub fn is_near(&self, other: &ErrorGain, errors: f64) -> bool {
+    pub(crate) fn is_near(&self, other: &ErrorGain, errors: f64) -> bool {
         let pairs = self.blocks.iter().zip(&other.blocks);
         let [value, se] = sum_and_error(pairs.map(|(a, b)| a - b));
         value.abs() <= errors * se
@@ -86,7 +86,7 @@ struct Without {
 
 /// Fits of terms with each block left out.
 pub struct BlocksLeftOut<'a> {
-    pub terms: &'a Terms,
+    terms: &'a Terms,
     sums: &'a BlockSums,
     /// Of all fitted blocks, by joint.
     total: Vec<DMatrix<f64>>,
@@ -104,11 +104,15 @@ impl<'a> BlocksLeftOut<'a> {
         let own = terms.own_of_all();
         let mut without = Vec::new();
         for (b, block) in sums.blocks.iter().enumerate() {
+            let mut others = all.clone();
             let times = if b < fitted { -1.0 } else { 0.0 };
-            let (factor, values) = fit_without((terms, &own), &all, (block, times), &diagonal)?;
-            let pull = (0..total.len())
-                .map(|j| pull(&block[j], &own[j], &values))
-                .collect();
+            terms.add_normal(&own, block, times, &mut others);
+            let (mut normal, mut side) = others;
+            terms.firm(&mut normal, &mut side, &diagonal);
+            let factor = normal.cholesky()?;
+            let values = factor.solve(&side);
+            let joints = block.iter().zip(&own);
+            let pull = joints.map(|(sums, own)| pull(sums, own, &values)).collect();
             without.push(Without {
                 block: (b < fitted).then_some(b),
                 factor,
@@ -128,13 +132,12 @@ impl<'a> BlocksLeftOut<'a> {
     /// Errors of every block by the terms in use, `[block][joint]`.
     pub fn errors(&self) -> Vec<Vec<f64>> {
         let blocks = self.without.iter().zip(&self.sums.blocks);
-        let of_block =
-            |(w, block): (&Without, &Vec<DMatrix<f64>>)| self.terms.squares(block, &w.values);
-        blocks.map(of_block).collect()
+        let errors = blocks.map(|(w, block)| self.terms.squares(block, &w.values));
+        errors.collect()
     }
 
     /// Squared error of all blocks and joints, in the weights of the joints.
-    pub fn error(&self) -> f64 {
+    pub(crate) fn error(&self) -> f64 {
         weighted(&self.errors(), &self.terms.weights)
     }
 
@@ -150,7 +153,7 @@ impl<'a> BlocksLeftOut<'a> {
     }
 
     /// The same of terms that are there in some blocks alone.
-    pub fn gain_within(&self, more: &[Term], there: Range<usize>) -> ErrorGain {
+    pub(crate) fn gain_within(&self, more: &[Term], there: Range<usize>) -> ErrorGain {
         self.gain_of(more, self.within(more, &there), &|b| there.contains(&b))
     }
 
@@ -207,16 +210,14 @@ impl<'a> BlocksLeftOut<'a> {
             }
         }
         let added = more.iter().zip(amplitude.iter());
-        let added: Vec<(usize, f64)> = added
-            .filter_map(|(term, x)| Some((term.column(j)?, *x)))
-            .filter(|(_, x)| *x != 0.0)
-            .collect();
+        let added = added.filter(|(_, x)| **x != 0.0);
+        let added = added.filter_map(|(term, x)| Some((term.column(j)?, *x)));
+        let added: Vec<(usize, f64)> = added.collect();
         for &(c, x) in &added {
             let column = block.column(c);
-            let used: f64 = own
-                .iter()
-                .map(|&(i, a)| column[a] * (without.values[i] + moved[i]))
-                .sum();
+            let used = own.iter();
+            let used = used.map(|&(i, a)| column[a] * (without.values[i] + moved[i]));
+            let used: f64 = used.sum();
             let among: f64 = added.iter().map(|&(d, y)| column[d] * y).sum();
             change += x * (among + 2.0 * used - 2.0 * column[tau]);
         }
@@ -224,10 +225,8 @@ impl<'a> BlocksLeftOut<'a> {
     }
 
     /// Amplitudes of terms that are there in some blocks alone, beside those in use over all fitted blocks.
-    pub fn amplitude_within(&self, more: &[Term], there: Range<usize>) -> DVector<f64> {
-        let (mut normal, mut right) = self.terms.normal(&self.total);
-        let diagonal: Vec<f64> = normal.diagonal().iter().map(|x| x.max(1e-300)).collect();
-        self.terms.firm(&mut normal, &mut right, &diagonal);
+    pub(crate) fn amplitude_within(&self, more: &[Term], there: Range<usize>) -> DVector<f64> {
+        let (normal, right) = self.terms.firm_normal(&self.total);
         let all = self.within(more, &there);
         let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
         let Some(factor) = normal.cholesky() else {
@@ -240,22 +239,6 @@ impl<'a> BlocksLeftOut<'a> {
         let right = &all.right - all.with.tr_mul(&factor.solve(&right));
         bounded::solve(&own, &right, &bounds)
     }
-}
-
-/// The factor and the values of the terms when a block is counted so many times more.
-fn fit_without(
-    (terms, own): (&Terms, &[Vec<(usize, usize)>]),
-    all: &(DMatrix<f64>, DVector<f64>),
-    (block, times): (&[DMatrix<f64>], f64),
-    diagonal: &[f64],
-) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
-    let mut others = all.clone();
-    terms.add_normal(own, block, times, &mut others);
-    let (mut normal, mut side) = others;
-    terms.firm(&mut normal, &mut side, diagonal);
-    let factor = normal.cholesky()?;
-    let values = factor.solve(&side);
-    Some((factor, values))
 }
 
 /// What is left to pull each of a joint's terms in some rows.

@@ -9,14 +9,6 @@
 //! Nothing here knows an effect or a robot. Rows come as columns of a linear problem; a *term* is an unknown
 //! with the columns that it has in the rows of one joint or of several. Another hypothesis is other columns for
 //! the same blocks: [`compare`] sets the errors of two against each other, [`agreement_on_share`] asks the parts.
-//!
-//! | file | does |
-//! |---|---|
-//! | `blocks` | divides logs into blocks and parts |
-//! | `bounded` | least squares with bounds, from normal equations |
-//! | `sums` | sums of products per block and joint, and the fit of all terms |
-//! | `left_out` | errors of each block by the fit of the others, for the terms in use and for more |
-//! | `parts` | agreement of an amplitude between parts |
 
 mod block_errors;
 mod blocks;
@@ -30,8 +22,10 @@ mod tests;
 pub use block_errors::{BlockErrors, FitToAll};
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
-pub use left_out::{BlocksLeftOut, ErrorGain, compare, weighted};
-pub use parts::{Agreement, LEAST_PARTS, agreement, agreement_on_share};
+pub(crate) use left_out::weighted;
+pub use left_out::{BlocksLeftOut, ErrorGain, compare};
+pub use parts::{Agreement, agreement_on_share};
+pub(crate) use parts::{LEAST_PARTS, agreement};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 
 /// The numbers that decide.

@@ -21,19 +21,18 @@ pub struct Agreement {
 
 impl Agreement {
     /// The part that a change is of the amplitude, along it.
-    pub fn part(&self, change: &DVector<f64>) -> f64 {
+    pub(crate) fn part(&self, change: &DVector<f64>) -> f64 {
         let (amplitude, information) = &self.whole;
         let along = information * amplitude;
         let size = amplitude.dot(&along);
-        if size > 0.0 {
-            change.dot(&along) / size
-        } else {
-            0.0
+        match size > 0.0 {
+            true => change.dot(&along) / size,
+            false => 0.0,
         }
     }
 
     /// Counts an error of this part of the amplitude, which all parts of the data share, to their scatter.
-    pub fn doubt(&mut self, part: f64, numbers: &Numbers) {
+    pub(crate) fn doubt(&mut self, part: f64, numbers: &Numbers) {
         let shape = (self.parts.len(), self.whole.0.len());
         if self.z > 0.0 && part != 0.0 {
             self.z = 1.0 / (1.0 / self.z + shape.0 as f64 * part * part);
@@ -149,16 +148,16 @@ fn judged(mut found: Vec<(DMatrix<f64>, DVector<f64>)>, numbers: &Numbers) -> Ag
     }
 }
 
-/// The z at which so few parts agree on k numbers by a chance as small as that of [`Numbers::parts`] parts at
-/// [`Numbers::doubt`]: P z is F with k and k (P - 1) degrees of freedom. None where no deviation can be formed.
+/// The z at which so few parts agree on k numbers by a chance as small as that of [`Numbers::parts`] at [`Numbers::doubt`].
 fn doubt(parts: usize, k: usize, numbers: &Numbers) -> Option<f64> {
     if parts >= numbers.parts {
         return Some(numbers.doubt);
     }
+    // P z is F with k and k (P - 1) degrees of freedom
     let chance = |parts: usize, z: f64| {
-        let degrees = [k as f64, k as f64 * (parts as f64 - 1.0)];
-        let distribution = FisherSnedecor::new(degrees[0], degrees[1]).ok()?;
-        Some(distribution.sf(parts as f64 * z))
+        let (k, parts) = (k as f64, parts as f64);
+        let distribution = FisherSnedecor::new(k, k * (parts - 1.0)).ok()?;
+        Some(distribution.sf(parts * z))
     };
     let usual = chance(numbers.parts, numbers.doubt)?;
     let (mut low, mut high) = (numbers.doubt, MOST_DOUBT);
@@ -184,33 +183,21 @@ fn reduced(
     (effect, values): (&[usize], &DVector<f64>),
     (s, r): (&mut DMatrix<f64>, &mut DVector<f64>),
 ) {
-    let own = terms.own(j);
     let tau = sums.nrows() - 1;
-    let other = |(i, _): &&(usize, usize)| !effect.contains(i);
-    let (free, held): (Vec<&(usize, usize)>, Vec<_>) = own
-        .iter()
-        .filter(other)
-        .partition(|(i, _)| terms.list[*i].is_of(j));
-    let target = |a: usize| -> f64 {
-        let column = sums.column(a);
-        column[tau]
-            - held
-                .iter()
-                .map(|(i, b)| column[*b] * values[*i])
-                .sum::<f64>()
+    let others = terms.own(j).into_iter();
+    let others = others.filter(|(i, _)| !effect.contains(i));
+    let (free, held): (Vec<_>, Vec<_>) = others.partition(|(i, _)| terms.list[*i].is_of(j));
+    let target = |a: &usize| -> f64 {
+        let column = sums.column(*a);
+        let held = held.iter().map(|(i, b)| column[*b] * values[*i]);
+        column[tau] - held.sum::<f64>()
     };
-    let c: Vec<(usize, usize)> = effect
-        .iter()
-        .enumerate()
-        .filter_map(|(at, i)| Some((at, terms.list[*i].column(j)?)))
-        .collect();
+    let targets = |of: &[usize]| DVector::from_iterator(of.len(), of.iter().map(target));
+    let own = effect.iter().enumerate();
+    let own = own.filter_map(|(at, i)| Some((at, terms.list[*i].column(j)?)));
+    let (places, columns): (Vec<usize>, Vec<usize>) = own.unzip();
     let o: Vec<usize> = free.iter().map(|(_, a)| *a).collect();
-    let of = |rows: &[usize], columns: &[usize]| {
-        DMatrix::from_fn(rows.len(), columns.len(), |a, b| {
-            sums[(rows[a], columns[b])]
-        })
-    };
-    let columns: Vec<usize> = c.iter().map(|(_, a)| *a).collect();
+    let of = |rows: &[usize], columns: &[usize]| sums.select_rows(rows).select_columns(columns);
     let mut inner = of(&o, &o);
     for i in 0..o.len() {
         let x = inner[(i, i)];
@@ -218,17 +205,16 @@ fn reduced(
     }
     let across = of(&o, &columns);
     let mut own_part = of(&columns, &columns);
-    let mut side = DVector::from_iterator(columns.len(), columns.iter().map(|a| target(*a)));
+    let mut side = targets(&columns);
     if let (false, Some(factor)) = (o.is_empty(), inner.cholesky()) {
         let through = factor.solve(&across);
         own_part -= across.tr_mul(&through);
-        let targets = DVector::from_iterator(o.len(), o.iter().map(|a| target(*a)));
-        side -= through.tr_mul(&targets);
+        side -= through.tr_mul(&targets(&o));
     }
     let w = terms.weights[j];
-    for (x, (i, _)) in c.iter().enumerate() {
+    for (x, i) in places.iter().enumerate() {
         r[*i] += w * side[x];
-        for (y, (l, _)) in c.iter().enumerate() {
+        for (y, l) in places.iter().enumerate() {
             s[(*i, *l)] += w * own_part[(x, y)];
         }
     }

@@ -57,7 +57,7 @@ impl BlockSums {
     }
 
     /// The mean with other sums of the same blocks.
-    pub fn mean(mut self, other: &BlockSums) -> Self {
+    pub(crate) fn mean(mut self, other: &BlockSums) -> Self {
         let pairs = self.blocks.iter_mut().zip(&other.blocks);
         for (own, other) in pairs.flat_map(|(own, other)| own.iter_mut().zip(other)) {
             *own = (&*own + other) * 0.5;
@@ -66,7 +66,7 @@ impl BlockSums {
     }
 
     /// Rows of each joint in all blocks.
-    pub fn rows_of(&self, joint: usize) -> f64 {
+    pub(crate) fn rows_of(&self, joint: usize) -> f64 {
         self.rows.iter().map(|rows| rows[joint]).sum()
     }
 }
@@ -92,14 +92,8 @@ pub struct TermFit {
 }
 
 impl Terms {
-    /// Number of terms.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.list.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.list.is_empty()
     }
 
     /// Weighted normal matrix and right side of joints' sums, without prior and ridge.
@@ -174,7 +168,7 @@ impl Terms {
     }
 
     /// Information matrix of the terms: that of joints' sums and of what is known beforehand, in weighted rows.
-    pub fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
+    pub(crate) fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
         self.firmed(sums).0
     }
 
@@ -185,19 +179,25 @@ impl Terms {
         (normal, right)
     }
 
-    /// What the fit has of its prior: the covariance of its values by that of the prior, over the squared unit in which
-    /// information counts.
-    pub fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {
+    /// Normal matrix and right side with what is known beforehand; a ridge holds what the data do not determine at all.
+    pub(super) fn firm_normal(&self, sums: &[DMatrix<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let (mut normal, mut right) = self.normal(sums);
         let diagonal: Vec<f64> = normal.diagonal().iter().map(|x| x.max(1e-300)).collect();
         self.firm(&mut normal, &mut right, &diagonal);
-        let known = self.prior.1.len();
-        let mut prior = DMatrix::zeros(self.len(), self.len());
-        prior
-            .view_mut((0, 0), (known, known))
-            .copy_from(&self.prior.0);
-        let factor = normal.cholesky()?;
+        (normal, right)
+    }
+
+    /// The covariance of a fit's values by that of its prior, over the squared unit in which information counts.
+    pub(crate) fn known_before(&self, sums: &[DMatrix<f64>]) -> Option<DMatrix<f64>> {
+        let prior = self.prior.0.clone().resize(self.len(), self.len(), 0.0);
+        let factor = self.firm_normal(sums).0.cholesky()?;
         Some(factor.solve(&factor.solve(&prior).transpose()))
+    }
+
+    /// Sum over joints in their weights.
+    pub(crate) fn weigh(&self, squares: &[f64]) -> f64 {
+        let pairs = squares.iter().zip(&self.weights);
+        pairs.map(|(s, w)| s * w).sum()
     }
 
     /// Squared residual of each joint at some values.

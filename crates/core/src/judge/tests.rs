@@ -39,18 +39,16 @@ const DECLARED: usize = 3;
 
 /// Noise of unit variance that forgets in `memory` seconds.
 fn noise(chance: &mut ChaCha8Rng, rows: usize, memory: f64) -> Vec<f64> {
-    let keep = if memory > 0.0 {
-        (-1.0 / (RATE * memory)).exp()
-    } else {
-        0.0
+    let keep: f64 = match memory > 0.0 {
+        true => (-1.0 / (RATE * memory)).exp(),
+        false => 0.0,
     };
     let mut x = 0.0;
     let mut next = |k: usize| {
         let news: f64 = chance.sample(rand_distr::StandardNormal);
-        x = if k == 0 {
-            news
-        } else {
-            keep * x + (1.0 - keep * keep).sqrt() * news
+        x = match k {
+            0 => news,
+            _ => keep * x + (1.0 - keep * keep).sqrt() * news,
         };
         x
     };
@@ -113,16 +111,20 @@ impl Campaign {
         }
     }
 
+    /// Declared terms and some candidates.
+    fn with(&self, chosen: &[usize]) -> Terms {
+        let used = chosen.iter().map(|c| self.candidates[*c].clone());
+        self.terms.with(&used.collect::<Vec<Term>>())
+    }
+
     /// Candidates in the order in which they are chosen, and what the parts say of each.
     fn judged(&self) -> Vec<(usize, Agreement, f64)> {
         let mut chosen: Vec<usize> = Vec::new();
         while chosen.len() < NUMBERS.effects {
-            let used: Vec<Term> = chosen.iter().map(|c| self.candidates[*c].clone()).collect();
-            let terms = self.terms.with(&used);
+            let terms = self.with(&chosen);
             let left_out = BlocksLeftOut::new(&self.sums, 0, &terms).unwrap();
-            let gains = (0..self.candidates.len())
-                .filter(|c| !chosen.contains(c))
-                .map(|c| (c, left_out.gain(&self.candidates[c..=c])));
+            let open = (0..self.candidates.len()).filter(|c| !chosen.contains(c));
+            let gains = open.map(|c| (c, left_out.gain(&self.candidates[c..=c])));
             let best = gains
                 .filter(|(_, gain)| gain.is_beyond(NUMBERS.screen, Some(0)))
                 .max_by(|a, b| a.1.value.total_cmp(&b.1.value));
@@ -131,19 +133,15 @@ impl Campaign {
                 None => break,
             }
         }
-        let used: Vec<Term> = chosen.iter().map(|c| self.candidates[*c].clone()).collect();
-        let terms = self.terms.with(&used);
-        let fit = terms.fit(&self.sums.over(0..self.blocks.list.len()), &[]);
+        let terms = self.with(&chosen);
+        let values = terms
+            .fit(&self.sums.over(0..self.blocks.list.len()), &[])
+            .values;
         let judged = chosen.iter().enumerate().map(|(i, c)| {
             let at = DECLARED + i;
-            let found = agreement(
-                &self.sums,
-                &self.blocks,
-                &terms,
-                (&[at], &fit.values),
-                &NUMBERS,
-            );
-            (*c, found, fit.values[at])
+            let of = (&[at][..], &values);
+            let found = agreement(&self.sums, &self.blocks, &terms, of, &NUMBERS);
+            (*c, found, values[at])
         });
         judged.collect()
     }
@@ -165,10 +163,7 @@ fn noise_along_a_motion_writes_nothing_in_98_of_100_campaigns() {
         }
     }
     // 2 % of 201 are 4: binomial, 98 % of draws at a rate of 1 %
-    assert!(
-        written <= 5,
-        "{written} of {all}, {accepted} passed the screen"
-    );
+    assert!(written <= 5, "{written} of {all}, {accepted} accepted");
 }
 
 #[test]
@@ -191,7 +186,7 @@ fn an_error_that_all_parts_share_is_counted_to_their_scatter() {
     let truth = |c: &[Vec<f64>], k: usize| 2.0 * c[2][k] + 0.6 * c[DECLARED + 8][k];
     let found = Campaign::of(2, 1, 0.0, &truth).judged();
     let (_, agreement, amplitude) = found.into_iter().find(|(c, ..)| *c == 8).unwrap();
-    let part = agreement.part(&nalgebra::DVector::from_element(1, 0.1 * amplitude));
+    let part = agreement.part(&DVector::from_element(1, 0.1 * amplitude));
     assert!((part - 0.1).abs() < 0.01, "{part}");
     let doubted = |part: f64| {
         let mut own = agreement.clone();
@@ -251,9 +246,8 @@ fn a_gain_within_some_blocks_is_that_of_a_column_which_is_there_alone() {
     let coulomb = &campaign.terms.list[2..3];
     let blocks = campaign.blocks.list.len();
     let gains = (1..blocks).map(|b| left_out.gain_within(coulomb, b..blocks));
-    let best = gains
-        .enumerate()
-        .max_by(|a, b| a.1.value.total_cmp(&b.1.value));
+    let best = gains.enumerate();
+    let best = best.max_by(|a, b| a.1.value.total_cmp(&b.1.value));
     let (at, gain) = best.unwrap();
     assert_eq!(at + 1, blocks / 2);
     assert!(gain.is_beyond(10.0, Some(0)));

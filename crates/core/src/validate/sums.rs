@@ -78,7 +78,7 @@ impl ErrorSums {
 }
 
 /// norm(tau - tau_hat) / norm(tau) from the squares of both, where there are rows.
-pub(super) fn ratio(error: f64, torque: f64, rows: u64) -> Option<f64> {
+pub(super) fn ratio([error, torque]: [f64; 2], rows: u64) -> Option<f64> {
     let relative = match torque > 0.0 {
         true => (error / torque).sqrt(),
         false => f64::NAN,

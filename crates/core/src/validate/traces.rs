@@ -15,37 +15,30 @@ pub(super) fn append(traces: &mut TorqueTraces, t: f64, filtered: &[f64], n: usi
     }
 }
 
-/// Of every four points keeps the two whose first-joint error is smallest and largest, in order
-/// of time; stretches keep their borders.
+/// Of every four points keeps the two whose error over the joints is smallest and largest; stretches keep their borders.
 fn halve(traces: &mut TorqueTraces, n: usize) {
     let mut out = TorqueTraces::default();
     let mut bounds = traces.breaks.clone();
     bounds.push(traces.t.len());
     for pair in bounds.windows(2) {
         out.breaks.push(out.t.len());
-        let mut k = pair[0];
-        while k < pair[1] {
-            let end = (k + 4).min(pair[1]);
+        for first in (pair[0]..pair[1]).step_by(4) {
+            let four = first..(first + 4).min(pair[1]);
             let size = |i: &usize| -> f64 {
-                (0..n)
-                    .map(|j| traces.measured[i * n + j] - traces.reconstructed[i * n + j])
-                    .sum()
+                let error = |j| traces.measured[i * n + j] - traces.reconstructed[i * n + j];
+                (0..n).map(error).sum()
             };
-            let lo = (k..end).min_by(|a, b| size(a).total_cmp(&size(b)));
-            let hi = (k..end).max_by(|a, b| size(a).total_cmp(&size(b)));
-            let (Some(lo), Some(hi)) = (lo, hi) else {
-                break;
-            };
-            let mut kept = [lo.min(hi), lo.max(hi)].to_vec();
+            let low = four.clone().min_by(|a, b| size(a).total_cmp(&size(b)));
+            let high = four.max_by(|a, b| size(a).total_cmp(&size(b)));
+            let mut kept: Vec<usize> = low.into_iter().chain(high).collect();
+            kept.sort_unstable();
             kept.dedup();
             for i in kept {
+                let row = i * n..(i + 1) * n;
                 out.t.push(traces.t[i]);
-                out.measured
-                    .extend_from_slice(&traces.measured[i * n..(i + 1) * n]);
-                out.reconstructed
-                    .extend_from_slice(&traces.reconstructed[i * n..(i + 1) * n]);
+                out.measured.extend(&traces.measured[row.clone()]);
+                out.reconstructed.extend(&traces.reconstructed[row]);
             }
-            k = end;
         }
     }
     *traces = out;

@@ -1,9 +1,18 @@
-//! Columns of terms along a scene: every factor once, then their products.
+//! Columns of terms along a scene: every factor once, then their products; and rows of a joint with them.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::term::{Factor, FormulaTerm, Function, Source};
-use crate::effect::Scene;
+use crate::diagnose::prepared::PreparedCase;
+use crate::diagnose::problem::pass::{Candidate, LANES, Window, in_window, regressor, windows};
+use crate::effect::{AugmentedModel, Scene, shifted};
+use crate::motion::MotionError;
 
 /// What the columns of terms are products of.
+#[derive(Default)]
 pub struct Columns {
     factors: Vec<Factor>,
     /// A wave's source, number and whether it is the cosine.
@@ -14,29 +23,21 @@ pub struct Columns {
 
 impl Columns {
     pub fn of(terms: &[FormulaTerm]) -> Self {
-        let mut all = Columns {
-            factors: Vec::new(),
-            waves: Vec::new(),
-            of: Vec::new(),
-        };
+        let mut all = Columns::default();
         for factor in terms.iter().flat_map(|t| &t.factors) {
             place(&mut all.factors, *factor);
         }
         let first = all.factors.len();
         for term in terms {
-            let own: Vec<usize> = term
-                .factors
-                .iter()
-                .map(|f| place(&mut all.factors, *f))
-                .collect();
-            match term.wave {
-                None => all.of.push(own),
-                Some((source, n)) => {
-                    for cosine in [false, true] {
-                        let wave = first + place(&mut all.waves, (source, n, cosine));
-                        all.of.push([own.as_slice(), &[wave]].concat());
-                    }
-                }
+            let own = term.factors.iter();
+            let own: Vec<usize> = own.map(|f| place(&mut all.factors, *f)).collect();
+            let Some((source, n)) = term.wave else {
+                all.of.push(own);
+                continue;
+            };
+            for cosine in [false, true] {
+                let wave = first + place(&mut all.waves, (source, n, cosine));
+                all.of.push([own.as_slice(), &[wave]].concat());
             }
         }
         all
@@ -76,4 +77,75 @@ fn place<T: PartialEq>(list: &mut Vec<T>, own: T) -> usize {
         list.push(own);
         list.len() - 1
     })
+}
+
+pub struct RowsOfJoint {
+    /// Of unknowns, of candidates, the torque and the residual.
+    pub declared: DMatrix<f64>,
+    pub more: DMatrix<f64>,
+    pub blocks: Vec<Range<usize>>,
+}
+
+impl PreparedCase<'_> {
+    /// About as many rows of a joint as are searched, with the columns of candidates and of terms.
+    pub fn joint_rows(
+        &self,
+        about: &AugmentedModel,
+        candidates: &[Candidate],
+        terms: &[FormulaTerm],
+        j: usize,
+    ) -> Result<RowsOfJoint, MotionError> {
+        let (data, blocks, unknowns) = (&self.data, &self.blocks.list, &self.unknowns);
+        let columns = Columns::of(terms);
+        let moving = |s: usize| !data.split.is_stationary(s, j);
+        let pieces = blocks.iter().flat_map(|b| &b.pieces);
+        let pieces = pieces.filter(|(s, _)| moving(*s));
+        let all: usize = pieces.map(|(_, rows)| rows.len()).sum();
+        let every = all.div_ceil(self.case.formula.rows).max(1);
+        // of each block: its rows, piece by piece
+        let mut found: Vec<Vec<Vec<f64>>> = vec![Vec::new(); blocks.len()];
+        let windows = windows(data, blocks).into_iter();
+        for (stretch, range) in windows.filter(|(s, _)| moving(*s)) {
+            let window = Window::of(about, data, stretch, &range);
+            let mut regressor = regressor(about, unknowns, &window.part);
+            let own = window.rows_of(j, unknowns, candidates, &mut regressor[j])?;
+            let made = columns.rows(&window, j)?;
+            for (block, out) in blocks.iter().zip(&mut found) {
+                let rows = in_window(block, (stretch, &range), every);
+                for k in rows.flat_map(|rows| rows.step_by(every)) {
+                    let made = made.iter().map(|column| column[k]);
+                    out.push(own.row(k).iter().copied().chain(made).collect());
+                }
+            }
+        }
+        let mut end = 0;
+        let of_block = |rows: &Vec<Vec<f64>>| {
+            end += rows.len();
+            end - rows.len()..end
+        };
+        let blocks = found.iter().map(of_block).collect();
+        let rows = found.concat();
+        let width = rows.first().map_or(0, Vec::len);
+        let first = width.saturating_sub(columns.count());
+        Ok(RowsOfJoint {
+            declared: DMatrix::from_fn(rows.len(), first, |i, c| rows[i][c]),
+            more: DMatrix::from_fn(rows.len(), width - first, |i, c| rows[i][first + c]),
+            blocks,
+        })
+    }
+}
+
+impl Columns {
+    fn rows(&self, window: &Window, j: usize) -> Result<Vec<Vec<f64>>, MotionError> {
+        let series = self.series(&window.scene());
+        let (weights, late) = (window.weights(j), window.late(j));
+        let groups: Vec<usize> = (0..self.count()).step_by(LANES).collect();
+        let rows = groups.into_par_iter().map(|first| {
+            let own = first..(first + LANES).min(self.count());
+            let mut raw: Vec<Vec<f64>> = own.map(|i| self.column(&series, i)).collect();
+            raw.iter_mut().for_each(|column| shifted(column, late));
+            window.kept(&mut raw, &weights)
+        });
+        Ok(rows.collect::<Result<Vec<_>, _>>()?.concat())
+    }
 }

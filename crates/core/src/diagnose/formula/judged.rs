@@ -14,7 +14,6 @@ use crate::diagnose::search::Chosen;
 use crate::diagnose::searched::SearchedCase;
 use crate::diagnose::steps::{Judged, judge};
 use crate::diagnose::tables::beside_the_others;
-use crate::diagnose::watch::UNWATCHED;
 use crate::effect::formula::{Definition, Shape};
 use crate::effect::{Added, Place, own};
 use crate::judge::Bound;
@@ -38,57 +37,37 @@ impl PreparedCase<'_> {
         confirmed: &[Chosen],
         proposed: Vec<Proposed>,
     ) -> Result<SearchedFormulas, DiagnoseError> {
-        let definitions = proposed.iter().map(|p| self.definition(p));
-        let definitions: Vec<Definition> = definitions.collect();
-        let all: Vec<usize> = (0..proposed.len()).collect();
+        let all: Vec<&Proposed> = proposed.iter().collect();
         let mut formulas = Vec::new();
-        if !proposed.is_empty() {
-            let (_, judged) =
-                self.with_formulas(searched, (confirmed, &proposed), &definitions, &all)?;
-            let first = judged.steps.len() - proposed.len();
-            let each = proposed
-                .iter()
-                .zip(&definitions)
-                .zip(&judged.steps[first..]);
-            for ((p, definition), step) in each {
-                let mut told = self.told(searched, confirmed, (p, definition), step.clone());
+        if !all.is_empty() {
+            let (_, judged) = self.with_formulas(searched, confirmed, &all)?;
+            let first = judged.steps.len() - all.len();
+            for (p, step) in all.iter().zip(&judged.steps[first..]) {
+                let mut found = self.found(searched, confirmed, p, step.clone());
                 if let Some(place) = step.judged {
                     let held = OnHeldOut::of(self, (&judged.judge, place), p.joint)?;
-                    told.picture = held.picture(&told.signals);
-                    told.at_reversals = held.at_reversals();
+                    found.picture = held.picture(&found.signals);
+                    found.at_reversals = held.at_reversals();
                 }
-                formulas.push(told);
+                formulas.push(found);
             }
         }
-        let robot = &self.case.given.model.robot;
-        let wanted = |i: &usize| {
-            let joint = &robot.joint_names()[proposed[*i].joint];
-            self.case.wishes.wants_formula(joint)
-        };
-        let accepted: Vec<usize> = all.into_iter().filter(wanted).collect();
-        let asked = self.case.wishes.accepted.iter();
-        let found = |joint: &Option<String>| {
-            let joint = joint.as_deref();
-            accepted
-                .iter()
-                .any(|i| Some(robot.joint_names()[proposed[*i].joint].as_str()) == joint)
-        };
-        let mut missing = asked.filter(|w| self.case.wishes.is_formula(w) && !found(&w.1));
-        if let Some((name, joint)) = missing.next() {
+        let wishes = &self.case.wishes;
+        let names = self.case.given.model.robot.joint_names();
+        let joint = |p: &Proposed| names[p.joint].as_str();
+        let mut accepted = all;
+        accepted.retain(|p| wishes.wants_formula(joint(p)));
+        let found = |of: Option<&str>| accepted.iter().any(|p| Some(joint(p)) == of);
+        let mut asked = wishes.accepted.iter().filter(|w| wishes.is_formula(w));
+        if let Some((name, joint)) = asked.find(|w| !found(w.1.as_deref())) {
             return Err(DiagnoseError::Accept {
                 name: format!("{name}:{}", joint.as_deref().unwrap_or("JOINT")),
                 why: "no formula was found there: see `formulas` in the JSON document".into(),
             });
         }
-        let accepted = match accepted.is_empty() {
-            true => None,
-            false => Some(self.with_formulas(
-                searched,
-                (confirmed, &proposed),
-                &definitions,
-                &accepted,
-            )?),
-        };
+        let some = !accepted.is_empty();
+        let accepted = some.then(|| self.with_formulas(searched, confirmed, &accepted));
+        let accepted = accepted.transpose()?;
         Ok(SearchedFormulas { formulas, accepted })
     }
 
@@ -96,13 +75,12 @@ impl PreparedCase<'_> {
     fn with_formulas(
         &self,
         searched: &SearchedCase,
-        (confirmed, proposed): (&[Chosen], &[Proposed]),
-        definitions: &[Definition],
-        taken: &[usize],
+        confirmed: &[Chosen],
+        taken: &[&Proposed],
     ) -> Result<(SearchedCase, Judged), DiagnoseError> {
         let stays = |c: &&Chosen| {
             let same = |own: &Chosen| own.candidate == c.candidate;
-            taken.iter().all(|i| proposed[*i].beside.iter().any(same))
+            taken.iter().all(|p| p.beside.iter().any(same))
         };
         let mut chosen: Vec<Chosen> = confirmed.iter().filter(stays).cloned().collect();
         let mut candidates = searched.candidates.clone();
@@ -112,26 +90,22 @@ impl PreparedCase<'_> {
                 candidate.slopes.clear();
             }
         }
-        for i in taken {
+        for p in taken {
             chosen.push(Chosen {
                 candidate: candidates.len(),
-                gain: proposed[*i].selected.gain.clone(),
-                error: proposed[*i].selected.error,
+                gain: p.selected.gain.clone(),
+                error: p.selected.error,
                 alternatives: Vec::new(),
             });
-            candidates.push(self.candidate(&proposed[*i], &definitions[*i])?);
+            candidates.push(self.candidate(p)?);
         }
         let about = searched.summed.about.clone();
         let summed = self.summed(about, &candidates, &searched.directions)?;
         let summed = self.polished(&mut candidates, &summed, &chosen, &searched.directions)?;
         let first = chosen.len() - taken.len();
-        let field = self.field(&candidates, &summed, UNWATCHED);
+        let field = self.field(&candidates, &summed);
         for at in first..chosen.len() {
-            let judged = beside_the_others(&field, &summed.declared, &chosen, at);
-            let judged = judged.ok_or(DiagnoseError::NothingDetermined {
-                unknowns: self.unknowns.len(),
-            })?;
-            (chosen[at].gain, chosen[at].error) = judged;
+            (chosen[at].gain, chosen[at].error) = beside_the_others(&field, &chosen, at)?;
         }
         let case = SearchedCase {
             noisier: Some(self.noisier(&summed, &candidates)?),
@@ -148,20 +122,12 @@ impl PreparedCase<'_> {
         Ok((case, judged))
     }
 
-    fn candidate(
-        &self,
-        of: &Proposed,
-        definition: &Definition,
-    ) -> Result<Candidate, DiagnoseError> {
-        let robot = &self.case.given.model.robot;
-        let law = own::law(definition, robot)?;
-        let shape = self.shapes(of).iter().map(|s| s.value).collect();
-        let effect = Added::new(
-            law,
-            Place::Joint(of.joint),
-            shape,
-            vec![0.0; law.linear.len()],
-        );
+    fn candidate(&self, of: &Proposed) -> Result<Candidate, DiagnoseError> {
+        let law = own::law(&self.definition(of), &self.case.given.model.robot)?;
+        let shapes = named(&of.terms, &self.names(of.joint));
+        let shape = shapes.iter().map(|s| s.value).collect();
+        let linear = vec![0.0; law.linear.len()];
+        let effect = Added::new(law, Place::Joint(of.joint), shape, linear);
         Ok(Candidate {
             bounds: vec![Bound::NONE; law.linear.len()],
             slopes: refined_shapes(&self.fitted.model, self.case, &self.cover, &effect),
@@ -169,49 +135,40 @@ impl PreparedCase<'_> {
         })
     }
 
-    fn shapes(&self, of: &Proposed) -> Vec<ShapeNumber> {
-        self.with_names(of.joint, |names| named(&of.terms, names))
-    }
-
-    /// What names and units there are at a joint.
-    pub(super) fn with_names<T>(&self, joint: usize, of: impl FnOnce(&Names) -> T) -> T {
+    pub(super) fn names(&self, joint: usize) -> Names<'_> {
         let robot = &self.case.given.model.robot;
-        let kinds = (0..robot.joints()).map(|k| robot.joint_kind(k).position_unit());
-        of(&Names {
+        let units = (0..robot.joints()).map(|k| robot.joint_kind(k).position_unit());
+        Names {
             joint,
             joints: robot.joint_names(),
-            positions: &kinds.collect::<Vec<_>>(),
+            positions: units.collect(),
             torques: &self.case.units,
-        })
+        }
     }
 
     /// A formula as an effect of the user's own: its name is that of its joint.
     fn definition(&self, of: &Proposed) -> Definition {
-        self.with_names(of.joint, |names| {
-            let shapes = named(&of.terms, names);
-            let mut coefficients: Vec<[String; 3]> = Vec::new();
-            for term in &of.terms {
-                let unit = term.unit(names).unwrap_or_default();
-                for text in term.texts(names, &shapes) {
-                    let name = format!("c{}", coefficients.len() + 1);
-                    coefficients.push([name, unit.clone(), text]);
-                }
+        let names = &self.names(of.joint);
+        let shapes = named(&of.terms, names);
+        let mut coefficients: Vec<[String; 3]> = Vec::new();
+        for term in &of.terms {
+            let unit = term.unit(names).unwrap_or_default();
+            for text in term.texts(names, &shapes) {
+                let name = format!("c{}", coefficients.len() + 1);
+                coefficients.push([name, unit.clone(), text]);
             }
-            let joint = &names.joints[of.joint];
-            Definition {
-                name: self.free_name(&formula_name(joint)),
-                joints: Some(vec![joint.clone()]),
-                coefficients,
-                shapes: shapes.iter().map(range).collect(),
-                friction: self.symmetry(of).odd > 0.5,
-                at_rest: of
-                    .terms
-                    .iter()
-                    .flat_map(FormulaTerm::sources)
-                    .all(Source::is_position),
-                meaning: "a formula of what was left, found by diagnose --search".to_owned(),
-            }
-        })
+        }
+        let joint = &names.joints[of.joint];
+        let mut sources = of.terms.iter().flat_map(FormulaTerm::sources);
+        Definition {
+            name: self.free_name(&formula_name(joint)),
+            joints: Some(vec![joint.clone()]),
+            coefficients,
+            shapes: shapes.iter().map(range).collect(),
+            friction: self.symmetry(of).odd > 0.5,
+            at_rest: sources.all(Source::is_position),
+            meaning: "a formula of what was left, found by diagnose --search".to_owned(),
+        }
     }
 
     /// A name, numbered where the given model has an effect that is called so.
@@ -226,11 +183,11 @@ impl PreparedCase<'_> {
         Symmetry::of(&of.terms, &of.selected.squares, of.joint)
     }
 
-    fn told(
+    fn found(
         &self,
         searched: &SearchedCase,
         confirmed: &[Chosen],
-        (of, definition): (&Proposed, &Definition),
+        of: &Proposed,
         step: FoundEffect,
     ) -> FoundFormula {
         let stays = |c: &&Chosen| !of.beside.iter().any(|own| own.candidate == c.candidate);
@@ -244,7 +201,7 @@ impl PreparedCase<'_> {
         FoundFormula {
             joint: of.joint,
             end,
-            definition: definition.clone(),
+            definition: self.definition(of),
             step,
             p_value: of.p_value,
             share: of.selected.gain.value / of.selected.error.max(f64::MIN_POSITIVE),
@@ -260,31 +217,29 @@ impl PreparedCase<'_> {
 }
 
 fn range(shape: &ShapeNumber) -> Shape {
-    let [from, to] = if shape.name.starts_with('n') {
-        WAVE
-    } else {
-        AROUND
+    let around = match shape.name.starts_with('n') {
+        true => WAVE,
+        false => AROUND,
     };
     Shape {
         name: shape.name.clone(),
         unit: shape.unit.clone(),
-        range: [from * shape.value, to * shape.value],
+        range: around.map(|times| times * shape.value),
     }
 }
 
 /// Signals that terms are functions of, each once, those of the first terms first.
 fn signals(terms: &[FormulaTerm]) -> Vec<(FormulaSignal, usize)> {
     let mut all = Vec::new();
-    for source in terms.iter().flat_map(FormulaTerm::sources) {
-        let own = match source {
-            Source::Signal(of, j) | Source::State(of, j, _) => vec![(of, j)],
-            Source::Sum(i, j) => vec![(FormulaSignal::Position, i), (FormulaSignal::Position, j)],
-        };
-        all.extend(
-            own.into_iter()
-                .filter(|s| !all.contains(s))
-                .collect::<Vec<_>>(),
-        );
+    let own = |source| match source {
+        Source::Signal(of, j) | Source::State(of, j, _) => vec![(of, j)],
+        Source::Sum(i, j) => [i, j].map(|j| (FormulaSignal::Position, j)).to_vec(),
+    };
+    let sources = terms.iter().flat_map(FormulaTerm::sources);
+    for signal in sources.flat_map(own) {
+        if !all.contains(&signal) {
+            all.push(signal);
+        }
     }
     all
 }

@@ -7,8 +7,7 @@ use super::term::{Factor, FormulaTerm, Function, Names, Source};
 use crate::effect::Cover;
 use crate::robot::FormulaSignal as Of;
 
-/// Scales of a function over the spread of what it is of, and of a state over the travel: so far apart that the shape
-/// between two is found by refinement.
+/// Scales of a function over the spread of its signal, and of a state over the travel: refinement finds those between.
 const SCALES: [f64; 3] = [0.1, 0.3, 1.0];
 const WAYS: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
 /// Waves a turn that are tried of every position beside those of the residual's spectrum.
@@ -22,7 +21,6 @@ const LEAST_WAVES: f64 = 0.25;
 
 /// What a joint and the others did.
 pub struct Around<'a> {
-    pub joint: usize,
     pub cover: &'a Cover,
     pub names: &'a Names<'a>,
     /// Joints that move in some log.
@@ -33,7 +31,7 @@ pub struct Around<'a> {
 
 /// All terms whose units one constant makes right.
 pub fn library(around: &Around) -> Vec<FormulaTerm> {
-    let j = around.joint;
+    let j = around.names.joint;
     let (carriers, own) = (around.carriers(), around.sizes());
     let others: Vec<FormulaTerm> = around.others().flat_map(|k| around.sizes_of(k)).collect();
     let mut all: Vec<FormulaTerm> = Vec::new();
@@ -49,15 +47,11 @@ pub fn library(around: &Around) -> Vec<FormulaTerm> {
     for k in around.others() {
         let speed = Factor::plain(Of::Speed, k);
         let drag = Factor::of(Function::Signed, speed.source);
-        let plain = [
-            speed,
-            drag,
-            Factor::plain(Of::Direction, k),
-            Factor::plain(Of::Acceleration, k),
-        ];
-        all.extend(plain.map(|f| FormulaTerm::of(&[f])));
+        let [direction, acceleration] =
+            [Of::Direction, Of::Acceleration].map(|of| Factor::plain(of, k));
+        all.extend([speed, drag, direction, acceleration].map(|f| FormulaTerm::of(&[f])));
         let own = [
-            speed.of_own(j),
+            Factor::plain(Of::Speed, j),
             Factor::plain(Of::Position, j),
             Factor::plain(Of::Direction, j),
             Factor::of(Function::Abs, Source::Signal(Of::Speed, j)),
@@ -75,19 +69,12 @@ pub fn library(around: &Around) -> Vec<FormulaTerm> {
     kept
 }
 
-impl Factor {
-    /// The same signal of another joint.
-    fn of_own(mut self, joint: usize) -> Self {
-        if let Source::Signal(_, of) = &mut self.source {
-            *of = joint;
-        }
-        self
-    }
-}
-
 impl Around<'_> {
     fn others(&self) -> impl Iterator<Item = usize> + '_ {
-        self.moving.iter().copied().filter(|k| *k != self.joint)
+        self.moving
+            .iter()
+            .copied()
+            .filter(|k| *k != self.names.joint)
     }
 
     fn range(&self, j: usize) -> f64 {
@@ -96,7 +83,7 @@ impl Around<'_> {
 
     /// What carries a torque by itself.
     fn carriers(&self) -> Vec<Factor> {
-        let j = self.joint;
+        let j = self.names.joint;
         let plain = |of| Factor::plain(of, j);
         let speed = Source::Signal(Of::Speed, j);
         let middle = 0.1 * self.range(j);
@@ -113,19 +100,16 @@ impl Around<'_> {
         let fast = self.cover.joints[j].speed_rms;
         all.extend(SCALES.map(|s| Factor::of(Function::Tanh(s * fast), speed)));
         for way in WAYS.map(|s| s * self.range(j)) {
-            all.extend(
-                [Of::Play, Of::Dahl]
-                    .map(|of| Factor::of(Function::Plain, Source::State(of, j, way))),
-            );
+            let state = |of| Factor::of(Function::Plain, Source::State(of, j, way));
+            all.extend([Of::Play, Of::Dahl].map(state));
         }
         all
     }
 
     /// What sets the size of a torque.
     fn sizes(&self) -> Vec<FormulaTerm> {
-        let j = self.joint;
-        let of =
-            |function, signal| FormulaTerm::of(&[Factor::of(function, Source::Signal(signal, j))]);
+        let j = self.names.joint;
+        let of = |function, signal| single(function, Source::Signal(signal, j));
         let mut all = vec![
             of(Function::Plain, Of::Load),
             of(Function::Abs, Of::Load),
@@ -141,37 +125,24 @@ impl Around<'_> {
         all.extend(SCALES.map(|s| of(Function::Decay(s * turn), Of::SinceReversal)));
         for (warm, spread) in &self.warm {
             let source = Source::Signal(Of::Temperature, *warm);
-            all.push(FormulaTerm::of(&[Factor::of(Function::Plain, source)]));
-            let decays = [0.3, 1.0, 3.0].map(|s| Factor::of(Function::Decay(s * spread), source));
-            all.extend(decays.map(|f| FormulaTerm::of(&[f])));
+            all.push(single(Function::Plain, source));
+            all.extend([0.3, 1.0, 3.0].map(|s| single(Function::Decay(s * spread), source)));
         }
-        all.extend(self.of_position(Source::Signal(Of::Position, j)));
+        all.extend(of_position(Source::Signal(Of::Position, j)));
         all.extend(self.waves(j));
         all
     }
 
     /// What another joint sets.
     fn sizes_of(&self, k: usize) -> Vec<FormulaTerm> {
-        let mut all = self.of_position(Source::Signal(Of::Position, k));
+        let mut all = of_position(Source::Signal(Of::Position, k)).to_vec();
         all.extend(self.waves(k));
         let speed = Source::Signal(Of::Speed, k);
-        let own = [Function::Abs, Function::Square].map(|f| Factor::of(f, speed));
-        all.extend(own.map(|f| FormulaTerm::of(&[f])));
-        let both = Source::Sum(self.joint, k);
-        all.extend(self.of_position(both));
+        all.extend([Function::Abs, Function::Square].map(|f| single(f, speed)));
+        let both = Source::Sum(self.names.joint, k);
+        all.extend(of_position(both));
         all.extend(TURNS[..2].iter().map(|n| wave(both, *n)));
         all
-    }
-
-    fn of_position(&self, source: Source) -> Vec<FormulaTerm> {
-        let all = [
-            Function::Plain,
-            Function::Square,
-            Function::Cube,
-            Function::Abs,
-        ];
-        all.map(|f| FormulaTerm::of(&[Factor::of(f, source)]))
-            .to_vec()
     }
 
     /// Waves over the position of a joint: whole ones a turn, and those of the residual's spectrum at the joint itself.
@@ -183,7 +154,7 @@ impl Around<'_> {
         if angle {
             all.extend(TURNS.iter().filter(|n| **n >= LEAST_WAVES * turns));
         }
-        if k == self.joint {
+        if k == self.names.joint {
             let joint = &self.cover.joints[k];
             let spectra = [&joint.ripple_orders, &joint.friction_orders];
             let peaks = spectra.iter().flat_map(|orders| orders.iter().take(PEAKS));
@@ -200,7 +171,16 @@ impl Around<'_> {
     }
 }
 
-fn wave(source: Source, n: f64) -> FormulaTerm {
+fn single(function: Function, source: Source) -> FormulaTerm {
+    FormulaTerm::of(&[Factor::of(function, source)])
+}
+
+fn of_position(source: Source) -> [FormulaTerm; 4] {
+    use Function::{Abs, Cube, Plain, Square};
+    [Plain, Square, Cube, Abs].map(|f| single(f, source))
+}
+
+pub(super) fn wave(source: Source, n: f64) -> FormulaTerm {
     FormulaTerm {
         factors: Vec::new(),
         wave: Some((source, n)),

@@ -14,15 +14,6 @@
 //! (`symbolic_regression` 0.12, after SymbolicRegression.jl, is the best kept): no declared parameter is refitted beside a tree, no
 //! block is left out, and a null of 99 searches would take hours. `exmex` evaluates what is found, as it does a user's
 //! formulas.
-//!
-//! | file | does |
-//! |---|---|
-//! | `term` | functions of signals, products of them, units, names |
-//! | `library` | the terms that are searched |
-//! | `select` | few of them |
-//! | `judged` | a formula as an effect of the user's own, before the judge |
-//! | `symmetry` | what kind of physics it is, whatever its terms |
-//! | `picture` | it on data set aside: over its first signal, and next to reversals |
 
 mod columns;
 mod judged;
@@ -34,11 +25,12 @@ mod term;
 #[cfg(test)]
 mod tests;
 
+use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use self::columns::Columns;
+use self::columns::RowsOfJoint;
 use self::judged::SearchedFormulas;
 use self::library::{Around, library};
 use self::select::{Products, Selected, gram};
@@ -46,13 +38,13 @@ use self::term::{FormulaTerm, Names};
 use super::error::DiagnoseError;
 use super::outcome::Diagnosis;
 use super::prepared::PreparedCase;
-use super::problem::pass::{Candidate, Made, RowsOfJoint, joint_rows};
+use super::problem::pass::Candidate;
 use super::search::Chosen;
 use super::searched::SearchedCase;
 use super::steps::Judged;
 use super::watch::Watch;
-use crate::effect::Place;
-use crate::judge::{LEAST_PARTS, TimeBlock, compare};
+use crate::effect::{AugmentedModel, Place};
+use crate::judge::{LEAST_PARTS, compare};
 
 /// A formula of a joint before the judge.
 pub struct Proposed {
@@ -83,9 +75,7 @@ impl PreparedCase<'_> {
         let part = watch.part("formulas", joints.len());
         let mut proposed = Vec::new();
         for j in joints {
-            if (watch.stop)() {
-                return Err(DiagnoseError::Interrupted);
-            }
+            watch.unless_stopped()?;
             proposed.extend(self.proposed(searched, &confirmed, j)?);
             part.step();
         }
@@ -93,8 +83,7 @@ impl PreparedCase<'_> {
         self.judged_formulas(searched, &confirmed, proposed)
     }
 
-    /// The formula of a joint that is to be judged: beside what the catalogue found at the joint, or in its place where it
-    /// explains as much by itself.
+    /// The formula of a joint beside what the catalogue found there, or in its place where it explains as much by itself.
     fn proposed(
         &self,
         searched: &SearchedCase,
@@ -102,14 +91,13 @@ impl PreparedCase<'_> {
         j: usize,
     ) -> Result<Option<Proposed>, DiagnoseError> {
         let of_joint = OfJoint::of(self, searched, confirmed, j);
-        let terms = self.with_names(j, |names| library(&self.around(names)));
-        let rows = self.joint_rows(searched, &of_joint.candidates, &terms, j)?;
+        let terms = library(&self.around(&self.names(j)));
+        let about = &searched.summed.about;
+        let rows = self.joint_rows(about, &of_joint.candidates, &terms, j)?;
         let gram = gram(&rows.more);
         let search = |with_own: bool| -> Result<Option<Proposed>, DiagnoseError> {
             let kept = of_joint.kept(with_own);
-            let (ridge, rows) = (self.case.numbers.ridge, (&rows, &gram, kept.as_slice()));
-            let products = self.with_names(j, |names| Products::of(&terms, rows, names, ridge));
-            let Some(products) = products else {
+            let Some(products) = self.products(&terms, (&rows, &gram, &kept), j) else {
                 return Ok(None);
             };
             let Some(selected) = self.selected(&products, None) else {
@@ -117,8 +105,7 @@ impl PreparedCase<'_> {
             };
             let p_value = self.chance(&products, &selected);
             let terms = selected.terms.iter().map(|t| terms[*t].clone()).collect();
-            let (terms, selected) =
-                self.reshaped(searched, (&of_joint, &kept), (terms, selected))?;
+            let (terms, selected) = self.reshaped(about, (&of_joint, &kept), (terms, selected))?;
             let stays = |c: &&Chosen| with_own || !of_joint.is_own(searched, c);
             Ok(Some(Proposed {
                 joint: j,
@@ -149,11 +136,20 @@ impl PreparedCase<'_> {
         products.select(signs.unwrap_or(&plain), numbers)
     }
 
-    /// Terms chosen anew of those that were chosen and of these with shapes between those of the library, twice, closer
-    /// each time: what only made good for a wrong shape falls out.
+    fn products<'t>(
+        &self,
+        terms: &'t [FormulaTerm],
+        rows: (&'t RowsOfJoint, &DMatrix<f64>, &[usize]),
+        j: usize,
+    ) -> Option<Products<'t>> {
+        let ridge = self.case.numbers.ridge;
+        Products::of(terms, rows, &self.names(j), ridge)
+    }
+
+    /// Terms chosen anew of these and of others with shapes near theirs, twice: what made good for a wrong shape falls out.
     fn reshaped(
         &self,
-        searched: &SearchedCase,
+        about: &AugmentedModel,
         (of_joint, kept): (&OfJoint, &[usize]),
         (mut terms, mut selected): (Vec<FormulaTerm>, Selected),
     ) -> Result<(Vec<FormulaTerm>, Selected), DiagnoseError> {
@@ -164,10 +160,8 @@ impl PreparedCase<'_> {
             if near.len() == terms.len() {
                 break;
             }
-            let rows = self.joint_rows(searched, &of_joint.candidates, &near, j)?;
-            let gram = gram(&rows.more);
-            let (ridge, rows) = (self.case.numbers.ridge, (&rows, &gram, kept));
-            let products = self.with_names(j, |names| Products::of(&near, rows, names, ridge));
+            let rows = self.joint_rows(about, &of_joint.candidates, &near, j)?;
+            let products = self.products(&near, (&rows, &gram(&rows.more), kept), j);
             let Some(found) = products.and_then(|p| self.selected(&p, None)) else {
                 break;
             };
@@ -180,70 +174,39 @@ impl PreparedCase<'_> {
     fn around<'b>(&'b self, names: &'b Names<'b>) -> Around<'b> {
         let stretches = &self.case.stretches;
         let joints = 0..self.cover.joints.len();
-        let moving = joints.clone().filter(|k| !self.cover.joints[*k].stationary);
         let spread = |k: usize| {
-            let all = stretches.iter().flat_map(|s| &s.temperature[k]);
-            let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
-                [a.min(*x), b.max(*x)]
-            });
-            high - low
+            let all = stretches.iter().flat_map(|s| s.temperature[k].iter());
+            let low = all.clone().fold(f64::INFINITY, |a, x| a.min(*x));
+            all.fold(f64::NEG_INFINITY, |b, x| b.max(*x)) - low
         };
-        let known = joints.filter(|k| stretches.iter().all(|s| s.has_temperature(*k)));
+        let known = joints.clone();
+        let known = known.filter(|k| stretches.iter().all(|s| s.has_temperature(*k)));
+        let warm = known.map(|k| (k, spread(k)));
+        let moves = |k: &usize| !self.cover.joints[*k].stationary;
         Around {
-            joint: names.joint,
             cover: &self.cover,
             names,
-            moving: moving.collect(),
-            warm: known
-                .map(|k| (k, spread(k)))
-                .filter(|(_, s)| *s > 0.0)
-                .collect(),
+            moving: joints.filter(moves).collect(),
+            warm: warm.filter(|(_, s)| *s > 0.0).collect(),
         }
     }
 
-    /// Rows of a joint with the columns of all terms.
-    fn joint_rows(
-        &self,
-        searched: &SearchedCase,
-        candidates: &[Candidate],
-        terms: &[FormulaTerm],
-        j: usize,
-    ) -> Result<RowsOfJoint, DiagnoseError> {
-        let columns = Columns::of(terms);
-        let made = Made {
-            series: &|scene| columns.series(scene),
-            column: &|series, i| columns.column(series, i),
-            count: columns.count(),
-        };
-        let rows = joint_rows(
-            &searched.summed.about,
-            (&self.unknowns, candidates),
-            (&self.data, &self.blocks.list),
-            (j, self.case.formula.rows),
-            &made,
-        )?;
-        Ok(rows)
-    }
-
-    /// Chance of a gain as large where whole parts of the residual have another sign: the whole search each time, until
-    /// it is too large to be told.
+    /// Chance of a gain as large where whole parts of the residual have another sign, until it is too large to be reported.
     fn chance(&self, products: &Products, selected: &Selected) -> f64 {
         let numbers = &self.case.formula;
         let mut chance = ChaCha8Rng::seed_from_u64(numbers.seed);
-        let mut signs = || {
+        let mut signs = |_| {
             let sign = |_| if chance.random::<bool>() { 1.0 } else { -1.0 };
             let of_parts: Vec<f64> = (0..self.blocks.parts).map(sign).collect();
-            let of_block = |b: &TimeBlock| of_parts[b.part];
-            self.blocks.list.iter().map(of_block).collect::<Vec<f64>>()
+            let blocks = self.blocks.list.iter();
+            blocks.map(|b| of_parts[b.part]).collect()
         };
-        let draws: Vec<Vec<f64>> = (0..numbers.draws).map(|_| signs()).collect();
+        let draws: Vec<Vec<f64>> = (0..numbers.draws).map(&mut signs).collect();
         let (mut drawn, mut as_good) = (0, 0);
         for some in draws.chunks(TOGETHER) {
-            let found = some
-                .par_iter()
-                .map(|signs| self.selected(products, Some(signs)));
-            let found: Vec<Option<Selected>> = found.collect();
-            let gains = found.iter().flatten().filter(|s| s.even >= selected.even);
+            let found = some.par_iter();
+            let found = found.filter_map(|signs| self.selected(products, Some(signs)));
+            let gains = found.filter(|s| s.even >= selected.even);
             (drawn, as_good) = (drawn + some.len(), as_good + gains.count());
             if (1 + as_good) as f64 > numbers.chance * (1 + numbers.draws) as f64 {
                 break;
@@ -256,7 +219,6 @@ impl PreparedCase<'_> {
 /// What the model has at a joint beside a formula.
 struct OfJoint {
     joint: usize,
-    /// Effects that are confirmed.
     candidates: Vec<Candidate>,
     /// Of each declared column: whether it is of an effect of the joint itself.
     own: Vec<bool>,
@@ -269,17 +231,13 @@ impl OfJoint {
         confirmed: &[Chosen],
         joint: usize,
     ) -> Self {
-        let candidates = confirmed
-            .iter()
-            .map(|c| searched.candidates[c.candidate].clone());
-        let candidates: Vec<Candidate> = candidates.collect();
+        let candidate = |c: &Chosen| searched.candidates[c.candidate].clone();
+        let candidates: Vec<Candidate> = confirmed.iter().map(candidate).collect();
         let mut own = vec![false; prepared.unknowns.columns[joint].len()];
         for candidate in candidates.iter().filter(|c| c.effect.place.touches(joint)) {
             let is_own = candidate.effect.place == Place::Joint(joint);
-            own.extend(vec![
-                is_own;
-                candidate.bounds.len() + candidate.slopes.len()
-            ]);
+            let count = candidate.bounds.len() + candidate.slopes.len();
+            own.extend(std::iter::repeat_n(is_own, count));
         }
         OfJoint {
             joint,

@@ -9,7 +9,6 @@ use crate::effect::cover::{TURN, reversals};
 use crate::effect::{AugmentedModel, Torques};
 use crate::robot::FormulaSignal;
 
-/// Rows that are kept of it, about.
 const MOST: usize = 700;
 
 /// Time about a reversal [s] within which hysteresis is judged by itself.
@@ -31,21 +30,17 @@ impl<'a> OnHeldOut<'a> {
         (model, place): (&'a AugmentedModel, usize),
         joint: usize,
     ) -> Result<Self, DiagnoseError> {
-        let (split, data) = (&prepared.split, &prepared.data);
+        let (split, data) = (prepared.data.split, &prepared.data);
         let mut without = model.clone();
         without.effects[place].linear.fill(0.0);
         let [without, with] = [filtered(&without, data)?, filtered(model, data)?];
-        let held = split
-            .pieces
-            .iter()
-            .filter(|p| p.role == LogRole::Holdout && !split.is_stationary(p.stretch, joint));
+        let held = split.pieces.iter().filter(|p| p.role == LogRole::Holdout);
+        let held = held.filter(|p| !split.is_stationary(p.stretch, joint));
         let rows = held.flat_map(|p| p.rows.clone().map(|row| (p.stretch, row)));
         let of_row = |(s, row): (usize, usize)| {
             let sample = data.filters.of(&prepared.case.stretches[s]).sample_of(row);
-            (
-                [s, sample],
-                [&without, &with].map(|left| left[s][joint][row]),
-            )
+            let left = [&without, &with].map(|left| left[s][joint][row]);
+            ([s, sample], left)
         };
         let rows = rows.map(of_row).collect();
         Ok(Self {
@@ -77,8 +72,9 @@ impl<'a> OnHeldOut<'a> {
     pub fn at_reversals(&self) -> Option<[f64; 2]> {
         let least = TURN * self.prepared.cover.joints[self.joint].range();
         let stretches = self.prepared.case.stretches.iter();
-        let turns = stretches.map(|s| reversals(&s.q[self.joint], least));
-        let turns: Vec<Vec<usize>> = turns.collect();
+        let turns: Vec<Vec<usize>> = stretches
+            .map(|s| reversals(&s.q[self.joint], least))
+            .collect();
         let near = |s: usize, k: usize| {
             let most = ABOUT_REVERSAL / self.prepared.case.stretches[s].dt;
             let after = turns[s].partition_point(|turn| *turn < k);

@@ -6,25 +6,19 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::columns::RowsOfJoint;
 use super::term::{FormulaTerm, Names};
 use crate::diagnose::problem::formula_numbers::FormulaNumbers;
-use crate::diagnose::problem::pass::RowsOfJoint;
 use crate::judge::{BlockSums, BlocksLeftOut, Bound, ErrorGain, Numbers, Term, Terms};
 
 /// Terms with sums of products of their columns, the declared ones and the residual.
 pub struct Products<'a> {
     pub terms: &'a [FormulaTerm],
-    /// Columns of each term.
     columns: Vec<Range<usize>>,
     /// Names and values of the shapes of each.
     shapes: Vec<Vec<String>>,
     more: &'a DMatrix<f64>,
-    blocks: &'a [Range<usize>],
-    /// Of each block: declared by declared, more by declared, and both by the residual.
-    declared: Vec<DMatrix<f64>>,
-    across: Vec<DMatrix<f64>>,
-    right: Vec<[DVector<f64>; 2]>,
-    squares: Vec<f64>,
+    blocks: Vec<BlockProducts>,
     /// Of more columns beside the declared ones, over all blocks.
     beside: DMatrix<f64>,
     /// Declared columns solved for those.
@@ -33,12 +27,19 @@ pub struct Products<'a> {
     share: Vec<f64>,
 }
 
-/// Terms that were chosen.
+/// Products of the rows of a block.
+struct BlockProducts {
+    rows: Range<usize>,
+    /// Declared by declared, more by declared, and both by the residual.
+    declared: DMatrix<f64>,
+    across: DMatrix<f64>,
+    right: [DVector<f64>; 2],
+    square: f64,
+}
+
 #[derive(Debug, Clone)]
 pub struct Selected {
-    /// Their indices.
     pub terms: Vec<usize>,
-    /// Gain of all of them.
     pub gain: ErrorGain,
     /// Squared error of blocks left out without any, and of each block with them.
     pub error: f64,
@@ -66,41 +67,38 @@ impl<'a> Products<'a> {
         let columns: Vec<Range<usize>> = terms.iter().map(place).collect();
         // the residual stands last
         let left = rows.declared.column(rows.declared.ncols().checked_sub(1)?);
-        let (d, own) = (kept.len(), rows.declared.select_columns(kept));
-        let mut all = Products {
+        let own = rows.declared.select_columns(kept);
+        let of_block = |block: &Range<usize>| {
+            let (from, count) = (block.start, block.len());
+            let (own, more) = (own.rows(from, count), rows.more.rows(from, count));
+            let left = left.rows(from, count);
+            BlockProducts {
+                rows: block.clone(),
+                declared: own.transpose() * own,
+                across: more.transpose() * own,
+                right: [own.tr_mul(&left), more.tr_mul(&left)],
+                square: left.norm_squared(),
+            }
+        };
+        let blocks: Vec<BlockProducts> = rows.blocks.iter().map(of_block).collect();
+        let mut normal: DMatrix<f64> = blocks.iter().map(|b| &b.declared).sum();
+        for i in 0..kept.len() {
+            normal[(i, i)] += (ridge * normal[(i, i)]).max(1e-300);
+        }
+        let across: DMatrix<f64> = blocks.iter().map(|b| &b.across).sum();
+        let through = normal.cholesky()?.solve(&across.transpose());
+        let beside = gram - across * &through;
+        let part = |c: usize| beside[(c, c)] / gram[(c, c)].max(1e-300);
+        Some(Products {
             terms,
             columns,
             shapes: terms.iter().map(|t| shapes_of(t, names)).collect(),
             more: &rows.more,
-            blocks: &rows.blocks,
-            declared: Vec::new(),
-            across: Vec::new(),
-            right: Vec::new(),
-            squares: Vec::new(),
-            beside: gram.clone(),
-            through: DMatrix::zeros(0, 0),
-            share: Vec::new(),
-        };
-        for block in &rows.blocks {
-            let (from, count) = (block.start, block.len());
-            let (own, more) = (own.rows(from, count), rows.more.rows(from, count));
-            let left = left.rows(from, count);
-            all.declared.push(own.transpose() * own);
-            all.across.push(more.transpose() * own);
-            all.right.push([own.tr_mul(&left), more.tr_mul(&left)]);
-            all.squares.push(left.norm_squared());
-        }
-        let mut normal: DMatrix<f64> = all.declared.iter().sum();
-        for i in 0..d {
-            normal[(i, i)] += (ridge * normal[(i, i)]).max(1e-300);
-        }
-        let across: DMatrix<f64> = all.across.iter().sum();
-        all.through = normal.cholesky()?.solve(&across.transpose());
-        let whole: Vec<f64> = all.beside.diagonal().iter().copied().collect();
-        all.beside -= across * &all.through;
-        let part = |(c, whole): (usize, f64)| all.beside[(c, c)] / whole.max(1e-300);
-        all.share = whole.into_iter().enumerate().map(part).collect();
-        Some(all)
+            blocks,
+            share: (0..gram.ncols()).map(part).collect(),
+            beside,
+            through,
+        })
     }
 
     /// Chooses terms, the residual of each block with a sign.
@@ -147,22 +145,17 @@ impl<'a> Products<'a> {
 
     /// Products of more columns with the residual, beside the declared ones.
     fn pull(&self, signs: &[f64]) -> DVector<f64> {
-        let (mut own, mut more) = (
-            self.right[0][0].clone() * 0.0,
-            self.right[0][1].clone() * 0.0,
-        );
-        for ([d, x], sign) in self.right.iter().zip(signs) {
-            own += d * *sign;
-            more += x * *sign;
-        }
+        let [own, more] = [0, 1].map(|k| {
+            let parts = self.blocks.iter().zip(signs);
+            let parts = parts.map(|(block, sign)| &block.right[k] * *sign);
+            parts.sum::<DVector<f64>>()
+        });
         more - self.through.tr_mul(&own)
     }
 
     fn columns_of(&self, terms: &[usize]) -> Vec<usize> {
-        terms
-            .iter()
-            .flat_map(|t| self.columns[*t].clone())
-            .collect()
+        let columns = terms.iter().flat_map(|t| self.columns[*t].clone());
+        columns.collect()
     }
 }
 
@@ -185,15 +178,10 @@ pub fn gram(more: &DMatrix<f64>) -> DMatrix<f64> {
     let firsts: Vec<usize> = (0..more.ncols()).step_by(SIDE_BY_SIDE).collect();
     let parts = firsts.into_par_iter().map(|first| {
         let count = SIDE_BY_SIDE.min(more.ncols() - first);
-        &turned * more.columns(first, count)
+        Vec::from((&turned * more.columns(first, count)).data)
     });
-    let parts: Vec<DMatrix<f64>> = parts.collect();
-    let mut out = DMatrix::zeros(more.ncols(), more.ncols());
-    for (i, part) in parts.iter().enumerate() {
-        out.columns_mut(i * SIDE_BY_SIDE, part.ncols())
-            .copy_from(part);
-    }
-    out
+    let parts: Vec<Vec<f64>> = parts.collect();
+    DMatrix::from_vec(more.ncols(), more.ncols(), parts.concat())
 }
 
 /// Columns of a product that one thread makes.
@@ -221,41 +209,26 @@ impl Asked<'_> {
         let d = p.through.nrows();
         let size = d + columns.len();
         let mut sums = BlockSums::zeros(p.blocks.len(), &[size]);
-        for (b, block) in p.blocks.iter().enumerate() {
+        for (b, (block, sign)) in p.blocks.iter().zip(self.signs).enumerate() {
             let out = &mut sums.blocks[b][0];
-            let sign = self.signs[b];
-            out.view_mut((0, 0), (d, d)).copy_from(&p.declared[b]);
-            let more = p.more.rows(block.start, block.len());
+            out.view_mut((0, 0), (d, d)).copy_from(&block.declared);
+            let mut put = |i: usize, k: usize, x: f64| {
+                out[(i, k)] = x;
+                out[(k, i)] = x;
+            };
+            let more = p.more.rows(block.rows.start, block.rows.len());
+            (0..d).for_each(|l| put(l, size, sign * block.right[0][l]));
             for (i, c) in columns.iter().enumerate() {
-                for (l, x) in p.across[b].row(*c).iter().enumerate() {
-                    out[(d + i, l)] = *x;
-                    out[(l, d + i)] = *x;
-                }
+                (0..d).for_each(|l| put(d + i, l, block.across[(*c, l)]));
                 for (k, other) in columns.iter().enumerate().take(i + 1) {
-                    let x = more.column(*c).dot(&more.column(*other));
-                    out[(d + i, d + k)] = x;
-                    out[(d + k, d + i)] = x;
+                    put(d + i, d + k, more.column(*c).dot(&more.column(*other)));
                 }
-                let x = sign * p.right[b][1][*c];
-                out[(d + i, size)] = x;
-                out[(size, d + i)] = x;
+                put(d + i, size, sign * block.right[1][*c]);
             }
-            for (l, x) in p.right[b][0].iter().enumerate() {
-                out[(l, size)] = sign * x;
-                out[(size, l)] = sign * x;
-            }
-            out[(size, size)] = p.squares[b];
-            sums.rows[b][0] = block.len() as f64;
+            put(size, size, block.square);
+            sums.rows[b][0] = block.rows.len() as f64;
         }
         sums
-    }
-
-    fn terms(&self, columns: Range<usize>) -> Vec<Term> {
-        let term = |column| Term {
-            columns: vec![(0, column)],
-            bound: Bound::NONE,
-        };
-        columns.map(term).collect()
     }
 
     /// Fits with each block left out: of the declared columns and `used`; the sums have those of `looked` too.
@@ -264,24 +237,25 @@ impl Asked<'_> {
         (used, looked): (&[usize], &[usize]),
         of: impl FnOnce(&BlocksLeftOut, &[Vec<Term>]) -> T,
     ) -> Option<T> {
-        let d = self.of.through.nrows();
-        let all: Vec<usize> = used.iter().chain(looked).copied().collect();
-        let sums = self.sums(&all);
-        let count = self.of.columns_of(used).len();
-        let terms = Terms {
-            list: self.terms(0..d + count),
+        let mut next = 0;
+        let mut terms = |count: usize| -> Vec<Term> {
+            let term = |column| Term {
+                columns: vec![(0, column)],
+                bound: Bound::NONE,
+            };
+            next += count;
+            (next - count..next).map(term).collect()
+        };
+        let sums = self.sums(&[used, looked].concat());
+        let in_use = Terms {
+            list: terms(self.of.through.nrows() + self.of.columns_of(used).len()),
             weights: vec![1.0],
             prior: (DMatrix::zeros(0, 0), DVector::zeros(0)),
             ridge: self.judge.ridge,
         };
-        let left_out = BlocksLeftOut::new(&sums, 0, &terms)?;
-        let mut next = d + count;
-        let more = looked.iter().map(|t| {
-            let first = next;
-            next += self.of.terms[*t].count();
-            self.terms(first..next)
-        });
+        let more = looked.iter().map(|t| terms(self.of.terms[*t].count()));
         let more: Vec<Vec<Term>> = more.collect();
+        let left_out = BlocksLeftOut::new(&sums, 0, &in_use)?;
         Some(of(&left_out, &more))
     }
 
@@ -292,16 +266,21 @@ impl Asked<'_> {
         })
     }
 
+    /// Columns of terms, their products beside the declared ones, and those with the residual.
+    fn beside(&self, terms: &[usize]) -> (Vec<usize>, DMatrix<f64>, DVector<f64>) {
+        let own = self.of.columns_of(terms);
+        let among = self.of.beside.select_columns(&own).select_rows(&own);
+        let right = self.pull.select_rows(&own);
+        (own, among, right)
+    }
+
     /// Square of what each of these terms adds to the fit of all of them, beside the declared columns.
     fn squares(&self, used: &[usize]) -> Option<Vec<f64>> {
-        let p = self.of;
-        let own = p.columns_of(used);
-        let among = DMatrix::from_fn(own.len(), own.len(), |i, k| p.beside[(own[i], own[k])]);
-        let right = DVector::from_iterator(own.len(), own.iter().map(|c| self.pull[*c]));
+        let (_, among, right) = self.beside(used);
         let values = among.clone().cholesky()?.solve(&right);
         let mut first = 0;
         let of_term = |t: &usize| {
-            let (at, k) = (first, p.columns[*t].len());
+            let (at, k) = (first, self.of.columns[*t].len());
             first += k;
             let x = values.rows(at, k);
             x.dot(&(among.view((at, at), (k, k)) * x))
@@ -318,13 +297,11 @@ impl Asked<'_> {
             gains.collect::<Vec<ErrorGain>>()
         })?;
         let own = short.into_iter().zip(gains);
-        let open: Vec<(usize, ErrorGain)> = own
-            .filter(|(_, g)| g.is_beyond(self.judge.screen, None))
-            .collect();
+        let own = own.filter(|(_, g)| g.is_beyond(self.judge.screen, None));
+        let open: Vec<(usize, ErrorGain)> = own.collect();
         let best = open.iter().max_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
-        let near = open
-            .iter()
-            .filter(|(_, g)| g.is_near(&best.1, self.judge.same));
+        let near = open.iter();
+        let near = near.filter(|(_, g)| g.is_near(&best.1, self.judge.same));
         let near = near.chain([best]);
         let shortest = near.min_by_key(|(t, _)| self.length(*t, used))?;
         Some(shortest.clone())
@@ -340,12 +317,10 @@ impl Asked<'_> {
     /// Terms that take most off the squares of all blocks beside others.
     fn shortlist(&self, used: &[usize]) -> Vec<usize> {
         let p = self.of;
-        let own = p.columns_of(used);
-        let among = DMatrix::from_fn(own.len(), own.len(), |i, k| p.beside[(own[i], own[k])]);
+        let (own, among, right) = self.beside(used);
         let Some(factor) = among.cholesky() else {
             return Vec::new();
         };
-        let right = DVector::from_iterator(own.len(), own.iter().map(|c| self.pull[*c]));
         let solved = factor.solve(&right);
         let mut found: Vec<(f64, usize)> = Vec::new();
         for t in (0..p.terms.len()).filter(|t| !used.contains(t) && self.fits(*t, used)) {
@@ -377,12 +352,9 @@ impl Asked<'_> {
         all.extend(&self.of.shapes[term]);
         all.sort_unstable();
         all.dedup();
-        let scale = |name: &str| {
-            all.iter()
-                .filter(|s| s.split(' ').next() == Some(name))
-                .count()
-        };
-        all.len() <= self.formula.shapes && scale("width") <= 1 && scale("way") <= 1
+        let is_of = |s: &str, name: &str| s.split(' ').next() == Some(name);
+        let one = |name: &str| all.iter().filter(|s| is_of(s, name)).count() <= 1;
+        all.len() <= self.formula.shapes && one("width") && one("way")
     }
 
     /// Puts in the place of each term what gains more there, as long as something does.

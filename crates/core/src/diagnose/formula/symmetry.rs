@@ -19,7 +19,7 @@ impl Symmetry {
                 t.sources()
                     .any(|s| matches!(s, Source::Signal(FormulaSignal::Acceleration, _)))
             }),
-            coupled: part(&|t| t.joints().iter().any(|k| *k != joint)),
+            coupled: part(&|t| t.sources().flat_map(Source::joints).any(|k| k != joint)),
         }
     }
 

@@ -16,7 +16,6 @@ pub enum Source {
     State(FormulaSignal, usize, f64),
 }
 
-/// A function of one source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Function {
     Plain,
@@ -33,7 +32,6 @@ pub enum Function {
     Bell(f64),
 }
 
-/// A function of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factor {
     pub source: Source,
@@ -48,7 +46,6 @@ pub struct FormulaTerm {
     pub wave: Option<(Source, f64)>,
 }
 
-/// Powers of units.
 pub type Powers = BTreeMap<String, i32>;
 
 /// Names and units on a robot, at one joint.
@@ -56,7 +53,7 @@ pub struct Names<'a> {
     pub joint: usize,
     pub joints: &'a [String],
     /// m or rad of each joint, and the unit of its torque.
-    pub positions: &'a [&'static str],
+    pub positions: Vec<&'static str>,
     pub torques: &'a [String],
 }
 
@@ -100,45 +97,38 @@ impl Source {
         let of = |signal: FormulaSignal, j: usize| {
             let plain = signal.name();
             let text = format!("{plain}_{}", names.joints[j]);
-            match (j == names.joint, text.chars().all(is_plain)) {
-                (true, _) => plain.to_owned(),
-                (false, true) => text,
-                (false, false) => format!("{{{text}}}"),
+            let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+            match j == names.joint {
+                true => plain.to_owned(),
+                false if text.chars().all(is_plain) => text,
+                false => format!("{{{text}}}"),
             }
         };
         match self {
             Self::Signal(signal, j) | Self::State(signal, j, _) => of(signal, j),
             Self::Sum(i, j) => {
-                let position = |j| of(FormulaSignal::Position, j);
-                format!("({} + {})", position(i), position(j))
+                let [a, b] = [i, j].map(|j| of(FormulaSignal::Position, j));
+                format!("({a} + {b})")
             }
         }
     }
 
     /// Its unit; none for a sum of what has different ones.
     pub fn unit(self, names: &Names) -> Option<Powers> {
+        use FormulaSignal as Of;
         let position = |j: usize| names.positions[j];
-        let powers = |of: &[(&str, i32)]| -> Powers {
-            of.iter()
-                .map(|(unit, p)| ((*unit).to_owned(), *p))
-                .collect()
+        let of: Vec<(&str, i32)> = match self {
+            Self::Sum(i, j) if position(i) != position(j) => return None,
+            Self::Signal(Of::Position, j) | Self::Sum(j, _) => vec![(position(j), 1)],
+            Self::Signal(Of::Speed, j) => vec![(position(j), 1), ("s", -1)],
+            Self::Signal(Of::Acceleration, j) => vec![(position(j), 1), ("s", -2)],
+            Self::Signal(Of::Load, j) => vec![(&names.torques[j], 1)],
+            Self::Signal(Of::Temperature, _) => vec![("degC", 1)],
+            Self::Signal(Of::Time | Of::SinceReversal, _) => vec![("s", 1)],
+            Self::Signal(Of::Direction | Of::Play | Of::Dahl, _) | Self::State(..) => Vec::new(),
         };
-        Some(match self {
-            Self::Signal(signal, j) => match signal {
-                FormulaSignal::Position => powers(&[(position(j), 1)]),
-                FormulaSignal::Speed => powers(&[(position(j), 1), ("s", -1)]),
-                FormulaSignal::Acceleration => powers(&[(position(j), 1), ("s", -2)]),
-                FormulaSignal::Load => powers(&[(&names.torques[j], 1)]),
-                FormulaSignal::Temperature => powers(&[("degC", 1)]),
-                FormulaSignal::Time | FormulaSignal::SinceReversal => powers(&[("s", 1)]),
-                FormulaSignal::Direction | FormulaSignal::Play | FormulaSignal::Dahl => {
-                    Powers::new()
-                }
-            },
-            Self::State(..) => Powers::new(),
-            Self::Sum(i, j) if position(i) == position(j) => powers(&[(position(i), 1)]),
-            Self::Sum(..) => return None,
-        })
+        let own = of.into_iter();
+        Some(own.map(|(unit, p)| (unit.to_owned(), p)).collect())
     }
 
     fn series(self, scene: &Scene) -> Vec<f64> {
@@ -151,10 +141,6 @@ impl Source {
             }
         }
     }
-}
-
-fn is_plain(c: char) -> bool {
-    c.is_ascii_alphanumeric() || c == '_'
 }
 
 impl Function {
@@ -182,15 +168,12 @@ impl Function {
     }
 
     fn keeps_sign(self) -> bool {
-        matches!(
-            self,
-            Self::Plain | Self::Cube | Self::Signed | Self::Tanh(_)
-        )
+        use Function::{Cube, Plain, Signed, Tanh};
+        matches!(self, Plain | Cube | Signed | Tanh(_))
     }
 }
 
 impl Factor {
-    /// A signal of a joint itself.
     pub fn plain(signal: FormulaSignal, joint: usize) -> Self {
         Self::of(Function::Plain, Source::Signal(signal, joint))
     }
@@ -199,7 +182,6 @@ impl Factor {
         Self { source, function }
     }
 
-    /// Its values along a scene.
     pub fn series(&self, scene: &Scene) -> Vec<f64> {
         let mut x = self.source.series(scene);
         x.iter_mut().for_each(|x| *x = self.function.value(*x));
@@ -213,27 +195,23 @@ impl Factor {
 
     /// The same with its scales times a number, each by itself.
     fn reshaped(&self, by: f64) -> Vec<Self> {
-        let function = match self.function {
-            Function::Tanh(w) => Some(Function::Tanh(by * w)),
-            Function::Decay(w) => Some(Function::Decay(by * w)),
-            Function::Bell(w) => Some(Function::Bell(by * w)),
-            _ => None,
-        };
-        let source = match self.source {
-            Source::State(of, j, way) => Some(Source::State(of, j, by * way)),
-            _ => None,
-        };
-        let functions = function.map(|function| Factor { function, ..*self });
-        let sources = source.map(|source| Factor { source, ..*self });
-        functions.into_iter().chain(sources).collect()
+        let (mut function, mut source) = (*self, *self);
+        let mut all = Vec::new();
+        if let Function::Tanh(w) | Function::Decay(w) | Function::Bell(w) = &mut function.function {
+            *w *= by;
+            all.push(function);
+        }
+        if let Source::State(_, _, way) = &mut source.source {
+            *way *= by;
+            all.push(source);
+        }
+        all
     }
 
     fn text(&self, names: &Names, shapes: &[ShapeNumber]) -> String {
         let x = self.source.name(names);
-        let w = self.shapes(names).pop().map_or(String::new(), |own| {
-            let known = shapes.iter().find(|s| s.key == own.key);
-            known.map_or(own.name, |s| s.name.clone())
-        });
+        let own = self.shapes(names).pop();
+        let w = own.map_or(String::new(), |own| own.name_among(shapes));
         match self.function {
             Function::Plain => x,
             Function::Square => format!("{x}^2"),
@@ -255,15 +233,10 @@ impl Factor {
             all.push(shape(name, "state", scale, names.positions[j]));
         }
         if let (_, Some(w)) = self.function.power() {
-            let unit = self
-                .source
-                .unit(names)
-                .map_or(String::new(), |u| unit_text(&u));
-            let of = format!(
-                "{:?} {}",
-                std::mem::discriminant(&self.function),
-                self.source.name(names)
-            );
+            let unit = self.source.unit(names);
+            let unit = unit.map_or(String::new(), |u| unit_text(&u));
+            let kind = std::mem::discriminant(&self.function);
+            let of = format!("{kind:?} {}", self.source.name(names));
             all.push(shape("w", &of, w, &unit));
         }
         all
@@ -282,6 +255,14 @@ fn shape(name: &str, of: &str, value: f64, unit: &str) -> ShapeNumber {
     }
 }
 
+impl ShapeNumber {
+    /// Its name where it is one of these, else its own.
+    fn name_among(self, shapes: &[ShapeNumber]) -> String {
+        let known = shapes.iter().find(|s| s.key == self.key);
+        known.map_or(self.name, |s| s.name.clone())
+    }
+}
+
 impl FormulaTerm {
     pub fn of(factors: &[Factor]) -> Self {
         Self {
@@ -290,14 +271,12 @@ impl FormulaTerm {
         }
     }
 
-    /// Times one more factor.
     pub fn times(&self, factor: Factor) -> Self {
         let mut all = self.clone();
         all.factors.push(factor);
         all
     }
 
-    /// Columns that it has.
     pub fn count(&self) -> usize {
         1 + usize::from(self.wave.is_some())
     }
@@ -313,7 +292,7 @@ impl FormulaTerm {
             }
         }
         if let Some((source, n)) = self.wave.filter(|(_, n)| !is_whole(*n)) {
-            // a wave is known to a part of its number that the travel sets: near enough for the refinement that follows
+            // the travel sets how well the number of a wave is known: near enough for the refinement that follows
             all.extend(by.iter().map(|x| FormulaTerm {
                 wave: Some((source, n * (1.0 + WAVES * (x - 1.0)))),
                 ..self.clone()
@@ -328,16 +307,6 @@ impl FormulaTerm {
         self.factors.iter().map(function).sum::<usize>() + 2 * usize::from(self.wave.is_some())
     }
 
-    /// Joints whose signals it takes.
-    pub fn joints(&self) -> Vec<usize> {
-        let sources = self.sources();
-        let mut all: Vec<usize> = sources.flat_map(Source::joints).collect();
-        all.sort_unstable();
-        all.dedup();
-        all
-    }
-
-    /// What its functions are of.
     pub fn sources(&self) -> impl Iterator<Item = Source> + '_ {
         let wave = self.wave.iter().map(|(source, _)| *source);
         self.factors.iter().map(|f| f.source).chain(wave)
@@ -348,8 +317,7 @@ impl FormulaTerm {
         self.factors.iter().filter(|f| f.is_odd()).count() % 2 == 1
     }
 
-    /// Unit of its coefficients at a joint; none where no one constant makes the units right: the argument of a wave
-    /// must be an angle, or have a number with a unit of its own.
+    /// Unit of its coefficients at a joint; none where no one constant makes the units right.
     pub fn unit(&self, names: &Names) -> Option<String> {
         let mut all = Powers::from([(names.torques[names.joint].clone(), 1)]);
         for factor in &self.factors {
@@ -360,6 +328,7 @@ impl FormulaTerm {
         }
         if let Some((source, n)) = self.wave {
             let unit = source.unit(names)?;
+            // what a wave is of must be an angle, or have a number with a unit of its own
             let angle = source.is_position() && unit.keys().all(|u| u == "rad");
             if !angle && (!source.is_position() || is_whole(n)) {
                 return None;
@@ -369,7 +338,6 @@ impl FormulaTerm {
         Some(unit_text(&all))
     }
 
-    /// Numbers that shape it.
     pub fn shapes(&self, names: &Names) -> Vec<ShapeNumber> {
         let mut all: Vec<ShapeNumber> = self.factors.iter().flat_map(|f| f.shapes(names)).collect();
         if let Some((source, n)) = self.wave.filter(|(_, n)| !is_whole(*n)) {
@@ -380,28 +348,20 @@ impl FormulaTerm {
         all
     }
 
-    /// Formulas of its coefficients.
     pub fn texts(&self, names: &Names, shapes: &[ShapeNumber]) -> Vec<String> {
         let factors: Vec<String> = self.factors.iter().map(|f| f.text(names, shapes)).collect();
         let Some((source, n)) = self.wave else {
             return vec![factors.join("*")];
         };
         let own = self.shapes(names).pop().filter(|_| !is_whole(n));
-        let n = own.map_or(format!("{n}"), |own| {
-            let known = shapes.iter().find(|s| s.key == own.key);
-            known.map_or(own.name, |s| s.name.clone())
-        });
+        let n = own.map_or(format!("{n}"), |own| own.name_among(shapes));
         let of = |wave: &str| {
+            let x = source.name(names);
             let last = match n.as_str() {
-                "1" => format!("{wave}({})", source.name(names)),
-                n => format!("{wave}({n}*{})", source.name(names)),
+                "1" => format!("{wave}({x})"),
+                n => format!("{wave}({n}*{x})"),
             };
-            let all: Vec<&str> = factors
-                .iter()
-                .map(String::as_str)
-                .chain([last.as_str()])
-                .collect();
-            all.join("*")
+            [factors.as_slice(), &[last]].concat().join("*")
         };
         vec![of("sin"), of("cos")]
     }
@@ -424,22 +384,14 @@ pub fn unit_text(powers: &Powers) -> String {
         });
         texts.collect::<Vec<String>>().join(" ")
     };
-    match (part(true), part(false)) {
-        (above, below) if below.is_empty() => match above.is_empty() {
-            true => "1".to_owned(),
-            false => above,
-        },
-        (above, below) => {
-            let above = if above.is_empty() {
-                "1".to_owned()
-            } else {
-                above
-            };
-            match below.contains(' ') {
-                true => format!("{above}/({below})"),
-                false => format!("{above}/{below}"),
-            }
-        }
+    let above = match part(true) {
+        none if none.is_empty() => "1".to_owned(),
+        above => above,
+    };
+    match part(false) {
+        none if none.is_empty() => above,
+        below if below.contains(' ') => format!("{above}/({below})"),
+        below => format!("{above}/{below}"),
     }
 }
 

@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::RowsOfJoint;
-use super::columns::Columns;
+use super::columns::{Columns, RowsOfJoint};
+use super::library::wave;
 use super::select::{Products, Selected, gram};
 use super::term::{Factor, FormulaTerm, Function, Names, Source, named};
 use crate::diagnose::problem::formula_numbers::FORMULA_NUMBERS;
@@ -22,7 +22,7 @@ fn with_names<T>(of: impl FnOnce(&Names) -> T) -> T {
     of(&Names {
         joint: 0,
         joints: &["q1".to_owned(), "arm 2".to_owned()],
-        positions: &["rad", "m"],
+        positions: vec!["rad", "m"],
         torques: &["Nm".to_owned(), "N".to_owned()],
     })
 }
@@ -117,12 +117,7 @@ fn noise_has_no_formula_whose_term_takes_two_percent_off() {
 }
 
 #[test]
-fn units_that_no_constant_makes_right_are_out_and_others_are_told() {
-    let plain = |signal, joint| Factor::plain(signal, joint);
-    let wave = |source, n| FormulaTerm {
-        factors: Vec::new(),
-        wave: Some((source, n)),
-    };
+fn units_that_no_constant_makes_right_are_out_and_others_are_written() {
     with_names(|names| {
         let unit = |term: &FormulaTerm| term.unit(names);
         let speed = Source::Signal(FormulaSignal::Speed, 0);
@@ -131,10 +126,8 @@ fn units_that_no_constant_makes_right_are_out_and_others_are_told() {
         let other = Source::Signal(FormulaSignal::Position, 1);
         assert_eq!(unit(&wave(other, 2.0)), None);
         assert_eq!(unit(&wave(other, 2.5)).as_deref(), Some("Nm"));
-        let product = FormulaTerm::of(&[
-            plain(FormulaSignal::Speed, 0),
-            plain(FormulaSignal::Load, 1),
-        ]);
+        let factors = [(FormulaSignal::Speed, 0), (FormulaSignal::Load, 1)];
+        let product = FormulaTerm::of(&factors.map(|(signal, j)| Factor::plain(signal, j)));
         assert_eq!(unit(&product).as_deref(), Some("Nm s/(N rad)"));
         assert_eq!(product.texts(names, &[]), ["v*{load_arm 2}"]);
         let decay = FormulaTerm::of(&[Factor::of(Function::Decay(0.5), speed)]);

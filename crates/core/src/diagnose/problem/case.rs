@@ -1,10 +1,10 @@
 //! What a diagnosis is given: a model, logs, what is known and open, and what the user asks for.
 
-use super::data_split::LogRole;
+use super::data_split::{DataSplit, LogRole};
 use super::formula_numbers::FormulaNumbers;
 use super::prior::ParameterPrior;
-use super::unknowns::FreeParameters;
-use crate::effect::{AugmentedModel, Law};
+use super::unknowns::{FreeParameters, Unknowns};
+use crate::effect::{Added, AugmentedModel, Law};
 use crate::judge::Numbers;
 use crate::motion::{ParallelFilters, Stretch};
 use crate::robot::drive::JointDrive;
@@ -55,12 +55,12 @@ pub struct Wishes {
 
 impl Wishes {
     /// Whether it is the formula that is searched, of some joint: `formula:JOINT`.
-    pub fn is_formula(&self, (name, _): &(String, Option<String>)) -> bool {
+    pub(crate) fn is_formula(&self, (name, _): &(String, Option<String>)) -> bool {
         self.search && name == FORMULA
     }
 
     /// Whether the formula of a joint is to be written.
-    pub fn wants_formula(&self, joint: &str) -> bool {
+    pub(crate) fn wants_formula(&self, joint: &str) -> bool {
         let own = |w: &&(String, Option<String>)| w.1.as_deref() == Some(joint);
         self.accepted.iter().filter(own).any(|w| self.is_formula(w))
     }
@@ -77,6 +77,25 @@ pub fn formula_name(joint: &str) -> String {
 }
 
 impl Case {
+    pub(crate) fn unknowns(&self) -> Unknowns {
+        Unknowns::of(&self.given, &self.open, self.keep)
+    }
+
+    pub(crate) fn split(&self) -> DataSplit {
+        let robot = &self.given.model.robot;
+        let filters = (&self.filters, self.cutoff_hz);
+        DataSplit::of(robot, &self.stretches, &self.roles, filters)
+    }
+
+    /// Whether an effect is the one that is named, at the joint that is named.
+    pub(crate) fn is_named(
+        &self,
+        effect: &Added,
+        (name, joint): &(String, Option<String>),
+    ) -> bool {
+        effect.name() == name && effect.place.name(&self.given.model.robot) == *joint
+    }
+
     /// The stretches of logs with a role.
     pub(crate) fn stretches_of(&self, role: LogRole) -> Vec<Stretch> {
         let of_role = |s: &&Stretch| self.roles[s.log] == role;

@@ -19,7 +19,6 @@ pub enum LogRole {
     Holdout,
 }
 
-/// A piece of one stretch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Piece {
     pub stretch: usize,
@@ -37,13 +36,11 @@ pub struct SetAside {
     pub to_s: f64,
 }
 
-/// All pieces.
 #[derive(Debug, Clone, Default)]
 pub struct DataSplit {
     pub pieces: Vec<Piece>,
     pub set_aside: Vec<SetAside>,
-    /// Whether each joint is stationary along each stretch, `[stretch][joint]`: its rows say nothing of its friction,
-    /// and it has no error that a law of motion answers for.
+    /// Whether each joint is stationary, `[stretch][joint]`: such rows say nothing of its friction, and have no error of motion.
     pub stationary: Vec<Vec<bool>>,
     /// Time from row to row along each stretch \[s\].
     pub step_s: Vec<f64>,
@@ -64,8 +61,7 @@ impl DataSplit {
         robot: &Robot,
         stretches: &[Stretch],
         roles: &[LogRole],
-        filters: &ParallelFilters,
-        cutoff_hz: f64,
+        (filters, cutoff_hz): (&ParallelFilters, f64),
     ) -> Self {
         let mut split = DataSplit {
             stationary: stationary_joints(robot, stretches),
@@ -88,11 +84,13 @@ impl DataSplit {
                 continue;
             }
             let mut start = 0;
-            for aside in held_out(rows, rows as f64 / total.max(1) as f64) {
-                let before = start..aside.start.saturating_sub(gap).max(start);
-                if before.len() > 2 * gap {
-                    split.cut(index, before, LogRole::Train, length);
+            let train = |split: &mut DataSplit, range: Range<usize>| {
+                if range.len() > 2 * gap {
+                    split.cut(index, range, LogRole::Train, length);
                 }
+            };
+            for aside in held_out(rows, rows as f64 / total.max(1) as f64) {
+                train(&mut split, start..aside.start.saturating_sub(gap));
                 split.cut(index, aside.clone(), LogRole::Holdout, length);
                 let time = |row: usize| stretch.own_time(parallel.sample_of(row));
                 split.set_aside.push(SetAside {
@@ -103,14 +101,11 @@ impl DataSplit {
                 });
                 start = (aside.end + gap).min(rows);
             }
-            if rows - start > 2 * gap {
-                split.cut(index, start..rows, LogRole::Train, length);
-            }
+            train(&mut split, start..rows);
         }
         split
     }
 
-    /// Divides a range of rows into pieces.
     fn cut(&mut self, stretch: usize, range: Range<usize>, role: LogRole, length: usize) {
         let count = (range.len() / length).max(1);
         for i in 0..count {
@@ -153,7 +148,6 @@ impl DataSplit {
         logs
     }
 
-    /// Rows with a role.
     pub(crate) fn rows_of(&self, role: LogRole) -> usize {
         let pieces = self.pieces.iter().filter(|p| p.role == role);
         pieces.map(|p| p.rows.len()).sum()
@@ -165,8 +159,7 @@ impl DataSplit {
     }
 }
 
-/// Ranges of a stretch that are held out, in order. They are spread over it, so that one quiet part does not stand
-/// for the whole.
+/// Ranges of a stretch that are held out, in order: spread over it, so that one quiet part does not stand for the whole.
 fn held_out(rows: usize, share: f64) -> Vec<Range<usize>> {
     let parts = ((PARTS as f64 * share).round() as usize).max(1);
     let range = |i: usize| {
@@ -197,20 +190,16 @@ mod tests {
         let stretches: Vec<Stretch> = (0..roles.len()).map(stretch).collect();
         let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
         let robot = Robot::single_joint("slide", JointKind::Prismatic);
-        (
-            DataSplit::of(&robot, &stretches, roles, &filters, 10.0),
-            stretches,
-        )
+        let split = DataSplit::of(&robot, &stretches, roles, (&filters, 10.0));
+        (split, stretches)
     }
 
     #[test]
     fn no_row_has_two_uses_and_other_uses_keep_their_distance() {
         let (split, stretches) = split(&[LogRole::Train, LogRole::Veto]);
         for (i, a) in split.pieces.iter().enumerate() {
-            for b in split.pieces[i + 1..]
-                .iter()
-                .filter(|b| b.stretch == a.stretch)
-            {
+            let later = split.pieces[i + 1..].iter();
+            for b in later.filter(|b| b.stretch == a.stretch) {
                 let distance = b.rows.start.saturating_sub(a.rows.end);
                 assert!(a.rows.end <= b.rows.start, "{a:?} {b:?}");
                 assert!(a.role == b.role || distance >= 9, "{a:?} {b:?}");

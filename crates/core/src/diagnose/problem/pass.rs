@@ -14,11 +14,11 @@ use super::data_split::DataSplit;
 use super::unknowns::{Unknown, Unknowns};
 use crate::effect::{Added, AugmentedModel, Scene, Torques, shifted};
 use crate::judge::{BlockSums, Bound, Term, TimeBlock};
-use crate::motion::{MotionError, ParallelFilters, Stretch};
+use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
 use crate::robot::model::JointFriction;
 
 /// Channels that are filtered side by side.
-const LANES: usize = 8;
+pub const LANES: usize = 8;
 /// Samples of a window besides its lead.
 const WINDOW: usize = 16_384;
 /// Samples before a window from which memory runs, and behind it.
@@ -76,18 +76,16 @@ impl Candidate {
 
 /// Where the columns of unknowns and candidates stand in the rows of each joint.
 pub struct ColumnLayout {
-    /// Terms of the declared unknowns.
     pub declared: Vec<Term>,
     /// Terms of each candidate, as many as it has coefficients.
     pub candidates: Vec<Vec<Term>>,
     /// Terms of each candidate's slopes.
     pub slopes: Vec<Vec<Term>>,
-    /// Columns of each joint: unknowns, candidates, then the measured torque; the residual stands last.
-    pub columns: Vec<usize>,
+    /// Column of each joint's measured torque, behind unknowns and candidates; the residual stands last.
+    pub torques: Vec<usize>,
 }
 
 impl ColumnLayout {
-    /// Of unknowns and candidates.
     pub fn of(unknowns: &Unknowns, candidates: &[Candidate]) -> Self {
         let joints = unknowns.columns.len();
         let term = |bound| Term {
@@ -100,39 +98,30 @@ impl ColumnLayout {
                 declared[*i].columns.push((j, column));
             }
         }
-        let mut columns: Vec<usize> = unknowns.columns.iter().map(Vec::len).collect();
+        let mut torques: Vec<usize> = unknowns.columns.iter().map(Vec::len).collect();
         let terms = candidates.iter().map(|c| {
             let bounds = c.bounds.iter().chain(c.slopes.iter().map(|(_, b)| b));
             let mut terms: Vec<Term> = bounds.map(|b| term(*b)).collect();
             for j in (0..joints).filter(|j| c.effect.place.touches(*j)) {
                 for term in &mut terms {
-                    term.columns.push((j, columns[j]));
-                    columns[j] += 1;
+                    term.columns.push((j, torques[j]));
+                    torques[j] += 1;
                 }
             }
             let slopes = terms.split_off(c.bounds.len());
             (terms, slopes)
         });
         let (candidates, slopes) = terms.unzip();
-        columns.iter_mut().for_each(|c| *c += 1);
         ColumnLayout {
             declared,
             candidates,
             slopes,
-            columns,
+            torques,
         }
-    }
-
-    /// Column of the measured torque of a joint.
-    pub fn torque(&self, joint: usize) -> usize {
-        self.columns[joint] - 1
     }
 }
 
 /// Sums over blocks of the columns of a model's unknowns and of candidates beside it.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
 pub fn pass(
     model: &AugmentedModel,
     (unknowns, candidates): (&Unknowns, &[Candidate]),
@@ -140,7 +129,8 @@ pub fn pass(
     data: &Data,
     blocks: &[TimeBlock],
 ) -> Result<BlockSums, MotionError> {
-    let mut sums = BlockSums::zeros(blocks.len(), &layout.columns);
+    let columns: Vec<usize> = layout.torques.iter().map(|torque| torque + 1).collect();
+    let mut sums = BlockSums::zeros(blocks.len(), &columns);
     let pieces = blocks.iter().flat_map(|b| &b.pieces);
     let rows: usize = pieces.map(|(_, rows)| rows.len()).sum();
     let every = rows.div_ceil(MOST_ROWS).max(1);
@@ -161,15 +151,13 @@ pub fn pass(
 }
 
 /// Windows over the rows that blocks need.
-fn windows(data: &Data, blocks: &[TimeBlock]) -> Vec<(usize, Range<usize>)> {
+pub fn windows(data: &Data, blocks: &[TimeBlock]) -> Vec<(usize, Range<usize>)> {
     let mut out = Vec::new();
     for (index, stretch) in data.stretches.iter().enumerate() {
         let pieces = blocks.iter().flat_map(|b| &b.pieces);
         let own = || pieces.clone().filter(|(s, _)| *s == index).map(|(_, r)| r);
-        let (Some(first), Some(last)) = (own().map(|r| r.start).min(), own().map(|r| r.end).max())
-        else {
-            continue;
-        };
+        let first = own().map(|r| r.start).min().unwrap_or(0);
+        let last = own().map(|r| r.end).max().unwrap_or(0);
         let step = (WINDOW / data.filters.of(stretch).decimation).max(1);
         let begins = (first..last).step_by(step);
         out.extend(begins.map(|begin| (index, begin..(begin + step).min(last))));
@@ -177,45 +165,49 @@ fn windows(data: &Data, blocks: &[TimeBlock]) -> Vec<(usize, Range<usize>)> {
     out
 }
 
+/// Rows of a block in a window, from the window's begin on; the first is one of every `every`-th of the stretch.
+pub fn in_window<'a>(
+    block: &'a TimeBlock,
+    (stretch, window): (usize, &'a Range<usize>),
+    every: usize,
+) -> impl Iterator<Item = Range<usize>> + 'a {
+    let own = block.pieces.iter().filter(move |(s, _)| *s == stretch);
+    own.filter_map(move |(_, piece)| {
+        let first = piece.start.max(window.start).next_multiple_of(every);
+        let end = piece.end.min(window.end);
+        (first < end).then(|| first - window.start..end - window.start)
+    })
+}
+
 /// Adds the rows of a window to the blocks that they lie in.
 fn fold(
     sums: &mut BlockSums,
     blocks: &[TimeBlock],
-    (stretch, window): (usize, &Range<usize>),
+    window: (usize, &Range<usize>),
     (rows, every): (&[DMatrix<f64>], usize),
 ) {
     for (b, block) in blocks.iter().enumerate() {
-        for (_, piece) in block.pieces.iter().filter(|(s, _)| *s == stretch) {
-            let (from, to) = (piece.start.max(window.start), piece.end.min(window.end));
-            if from >= to {
-                continue;
-            }
-            let (of_block, counts) = (&mut sums.blocks[b], &mut sums.rows[b]);
-            let joints = rows.iter().zip(of_block.iter_mut()).zip(counts);
-            for ((rows, total), count) in joints {
-                if rows.nrows() == 0 {
-                    continue;
-                }
-                let first = from.next_multiple_of(every);
-                if first >= to {
-                    continue;
-                }
-                let (begin, kept) = (first - window.start, (to - first).div_ceil(every));
-                let part = rows.rows_with_step(begin, kept, every - 1).into_owned();
+        for range in in_window(block, window, every) {
+            let kept = range.len().div_ceil(every);
+            let joints = rows.iter().zip(&mut sums.blocks[b]).zip(&mut sums.rows[b]);
+            for ((rows, total), count) in joints.filter(|((rows, _), _)| rows.nrows() > 0) {
+                let part = rows.rows_with_step(range.start, kept, every - 1);
+                let part = part.into_owned();
                 total.gemm(1.0, &part.transpose(), &part, 1.0);
-                *count += part.nrows() as f64;
+                *count += kept as f64;
             }
         }
     }
 }
 
 /// A piece of one stretch with what a model makes of it.
-struct Window<'a> {
+pub struct Window<'a> {
     model: &'a AugmentedModel,
     data: &'a Data<'a>,
+    parallel: &'a Parallel,
     stretch: usize,
     /// Samples, from the begin of the lead on.
-    part: Stretch,
+    pub part: Stretch,
     torques: Torques,
     /// Rows of the stretch that are wanted, and the row that the part begins with.
     range: Range<usize>,
@@ -223,7 +215,12 @@ struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    fn of(model: &'a AugmentedModel, data: &'a Data, index: usize, range: &Range<usize>) -> Self {
+    pub fn of(
+        model: &'a AugmentedModel,
+        data: &'a Data,
+        index: usize,
+        range: &Range<usize>,
+    ) -> Self {
         let stretch = &data.stretches[index];
         let parallel = data.filters.of(stretch);
         let begin = range.start.saturating_sub(LEAD / parallel.decimation);
@@ -234,6 +231,7 @@ impl<'a> Window<'a> {
             torques: model.torques(&part),
             model,
             data,
+            parallel,
             stretch: index,
             part,
             range: range.clone(),
@@ -241,7 +239,7 @@ impl<'a> Window<'a> {
         }
     }
 
-    fn scene(&self) -> Scene<'_> {
+    pub fn scene(&self) -> Scene<'_> {
         Scene {
             robot: &self.model.model.robot,
             theta: &self.model.model.theta,
@@ -261,18 +259,20 @@ impl<'a> Window<'a> {
         candidates: &[Candidate],
         layout: &ColumnLayout,
     ) -> Result<Vec<DMatrix<f64>>, MotionError> {
-        let n = self.model.model.robot.joints();
         let mut regressor = regressor(self.model, unknowns, &self.part);
-        let of_joint = |(j, regressor): (usize, &mut Vec<Vec<f64>>)| {
-            if self.data.split.is_stationary(self.stretch, j) {
-                return Ok(DMatrix::zeros(0, layout.columns[j] + 1));
-            }
-            self.rows_of(j, unknowns, candidates, regressor)
+        let of_joint = |(j, regressor): (usize, &mut Vec<Vec<f64>>)| match self
+            .data
+            .split
+            .is_stationary(self.stretch, j)
+        {
+            true => Ok(DMatrix::zeros(0, layout.torques[j] + 2)),
+            false => self.rows_of(j, unknowns, candidates, regressor),
         };
-        (0..n).zip(regressor.iter_mut()).map(of_joint).collect()
+        regressor.iter_mut().enumerate().map(of_joint).collect()
     }
 
-    fn rows_of(
+    /// Rows of one joint, of which the regressor's columns are taken.
+    pub fn rows_of(
         &self,
         j: usize,
         unknowns: &Unknowns,
@@ -282,20 +282,18 @@ impl<'a> Window<'a> {
         let (model, part) = (self.model, &self.part);
         let scene = self.scene();
         let mut friction = friction_columns(&model.model.friction[j], &part.v[j]);
-        let mut raw: Vec<Vec<f64>> = Vec::new();
-        for i in &unknowns.columns[j] {
-            raw.push(match unknowns.list[*i] {
-                Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
-                Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
-                Unknown::Offset(_) => vec![1.0; part.len()],
-            });
-        }
+        let column = |i: &usize| match unknowns.list[*i] {
+            Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
+            Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
+            Unknown::Offset(_) => vec![1.0; part.len()],
+        };
+        let mut raw: Vec<Vec<f64>> = unknowns.columns[j].iter().map(column).collect();
         let own = |c: &&Candidate| c.effect.place.touches(j) && !c.bounds.is_empty();
         for candidate in candidates.iter().filter(own) {
             raw.extend(candidate.columns(&scene, j));
         }
         let mut hat = self.torques.hat[j].clone();
-        let late = model.shift(j) / part.dt;
+        let late = self.late(j);
         raw.iter_mut().for_each(|column| shifted(column, late));
         shifted(&mut hat, late);
         let tau = &part.tau[j];
@@ -311,122 +309,47 @@ impl<'a> Window<'a> {
         Ok(out)
     }
 
+    /// Samples by which the torque of a joint is late.
+    pub fn late(&self, j: usize) -> f64 {
+        self.model.shift(j) / self.part.dt
+    }
+
     /// Weights of the samples of a joint; none where all weigh the same.
-    fn weights(&self, j: usize) -> Vec<f64> {
+    pub fn weights(&self, j: usize) -> Vec<f64> {
         match self.model.model.friction[j] {
             JointFriction::None => Vec::new(),
             // both sides of the model, where the joint stands or turns, weigh nothing before any filter
-            _ => {
-                let parallel = self.data.filters.of(&self.data.stretches[self.stretch]);
-                parallel.weights(&self.part, j, self.data.rest_speed[j])
-            }
+            _ => (self.parallel).weights(&self.part, j, self.data.rest_speed[j]),
         }
     }
 
     /// The rows that are wanted of some channels of weighed samples.
-    fn kept(&self, raw: &mut [Vec<f64>], weights: &[f64]) -> Result<Vec<Vec<f64>>, MotionError> {
+    pub fn kept(
+        &self,
+        raw: &mut [Vec<f64>],
+        weights: &[f64],
+    ) -> Result<Vec<Vec<f64>>, MotionError> {
         for column in raw.iter_mut() {
             column.iter_mut().zip(weights).for_each(|(x, w)| *x *= w);
         }
         let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
-        let parallel = self.data.filters.of(&self.data.stretches[self.stretch]);
         let (skip, count) = (self.range.start - self.begin, self.range.len());
         let own = |rows: Vec<f64>| {
             let mut kept: Vec<f64> = rows.into_iter().skip(skip).take(count).collect();
             kept.resize(count, 0.0);
             kept
         };
-        Ok(parallel.run(&channels)?.into_iter().map(own).collect())
+        let rows = self.parallel.run(&channels)?;
+        Ok(rows.into_iter().map(own).collect())
     }
-
-    /// Rows of more columns of one joint, each made of series along the scene.
-    fn made(&self, j: usize, more: &Made) -> Result<Vec<Vec<f64>>, MotionError> {
-        let series = (more.series)(&self.scene());
-        let weights = self.weights(j);
-        let late = self.model.shift(j) / self.part.dt;
-        let groups: Vec<usize> = (0..more.count).step_by(LANES).collect();
-        let rows = groups.into_par_iter().map(|first| {
-            let own = first..(first + LANES).min(more.count);
-            let mut raw: Vec<Vec<f64>> = own.map(|i| (more.column)(&series, i)).collect();
-            raw.iter_mut().for_each(|column| shifted(column, late));
-            self.kept(&mut raw, &weights)
-        });
-        Ok(rows.collect::<Result<Vec<_>, _>>()?.concat())
-    }
-}
-
-/// A column, of series and its place.
-type ColumnOf<'a> = dyn Fn(&[Vec<f64>], usize) -> Vec<f64> + Sync + 'a;
-
-/// Columns that are made of series along a scene.
-pub struct Made<'a> {
-    pub series: &'a (dyn Fn(&Scene) -> Vec<Vec<f64>> + Sync),
-    pub column: &'a ColumnOf<'a>,
-    pub count: usize,
-}
-
-/// Rows of one joint.
-#[derive(Debug, Clone, Default)]
-pub struct RowsOfJoint {
-    /// Of unknowns, of candidates, the torque and the residual.
-    pub declared: DMatrix<f64>,
-    pub more: DMatrix<f64>,
-    /// Rows of each block.
-    pub blocks: Vec<Range<usize>>,
-}
-
-/// About `most` rows of one joint in blocks, with more columns.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
-pub fn joint_rows(
-    model: &AugmentedModel,
-    (unknowns, candidates): (&Unknowns, &[Candidate]),
-    (data, blocks): (&Data, &[TimeBlock]),
-    (j, most): (usize, usize),
-    more: &Made,
-) -> Result<RowsOfJoint, MotionError> {
-    let moving = |(s, _): &&(usize, Range<usize>)| !data.split.is_stationary(*s, j);
-    let pieces = blocks.iter().flat_map(|b| &b.pieces).filter(moving);
-    let all: usize = pieces.map(|(_, rows)| rows.len()).sum();
-    let every = all.div_ceil(most).max(1);
-    // of each block: columns of its rows, piece by piece
-    let mut found: Vec<Vec<Vec<f64>>> = vec![Vec::new(); blocks.len()];
-    for (stretch, range) in windows(data, blocks) {
-        if data.split.is_stationary(stretch, j) {
-            continue;
-        }
-        let window = Window::of(model, data, stretch, &range);
-        let mut regressor = regressor(model, unknowns, &window.part);
-        let own = window.rows_of(j, unknowns, candidates, &mut regressor[j])?;
-        let made = window.made(j, more)?;
-        for (block, out) in blocks.iter().zip(&mut found) {
-            for (_, piece) in block.pieces.iter().filter(|(s, _)| *s == stretch) {
-                let (from, to) = (piece.start.max(range.start), piece.end.min(range.end));
-                for row in (from.next_multiple_of(every)..to).step_by(every) {
-                    let k = row - range.start;
-                    let made = made.iter().map(|column| column[k]);
-                    out.push(own.row(k).iter().copied().chain(made).collect());
-                }
-            }
-        }
-    }
-    let mut out = RowsOfJoint::default();
-    let mut begin = 0;
-    for block in &found {
-        out.blocks.push(begin..begin + block.len());
-        begin += block.len();
-    }
-    let rows: Vec<&Vec<f64>> = found.iter().flatten().collect();
-    let width = rows.first().map_or(0, |row| row.len());
-    let first = width.saturating_sub(more.count);
-    out.declared = DMatrix::from_fn(begin, first, |i, c| rows[i][c]);
-    out.more = DMatrix::from_fn(begin, width - first, |i, c| rows[i][first + c]);
-    Ok(out)
 }
 
 /// Regressor of the inertial parameters along a stretch, `[joint][parameter][sample]`; nothing where these are kept.
-fn regressor(model: &AugmentedModel, unknowns: &Unknowns, stretch: &Stretch) -> Vec<Vec<Vec<f64>>> {
+pub fn regressor(
+    model: &AugmentedModel,
+    unknowns: &Unknowns,
+    stretch: &Stretch,
+) -> Vec<Vec<Vec<f64>>> {
     let robot = &model.model.robot;
     let (n, p) = (robot.joints(), robot.parameters().len());
     let theta = |u: &Unknown| matches!(u, Unknown::Theta(_));
@@ -436,7 +359,7 @@ fn regressor(model: &AugmentedModel, unknowns: &Unknowns, stretch: &Stretch) -> 
     let samples = stretch.len();
     let mut out = vec![vec![vec![0.0; samples]; p]; n];
     let mut y = vec![0.0; n * p];
-    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
     for k in 0..samples {
         stretch.at(k, &mut q, &mut v, &mut a);
         robot.regressor(&q, &v, &a, &mut y);

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::unknowns::{Unknown, Unknowns, value};
 use crate::effect::AugmentedModel;
+use crate::robot::model::JointFriction;
 
 /// What is known of parameters before: their values and how firmly, in units of independent rows.
 #[derive(Debug, Clone)]
@@ -21,29 +22,19 @@ impl ParameterPrior {
     /// Index of an unknown in the model's own order.
     fn place(&self, unknown: Unknown) -> usize {
         let model = &self.centre.model;
-        let theta = model.theta.len();
+        let behind = |joints: &[JointFriction]| {
+            let friction: usize = joints.iter().map(|f| f.parameters()).sum();
+            model.theta.len() + friction
+        };
         match unknown {
             Unknown::Theta(i) => i,
-            Unknown::Friction { joint, k } => {
-                let before: usize = model.friction[..joint].iter().map(|f| f.parameters()).sum();
-                theta + before + k
-            }
-            Unknown::Offset(j) => {
-                let all: usize = model.friction.iter().map(|f| f.parameters()).sum();
-                theta + all + j
-            }
+            Unknown::Friction { joint, k } => behind(&model.friction[..joint]) + k,
+            Unknown::Offset(j) => behind(&model.friction) + j,
         }
     }
 
-    /// How far a model is from the centre.
-    fn off(&self, unknowns: &Unknowns, model: &AugmentedModel) -> DVector<f64> {
-        let off = unknowns.list.iter();
-        let off = off.map(|x| value(&self.centre, *x) - value(model, *x));
-        DVector::from_iterator(unknowns.len(), off)
-    }
-
     /// Information and its pull on the present model, over the unknowns.
-    pub fn over(
+    pub(crate) fn over(
         &self,
         unknowns: &Unknowns,
         model: &AugmentedModel,
@@ -53,7 +44,9 @@ impl ParameterPrior {
         let information = DMatrix::from_fn(u, u, |a, b| {
             self.rows_per_independent * self.information[(places[a], places[b])]
         });
-        let pull = &information * self.off(unknowns, model);
+        let off = unknowns.list.iter();
+        let off = off.map(|x| value(&self.centre, *x) - value(model, *x));
+        let pull = &information * DVector::from_iterator(u, off);
         (information, pull)
     }
 }

@@ -1,4 +1,5 @@
-//! Where a joint with a jump in its friction law stands or turns: static friction takes any torque there.
+//! Where a joint with a jump in its friction law stands or turns: static friction takes any torque up to its limit
+//! there, and no law of v says which.
 
 use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, Parallel, Stretch, rest};
@@ -7,46 +8,36 @@ use crate::robot::model::JointFriction;
 /// Speed below which a joint counts as standing, over its rms speed.
 const STANDING: f64 = 0.01;
 
-/// Rows in which a joint with a jump in its friction law stands still for as long as the filter
-/// remembers: static friction takes any torque up to its limit there, and no law of v says which.
+/// Rows in which a joint with a jump in its friction law stands still for as long as the filter remembers.
 pub(crate) fn standing(
     model: &AugmentedModel,
     stretch: &Stretch,
     parallel: &Parallel,
     j: usize,
-) -> Vec<usize> {
+) -> Vec<bool> {
+    let rows = 0..parallel.rows(stretch.len());
     if !model.model.friction[j].jumps() {
-        return Vec::new();
+        return vec![false; rows.len()];
     }
     let v = &stretch.v[j];
-    let slow = slow(v);
+    let square = v.iter().map(|v| v * v).sum::<f64>() / v.len().max(1) as f64;
+    let slow = STANDING * square.sqrt();
     // samples since the joint last moved, and until it moves again
-    let mut since = vec![0usize; v.len()];
-    let mut count = usize::MAX / 2;
-    for (k, v) in v.iter().enumerate() {
-        count = if v.abs() > slow { 0 } else { count + 1 };
-        since[k] = count;
+    let next = |count: &mut usize, v: &f64| {
+        *count = if v.abs() > slow { 0 } else { *count + 1 };
+        Some(*count)
+    };
+    let far = usize::MAX / 2;
+    let mut stands: Vec<usize> = v.iter().scan(far, next).collect();
+    let after = v.iter().rev().scan(far, next);
+    for (stands, after) in stands.iter_mut().rev().zip(after) {
+        *stands = after.min(*stands);
     }
-    count = usize::MAX / 2;
-    for (k, v) in v.iter().enumerate().rev() {
-        count = if v.abs() > slow { 0 } else { count + 1 };
-        since[k] = since[k].min(count);
-    }
-    (0..parallel.rows(stretch.len()))
-        .filter(|i| since[parallel.sample_of(*i)] > parallel.decimation)
+    rows.map(|i| stands[parallel.sample_of(i)] > parallel.decimation)
         .collect()
 }
 
-/// Speed below which a joint counts as standing.
-fn slow(v: &[f64]) -> f64 {
-    let square = v.iter().map(|v| v * v).sum::<f64>() / v.len().max(1) as f64;
-    STANDING * square.sqrt()
-}
-
 /// Rows in which each joint rests, as `validate` finds them, `[joint][row]`; none of joints without friction.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
 pub(crate) fn resting(
     model: &AugmentedModel,
     stretch: &Stretch,

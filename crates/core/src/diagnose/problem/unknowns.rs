@@ -56,7 +56,6 @@ impl Unknowns {
         Unknowns { list, columns }
     }
 
-    /// Number of unknowns.
     pub fn len(&self) -> usize {
         self.list.len()
     }
@@ -64,38 +63,29 @@ impl Unknowns {
 
 /// Adds a step to a model; slopes stay positive.
 pub fn step(model: &mut AugmentedModel, unknowns: &Unknowns, delta: &[f64]) {
+    let model = &mut model.model;
     for (unknown, d) in unknowns.list.iter().zip(delta) {
         match *unknown {
-            Unknown::Theta(i) => model.model.theta[i] += d,
-            Unknown::Offset(j) => model.model.offset[j] += d,
-            Unknown::Friction { joint, k } => {
-                friction_step(&mut model.model.friction[joint], k, *d);
-            }
+            Unknown::Theta(i) => model.theta[i] += d,
+            Unknown::Offset(j) => model.offset[j] += d,
+            Unknown::Friction { joint, k } => match &mut model.friction[joint] {
+                JointFriction::None => {}
+                JointFriction::ViscousCoulomb(law) => {
+                    *[&mut law.viscous, &mut law.coulomb][k] += d;
+                }
+                JointFriction::DoubleTanh(law) => {
+                    let mut p = law.parameters();
+                    let free = p[k] + d;
+                    // a slope stays positive and moves by a factor of two at most
+                    let [least, most] = [0.5, 2.0].map(|times| times * p[k]);
+                    p[k] = if k < 3 { free } else { free.clamp(least, most) };
+                    *law = DoubleTanh::from_parameters(p);
+                }
+            },
         }
     }
 }
 
-fn friction_step(law: &mut JointFriction, k: usize, d: f64) {
-    match law {
-        JointFriction::None => {}
-        JointFriction::ViscousCoulomb(law) => match k {
-            0 => law.viscous += d,
-            _ => law.coulomb += d,
-        },
-        JointFriction::DoubleTanh(law) => {
-            let mut p = law.parameters();
-            p[k] = if k >= 3 {
-                // a slope stays positive and moves by a factor of two at most
-                (p[k] + d).clamp(0.5 * p[k], 2.0 * p[k])
-            } else {
-                p[k] + d
-            };
-            *law = DoubleTanh::from_parameters(p);
-        }
-    }
-}
-
-/// Value of an unknown in a model.
 pub fn value(model: &AugmentedModel, unknown: Unknown) -> f64 {
     match unknown {
         Unknown::Theta(i) => model.model.theta[i],

@@ -1,14 +1,14 @@
-//! Errors of a model over the rows of one use, as `validate` counts them, with block-bootstrap
-//! intervals.
+//! Errors of a model over the rows of one use, as `validate` counts them, with block-bootstrap intervals.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::diagnose::problem::case::Case;
 use crate::diagnose::problem::data_split::{DataSplit, LogRole};
 use crate::diagnose::problem::rests::{resting, standing};
 use crate::effect::AugmentedModel;
 use crate::math::bootstrap::intervals_95;
-use crate::motion::{MotionError, ParallelFilters, Stretch};
+use crate::motion::MotionError;
 
 /// Errors of one joint.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -65,13 +65,12 @@ pub struct JointChange {
 
 impl JointChange {
     /// Whether the interval lies below zero.
-    pub fn improved(&self) -> bool {
+    pub(crate) fn improved(&self) -> bool {
         self.interval_95[1] < 0.0
     }
 
-    /// Whether it worsened by an amount that shows in the digits of a report: with rows enough the interval of a
-    /// change of no consequence is above zero too.
-    pub fn noticeably_worse(&self) -> bool {
+    /// Whether it worsened by an amount that shows in a report: with rows enough any change is surely above zero.
+    pub(crate) fn noticeably_worse(&self) -> bool {
         self.worsened && self.after - self.before > NOTICEABLE * self.before
     }
 }
@@ -96,53 +95,33 @@ pub struct PieceErrors {
 /// Relative change of an error below which it is not reported as worse.
 const NOTICEABLE: f64 = 0.01;
 
-/// Seed of the bootstrap.
 const SEED: u64 = 20_020_520;
 
-/// Which rows of the pieces count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Counted {
-    /// All of them, as `validate` counts.
-    All,
-    /// Without those in which friction at rest takes whatever the torque is.
-    Moving,
-}
-
-/// Errors of a model over the pieces of a role.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
+/// Errors of a model over the pieces of a role, all rows of them or without those in which a joint stands.
 pub fn pieces(
     model: &AugmentedModel,
-    stretches: &[Stretch],
-    (filters, rest_speed): (&ParallelFilters, &[f64]),
+    case: &Case,
     split: &DataSplit,
-    (wanted, counted): (LogRole, Counted),
+    (wanted, moving): (LogRole, bool),
 ) -> Result<Pieces, MotionError> {
     let n = model.model.robot.joints();
     let mut pieces = Pieces::new();
-    for (index, stretch) in stretches.iter().enumerate() {
-        let own = split
-            .pieces
-            .iter()
-            .filter(|p| p.stretch == index && p.role == wanted);
-        let own: Vec<_> = own.collect();
-        if own.is_empty() {
+    for (index, stretch) in case.stretches.iter().enumerate() {
+        let own = split.pieces.iter();
+        let own = own.filter(|p| p.stretch == index && p.role == wanted);
+        if own.clone().next().is_none() {
             continue;
         }
-        let parallel = filters.of(stretch);
+        let parallel = case.filters.of(stretch);
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
-        let resting = resting(model, stretch, parallel, rest_speed)?;
-        let mut still = vec![vec![false; parallel.rows(stretch.len())]; n];
-        if counted == Counted::Moving {
-            for (j, still) in still.iter_mut().enumerate() {
-                for i in standing(model, stretch, parallel, j) {
-                    still[i] = true;
-                }
-            }
-        }
+        let resting = resting(model, stretch, parallel, &case.rest_speed)?;
+        let still = |j| match moving {
+            true => standing(model, stretch, parallel, j),
+            false => vec![false; parallel.rows(stretch.len())],
+        };
+        let still: Vec<Vec<bool>> = (0..n).map(still).collect();
         for piece in own {
             let joint = |j: usize| {
                 let mut s = PieceErrors::default();
@@ -163,8 +142,8 @@ pub fn pieces(
                 }
                 let first = parallel.sample_of(piece.rows.start);
                 let last = parallel.sample_of(piece.rows.end).min(stretch.len());
-                for (measured, hat) in stretch.tau[j][first..last].iter().zip(&hat[j][first..last])
-                {
+                let raw = stretch.tau[j][first..last].iter();
+                for (measured, hat) in raw.zip(&hat[j][first..last]) {
                     s.raw_error += (measured - hat).powi(2);
                     s.raw_torque += measured * measured;
                 }
@@ -202,9 +181,7 @@ pub fn mean_relative_error(pieces: &Pieces) -> Option<f64> {
     (!all.is_empty()).then(|| mean(&relative(pieces, &all)))
 }
 
-/// What a change of the model does to the errors over the same pieces, joint by joint; nothing of joints that have
-/// no error there.
-/// The bootstrap draws `block` neighbouring pieces at a time, which the residual's memory does not reach over.
+/// What a change does to the errors of each joint that has one; the bootstrap draws `block` neighbouring pieces at a time.
 pub fn changes(
     joints: &[String],
     (before, after): (&Pieces, &Pieces),
@@ -232,12 +209,9 @@ pub fn changes(
     change.filter(|c| c.before.is_finite()).collect()
 }
 
-/// Errors over pieces; none where there is none. `units` are those of the joints' torques.
-pub fn summed(
-    model: &AugmentedModel,
-    units: &[String],
-    (pieces, block): (&[Vec<PieceErrors>], usize),
-) -> Option<Errors> {
+/// Errors over pieces; none where there is none.
+pub fn summed(case: &Case, (pieces, block): (&Pieces, usize)) -> Option<Errors> {
+    let units = &case.units;
     let n = units.len();
     if pieces.is_empty() {
         return None;
@@ -250,37 +224,37 @@ pub fn summed(
         errors
     });
     // squared error and torque, and number of rows, of joint j: moving, resting
+    let sum = |j: usize, of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
     let parts = |j: usize| -> [[f64; 3]; 2] {
-        let sum = |of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
+        let sum = |of| sum(j, of);
         let all = [sum(|s| s.error), sum(|s| s.torque), sum(|s| s.rows)];
         let rest = [sum(|s| s.rest[0]), sum(|s| s.rest[1]), sum(|s| s.rest[2])];
         [std::array::from_fn(|k| (all[k] - rest[k]).max(0.0)), rest]
     };
     let part = |[error, torque, rows]: [f64; 3]| (rows > 0.0).then(|| ratio(error, torque));
-    let joints: Vec<JointErrors> = (0..n)
-        .map(|j| {
-            let sum = |of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
-            let rows = sum(|s| s.rows);
-            let scatter = sum(|s| s.torque) - sum(|s| s.mean).powi(2) / rows.max(1.0);
-            JointErrors {
-                joint: model.model.robot.joint_names()[j].clone(),
-                unit: units[j].clone(),
-                rmse: (sum(|s| s.error) / rows.max(1.0)).sqrt(),
-                relative_error: found[j],
-                relative_error_moving: part(parts(j)[0]),
-                relative_error_rest: part(parts(j)[1]),
-                interval_95: intervals[j],
-                relative_error_raw: ratio(sum(|s| s.raw_error), sum(|s| s.raw_torque)),
-                max_abs: pieces.iter().map(|p| p[j].largest).fold(0.0, f64::max),
-                r2: if scatter > 0.0 {
-                    1.0 - sum(|s| s.error) / scatter
-                } else {
-                    f64::NAN
-                },
-                samples: rows as u64,
-            }
-        })
-        .collect();
+    let of_joint = |j: usize| {
+        let sum = |of| sum(j, of);
+        let rows = sum(|s| s.rows);
+        let scatter = sum(|s| s.torque) - sum(|s| s.mean).powi(2) / rows.max(1.0);
+        let [moving, rest] = parts(j).map(part);
+        JointErrors {
+            joint: case.given.model.robot.joint_names()[j].clone(),
+            unit: units[j].clone(),
+            rmse: (sum(|s| s.error) / rows.max(1.0)).sqrt(),
+            relative_error: found[j],
+            relative_error_moving: moving,
+            relative_error_rest: rest,
+            interval_95: intervals[j],
+            relative_error_raw: ratio(sum(|s| s.raw_error), sum(|s| s.raw_torque)),
+            max_abs: pieces.iter().map(|p| p[j].largest).fold(0.0, f64::max),
+            r2: match scatter > 0.0 {
+                true => 1.0 - sum(|s| s.error) / scatter,
+                false => f64::NAN,
+            },
+            samples: rows as u64,
+        }
+    };
+    let joints: Vec<JointErrors> = (0..n).map(of_joint).collect();
     let one_unit = units.iter().all(|u| *u == units[0]);
     let pooled = |k: usize| {
         let add = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| a[i] + b[i]);
@@ -309,12 +283,8 @@ mod tests {
         let piece = |k: usize| PieceErrors {
             error: (error * (1.0 + 0.001 * (k % 3) as f64)).powi(2),
             torque: 1.0,
-            mean: 0.0,
             rows: 1.0,
-            largest: 0.0,
-            raw_error: 0.0,
-            raw_torque: 1.0,
-            rest: [0.0; 3],
+            ..PieceErrors::default()
         };
         (0..60).map(|k| vec![piece(k)]).collect()
     }

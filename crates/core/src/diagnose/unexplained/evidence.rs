@@ -1,6 +1,8 @@
 //! What a person looks at: the filtered residual over position, velocity, load and time, forward and
 //! backward apart, and its spectra over order and frequency, for a model before and after.
 
+use std::f64::consts::TAU;
+
 use serde::Serialize;
 
 use crate::effect::AugmentedModel;
@@ -42,16 +44,6 @@ const GAP_BETWEEN_LOGS: f64 = 0.02;
 /// Rows that a spectrum is made of, about.
 const ROWS: usize = 4000;
 
-/// Rows of one joint.
-#[derive(Default)]
-struct ResidualRows {
-    t: Vec<f64>,
-    q: Vec<f64>,
-    v: Vec<f64>,
-    load: Vec<f64>,
-    e: Vec<f64>,
-}
-
 /// Evidence of a model along stretches, joint by joint. Spectra over frequency end above the cut-off, those over
 /// order above `orders`, one per joint.
 ///
@@ -64,74 +56,47 @@ pub fn evidence(
     (cutoff_hz, orders): (f64, &[f64]),
 ) -> Result<Vec<JointEvidence>, MotionError> {
     let robot = &model.model.robot;
-    let n = robot.joints();
-    let mut all: Vec<ResidualRows> = (0..n).map(|_| ResidualRows::default()).collect();
+    // rows of each joint: time, position, velocity, load and residual
+    let mut all: Vec<[Vec<f64>; 5]> = vec![Default::default(); robot.joints()];
     for (stretch, late) in stretches.iter().zip(one_after_the_other(stretches)) {
         let parallel = filters.of(stretch);
-        let load = model.torques(stretch).load;
-        let hat = model.reconstruct(stretch);
+        let torques = model.torques(stretch);
+        let residual = model.residual(stretch, &torques);
         for (j, rows) in all.iter_mut().enumerate() {
-            let residual: Vec<f64> = stretch.tau[j]
-                .iter()
-                .zip(&hat[j])
-                .map(|(t, h)| t - h)
-                .collect();
-            let filtered = parallel.run(&[&residual])?;
-            // a break between stretches
-            rows.push([f64::NAN; 5]);
-            for (i, e) in filtered[0].iter().enumerate() {
+            let (q, v, load) = (&stretch.q[j], &stretch.v[j], &torques.load[j]);
+            let filtered = parallel.run(&[&residual[j]])?;
+            let row = |(i, e): (usize, &f64)| {
                 let k = parallel.sample_of(i);
-                rows.push([
-                    stretch.t[k] + late,
-                    stretch.q[j][k],
-                    stretch.v[j][k],
-                    load[j][k],
-                    *e,
-                ]);
+                [stretch.t[k] + late, q[k], v[k], load[k], *e]
+            };
+            // a break between stretches
+            let parted = std::iter::once([f64::NAN; 5]);
+            for row in parted.chain(filtered[0].iter().enumerate().map(row)) {
+                rows.iter_mut().zip(row).for_each(|(to, x)| to.push(x));
             }
         }
     }
-    Ok(all
-        .iter()
-        .enumerate()
-        .map(|(j, rows)| {
-            let direction = |forward: bool| {
-                let rms = mean_square(&rows.v).sqrt();
-                move |v: f64| {
-                    if forward {
-                        v > 0.02 * rms
-                    } else {
-                        v < -0.02 * rms
-                    }
-                }
-            };
-            let by = |x: &[f64]| {
-                let part = |forward| binned(x, &rows.e, &rows.v, &direction(forward));
-                [part(true), part(false)]
-            };
-            let per_unit = match robot.joint_kind(j) {
-                JointKind::Revolute => 1.0,
-                JointKind::Prismatic => std::f64::consts::TAU,
-            };
-            let [low, high] = range(&rows.q);
-            let turns = ((high - low) * per_unit / std::f64::consts::TAU).max(1e-9);
-            let found = orders.get(j).copied().unwrap_or(0.0);
-            let waves = (40.0 / turns).max(ABOVE * found);
-            JointEvidence {
-                position: by(&rows.q),
-                velocity: binned(&rows.v, &rows.e, &rows.v, &|_| true),
-                load: by(&rows.load),
-                time: rows.t.iter().zip(&rows.e).map(|(t, e)| [*t, *e]).collect(),
-                order: spectrum(&rows.q, &rows.e, per_unit, (waves, turns)),
-                frequency: spectrum(
-                    &rows.t,
-                    &rows.e,
-                    std::f64::consts::TAU,
-                    (1.5 * cutoff_hz, 0.0),
-                ),
-            }
-        })
-        .collect())
+    let of_joint = |(j, [t, q, v, load, e]): (usize, &[Vec<f64>; 5])| {
+        let slow = 0.02 * mean_square(v).sqrt();
+        let by = |x: &[f64]| [1.0, -1.0].map(|sign| binned(x, e, v, &|v| sign * v > slow));
+        let per_unit = match robot.joint_kind(j) {
+            JointKind::Revolute => 1.0,
+            JointKind::Prismatic => TAU,
+        };
+        let [low, high] = range(q);
+        let turns = ((high - low) * per_unit / TAU).max(1e-9);
+        let found = orders.get(j).copied().unwrap_or(0.0);
+        let waves = (40.0 / turns).max(ABOVE * found);
+        JointEvidence {
+            position: by(q),
+            velocity: binned(v, e, v, &|_| true),
+            load: by(load),
+            time: t.iter().zip(e).map(|(t, e)| [*t, *e]).collect(),
+            order: spectrum(q, e, per_unit, (waves, turns)),
+            frequency: spectrum(t, e, TAU, (1.5 * cutoff_hz, 0.0)),
+        }
+    };
+    Ok(all.iter().enumerate().map(of_joint).collect())
 }
 
 /// What is added to the times of each stretch so that logs, whose clocks may begin alike, stand one after the other
@@ -154,16 +119,6 @@ pub fn one_after_the_other(stretches: &[&Stretch]) -> Vec<f64> {
         late
     };
     stretches.iter().map(of).collect()
-}
-
-impl ResidualRows {
-    fn push(&mut self, [t, q, v, load, e]: [f64; 5]) {
-        self.t.push(t);
-        self.q.push(q);
-        self.v.push(v);
-        self.load.push(load);
-        self.e.push(e);
-    }
 }
 
 fn mean_square(x: &[f64]) -> f64 {
@@ -194,47 +149,37 @@ fn binned(x: &[f64], e: &[f64], v: &[f64], wanted: &dyn Fn(f64) -> bool) -> Line
             sums[bin].1 += 1;
         }
     }
-    sums.iter()
-        .enumerate()
-        .map(|(i, (sum, count))| {
-            let y = if *count < MIN_ROWS_PER_BIN {
-                f64::NAN
-            } else {
-                sum / *count as f64
-            };
-            [low + (i as f64 + 0.5) * width, y]
-        })
-        .collect()
+    let point = |(i, (sum, count)): (usize, &(f64, usize))| {
+        let y = match *count < MIN_ROWS_PER_BIN {
+            true => f64::NAN,
+            false => sum / *count as f64,
+        };
+        [low + (i as f64 + 0.5) * width, y]
+    };
+    sums.iter().enumerate().map(point).collect()
 }
 
-/// Amplitude of e at waves of x, from 0 to `last` waves per unit, where x covers `units` of them, as far as that is
-/// known: a peak is as narrow as a wave over the whole of it.
+/// Amplitude of e at up to `last` waves of x per unit, where x covers `units`: a peak is as narrow as a wave over all of it.
 fn spectrum(x: &[f64], e: &[f64], per_unit: f64, (last, units): (f64, f64)) -> Line {
     let stride = (x.len() / ROWS).max(1);
-    let rows: Vec<(f64, f64)> = x
-        .iter()
-        .zip(e)
-        .step_by(stride)
-        .filter(|(x, _)| x.is_finite())
-        .map(|(x, e)| (*x, *e))
-        .collect();
+    let rows = x.iter().zip(e).step_by(stride);
+    let rows: Vec<(&f64, &f64)> = rows.filter(|(x, _)| x.is_finite()).collect();
     if rows.len() < 10 || !last.is_finite() {
         return Vec::new();
     }
     let mean = rows.iter().map(|r| r.1).sum::<f64>() / rows.len() as f64;
     let points = ((PEAK * last * units) as usize).clamp(SPECTRUM, MOST_POINTS);
-    (1..=points)
-        .map(|i| {
-            let wave = last * i as f64 / points as f64;
-            let (mut re, mut im) = (0.0, 0.0);
-            for (x, e) in &rows {
-                let (s, c) = (per_unit * wave * x).sin_cos();
-                re += (e - mean) * c;
-                im += (e - mean) * s;
-            }
-            [wave, 2.0 * re.hypot(im) / rows.len() as f64]
-        })
-        .collect()
+    let point = |i: usize| {
+        let wave = last * i as f64 / points as f64;
+        let (mut re, mut im) = (0.0, 0.0);
+        for (x, e) in &rows {
+            let (s, c) = (per_unit * wave * *x).sin_cos();
+            re += (*e - mean) * c;
+            im += (*e - mean) * s;
+        }
+        [wave, 2.0 * re.hypot(im) / rows.len() as f64]
+    };
+    (1..=points).map(point).collect()
 }
 
 #[cfg(test)]
@@ -248,12 +193,8 @@ mod tests {
             t: vec![from, from + 10.0],
             ..Stretch::default()
         };
-        let all = [
-            stretch(0, 0.0),
-            stretch(0, 15.0),
-            stretch(1, 0.0),
-            stretch(2, 90.0),
-        ];
+        let all = [(0, 0.0), (0, 15.0), (1, 0.0), (2, 90.0)];
+        let all = all.map(|(log, from)| stretch(log, from));
         let late = one_after_the_other(&all.each_ref());
         let apart = GAP_BETWEEN_LOGS * 40.0;
         let expected = [0.0, 0.0, 25.0 + apart, 35.0 + 2.0 * apart - 90.0];
@@ -265,16 +206,11 @@ mod tests {
     #[test]
     fn bins_hold_means_and_a_spectrum_peaks_where_the_wave_is() {
         let x: Vec<f64> = (0..3000).map(|k| f64::from(k) / 3000.0).collect();
-        let e: Vec<f64> = x
-            .iter()
-            .map(|x| 0.7 * (std::f64::consts::TAU * 8.0 * x).sin())
-            .collect();
-        let line = spectrum(&x, &e, std::f64::consts::TAU, (40.0, 1.0));
+        let e: Vec<f64> = x.iter().map(|x| 0.7 * (TAU * 8.0 * x).sin()).collect();
+        let line = spectrum(&x, &e, TAU, (40.0, 1.0));
         let peak = line.iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
-        assert!(
-            (peak[0] - 8.0).abs() < 0.2 && (peak[1] - 0.7).abs() < 0.02,
-            "{peak:?}"
-        );
+        let [off, height] = [(peak[0] - 8.0).abs(), (peak[1] - 0.7).abs()];
+        assert!(off < 0.2 && height < 0.02, "{peak:?}");
         let flat = binned(&x, &vec![0.3; 3000], &vec![1.0; 3000], &|v| v > 0.0);
         assert!(flat.len() == BINS && flat.iter().all(|p| (p[1] - 0.3).abs() < 1e-12));
     }

@@ -18,7 +18,6 @@ pub struct ResidualMap {
 
 /// Cells along each signal.
 const CELLS: usize = 20;
-/// Bins of the curve.
 const BINS: usize = 24;
 /// Part of the rows beyond each end.
 const BEYOND: f64 = 0.005;
@@ -26,8 +25,7 @@ const BEYOND: f64 = 0.005;
 const MIN_ROWS_PER_CELL: f64 = 3.0;
 
 impl ResidualMap {
-    /// Of a residual and two signals at the same rows. Rows of one block are not independent: the standard error is
-    /// that of the means of blocks, `block` says in which each row is.
+    /// Of a residual and two signals at the same rows; standard errors are those of blocks, whose rows are not independent.
     pub(super) fn of(
         signals: [Signal; 2],
         values: [&[f64]; 2],
@@ -39,9 +37,8 @@ impl ResidualMap {
             let along = |s: usize| {
                 let [from, to] = ends[s];
                 let share = (values[s][i] - from) / (to - from);
-                (0.0..=1.0)
-                    .contains(&share)
-                    .then(|| ((share * CELLS as f64) as usize).min(CELLS - 1))
+                let cell = ((share * CELLS as f64) as usize).min(CELLS - 1);
+                (0.0..=1.0).contains(&share).then_some(cell)
             };
             Some([along(0)?, along(1)?])
         };
@@ -54,13 +51,11 @@ impl ResidualMap {
             }
         }
         let mean = |[sum, rows]: &[f64; 2]| (*rows >= MIN_ROWS_PER_CELL).then(|| sum / rows);
+        let line = |line: &Vec<[f64; 2]>| line.iter().map(mean).collect();
         ResidualMap {
             signals,
             ends,
-            cells: sums
-                .iter()
-                .map(|line| line.iter().map(mean).collect())
-                .collect(),
+            cells: sums.iter().map(line).collect(),
             curve: curve(values[0], residual, block),
         }
     }
@@ -131,11 +126,8 @@ mod tests {
         }
         assert!(filled > 390, "{filled}");
         for [x, mean, std] in &map.curve {
-            assert!(
-                (mean - 2.0 * x).abs() < 0.05 + 4.0 * std,
-                "{x}: {mean} {std}"
-            );
-            assert!(*std < 0.1, "{std}");
+            let off = (mean - 2.0 * x).abs();
+            assert!(off < 0.05 + 4.0 * std && *std < 0.1, "{x}: {mean} {std}");
         }
         let still = ResidualMap::of(signals, [&x, &vec![1.0; n]], &residual, &block);
         assert_eq!(still.ends[1], [0.0, 2.0]);

@@ -4,15 +4,11 @@ pub mod dependence;
 pub mod errors;
 pub mod evidence;
 pub mod map;
-mod noise_floor;
+pub mod noise_floor;
 mod period;
 pub mod signal;
 
-use self::errors::Errors;
-use self::noise_floor::floor;
-use crate::diagnose::problem::case::Case;
-use crate::effect::stationary_joints;
-use crate::motion::{MotionError, Stretch};
+use self::errors::{Errors, JointErrors};
 
 /// What stays unexplained on one joint, on fitted or on unseen logs, whichever is more.
 #[derive(Debug, Clone, Copy)]
@@ -39,41 +35,20 @@ pub const NEGLIGIBLE: f64 = 2e-6;
 /// Power of a torque's noise over its own below which it is that of rounding, and no noise.
 const NO_NOISE: f64 = 1e-10;
 
-/// Variance of the noise in each joint's filtered residual, from raw residuals `[stretch][joint][sample]`.
-pub fn noise(
-    residuals: &[Vec<Vec<f64>>],
-    case: &Case,
-    stretches: &[Stretch],
-) -> Result<Vec<f64>, MotionError> {
-    floor(
-        residuals,
-        stretches,
-        &case.filters,
-        case.cutoff_hz,
-        case.averaged,
-        &stationary_joints(&case.given.model.robot, stretches),
-    )
-}
-
 /// How much of each joint's residual is above the noise floor.
 fn above(noise: &[f64], found: &Errors) -> Vec<Unexplained> {
-    found
-        .joints
-        .iter()
-        .zip(noise)
-        .map(|(e, noise)| {
-            let residual = e.rmse * e.rmse;
-            let torque = residual / (e.relative_error * e.relative_error);
-            Unexplained {
-                share: ((residual - noise) / torque).max(0.0),
-                over_floor: (*noise > NO_NOISE * torque).then(|| residual / noise),
-            }
-        })
-        .collect()
+    let of_joint = |(e, noise): (&JointErrors, &f64)| {
+        let residual = e.rmse * e.rmse;
+        let torque = residual / (e.relative_error * e.relative_error);
+        Unexplained {
+            share: ((residual - noise) / torque).max(0.0),
+            over_floor: (*noise > NO_NOISE * torque).then(|| residual / noise),
+        }
+    };
+    found.joints.iter().zip(noise).map(of_joint).collect()
 }
 
-/// What is unexplained on fitted logs, or on unseen ones with their own noise where that is more: what fits the one and
-/// not the other is structure too.
+/// What is unexplained on fitted logs, or on unseen ones with their own noise where that is more.
 pub fn unexplained(
     train: &Errors,
     noise: &[f64],
@@ -85,12 +60,9 @@ pub fn unexplained(
     };
     let pairs = train.into_iter().zip(above(&noise, holdout)).zip(&noise);
     // a joint that rests there has no floor
-    let more = |((train, unseen), noise): ((Unexplained, Unexplained), &f64)| {
-        if unseen.share > train.share && *noise > 0.0 {
-            unseen
-        } else {
-            train
-        }
+    let more = |((train, unseen), noise): ((Unexplained, Unexplained), &f64)| match *noise > 0.0 {
+        true if unseen.share > train.share => unseen,
+        _ => train,
     };
     pairs.map(more).collect()
 }
@@ -98,8 +70,15 @@ pub fn unexplained(
 /// Structure after over structure before, per joint.
 pub fn part_unexplained(noise: &[f64], before: &Errors, after: &Errors) -> Vec<f64> {
     let shares = above(noise, before).into_iter().zip(above(noise, after));
-    let part = |(before, after): (Unexplained, Unexplained)| {
-        after.share / before.share.max(f64::MIN_POSITIVE)
-    };
-    shares.map(part).collect()
+    shares
+        .map(|(before, after)| after.share / before.share.max(f64::MIN_POSITIVE))
+        .collect()
+}
+
+/// Nearly normal noise.
+#[cfg(test)]
+fn normal(seed: u64) -> impl FnMut() -> f64 {
+    use rand::{RngExt, SeedableRng};
+    let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    move || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0
 }

@@ -11,6 +11,8 @@
 //! frequency is underrated, and then some of it is called structure: the safe side.
 
 use super::period::{period, unrepeated};
+use crate::diagnose::problem::case::Case;
+use crate::effect::stationary_joints;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
@@ -18,17 +20,23 @@ use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
 /// Borders of the bands that are looked at, over the cut-off.
 const BORDERS: [f64; 3] = [1.5, 2.25, 3.0];
 
-/// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]`. `averaged`
-/// where each torque is the mean of two rows, as by a zero-order hold.
-///
-/// # Errors
-/// [`MotionError`] of the filters.
+/// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]` along some stretches.
 pub fn floor(
+    case: &Case,
+    residuals: &[Vec<Vec<f64>>],
+    stretches: &[Stretch],
+) -> Result<Vec<f64>, MotionError> {
+    let stationary = stationary_joints(&case.given.model.robot, stretches);
+    let band = (case.cutoff_hz, case.averaged);
+    floor_of(residuals, stretches, &case.filters, band, &stationary)
+}
+
+/// The same with each part by itself; `averaged` where each torque is the mean of two rows.
+fn floor_of(
     residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
     filters: &ParallelFilters,
-    cutoff_hz: f64,
-    averaged: bool,
+    (cutoff_hz, averaged): (f64, bool),
     stationary: &[Vec<bool>],
 ) -> Result<Vec<f64>, MotionError> {
     // logs of one rate together
@@ -60,14 +68,14 @@ fn over_rates(bands: &[Bands], noise: &[Vec<StretchNoise>]) -> f64 {
         let rows = samples / bands.parallel.decimation as f64;
         (rows, together(noise, bands.seen, bands.kept))
     };
-    let all: Vec<(f64, f64)> = bands.iter().zip(noise).map(of_rate).collect();
-    let known = || all.iter().filter(|(rows, _)| *rows > 0.0);
-    match (known().next(), known().count()) {
-        (None, _) => 0.0,
-        (Some((_, variance)), 1) => *variance,
+    let all = bands.iter().zip(noise).map(of_rate);
+    let known: Vec<(f64, f64)> = all.filter(|(rows, _)| *rows > 0.0).collect();
+    match known.as_slice() {
+        [] => 0.0,
+        [(_, variance)] => *variance,
         _ => {
-            let rows: f64 = known().map(|(rows, _)| rows).sum();
-            known().map(|(r, variance)| r * variance).sum::<f64>() / rows
+            let rows: f64 = known.iter().map(|(rows, _)| rows).sum();
+            known.iter().map(|(r, v)| r * v).sum::<f64>() / rows
         }
     }
 }
@@ -79,7 +87,6 @@ struct Bands<'a> {
     seen: [[f64; 2]; 2],
     /// What the band that is kept sees of them.
     kept: [f64; 2],
-    /// Low-pass filters at the borders.
     passes: [ZeroPhase; 3],
     /// Samples of a block, some periods of the band.
     block: usize,
@@ -101,17 +108,15 @@ impl<'a> Bands<'a> {
             let cutoff = times * top * cutoff_hz;
             Ok(ZeroPhase::new(Sos::butterworth(4, cutoff, rate)?))
         };
+        let [near, middle, far] = BORDERS.map(low_pass);
+        let passes = [near?, middle?, far?];
         let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
         let width = top * cutoff_hz * (BORDERS[1] - BORDERS[0]);
         let mut bands = Bands {
             parallel,
             seen: [[0.0; 2]; 2],
             kept: [0.0; 2],
-            passes: [
-                low_pass(BORDERS[0])?,
-                low_pass(BORDERS[1])?,
-                low_pass(BORDERS[2])?,
-            ],
+            passes,
             block,
             freedom: 2.0 * width * block as f64 / rate,
             // 1 + 16 + 36 + 16 + 1 = 70; of the mean of two neighbours (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7
@@ -128,7 +133,7 @@ impl<'a> Bands<'a> {
 
     /// A signal in each of the two bands.
     fn parted(&self, x: &[f64]) -> Result<[Vec<f64>; 2], MotionError> {
-        let mut below = [x.to_vec(), x.to_vec(), x.to_vec()];
+        let mut below = [(); 3].map(|()| x.to_vec());
         for (pass, x) in self.passes.iter().zip(&mut below) {
             pass.run(x, 1)?;
         }
@@ -188,7 +193,6 @@ impl<'a> Bands<'a> {
 
 /// What one stretch shows of a joint's noise.
 struct StretchNoise {
-    /// Its rows.
     weight: f64,
     /// Power in the two bands.
     near: [Middle; 2],
@@ -198,8 +202,7 @@ struct StretchNoise {
     repeated: Option<f64>,
 }
 
-/// Variance of the noise in the band that is kept, over all stretches by their rows; 0 of none. Bands are taken
-/// together before anything is solved for, so that their errors average out.
+/// Variance of the noise in the band that is kept, over all stretches by their rows; 0 of none.
 fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> f64 {
     let rows: f64 = stretches.iter().map(|s| s.weight).sum();
     if rows <= 0.0 {
@@ -208,6 +211,7 @@ fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> 
     let mean = |of: &dyn Fn(&StretchNoise) -> f64| {
         stretches.iter().map(|s| s.weight * of(s)).sum::<f64>() / rows
     };
+    // bands are taken together before anything is solved for, so that their errors average out
     let near = [0, 1].map(|band: usize| Middle {
         value: mean(&|s| s.near[band].value),
         error: (mean(&|s| s.weight * s.near[band].error.powi(2)) / rows).sqrt(),
@@ -218,16 +222,14 @@ fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> 
     mean(&|s| s.repeated.map_or(beyond, |r| (r + rising).min(beyond)))
 }
 
-/// Variances of white noise and of rising noise in the band that is kept, from that in two bands beyond it, of
-/// which `seen[band][source]` is what each band sees of each. White noise that the rising noise hides there is
-/// anything up to its standard error, and is taken to be that, for what is no more is no structure; but it is
-/// no more than all that a band has.
+/// Variances of white and of rising noise in the band that is kept, from those in two bands, which see `seen[band][source]`.
 fn carried_on(near: [Middle; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> [f64; 2] {
     let [[w, r], [x, s]] = seen;
     let determinant = w * s - r * x;
     let [first, second] = near.map(|n| n.value);
     let white = (first * s - r * second) / determinant;
     let rising = (w * second - first * x) / determinant;
+    // white noise that the rising noise hides is taken to be its standard error: what is no more is no structure
     let error = (near[0].error * s).hypot(near[1].error * r) / determinant.abs();
     let alone = |source: usize| {
         let of_band = |band: usize| near[band].value / seen[band][source];
@@ -248,8 +250,7 @@ fn power(x: &[f64]) -> f64 {
 /// Blocks below which their spread says nothing of the median's error.
 const MIN_BLOCKS: usize = 8;
 
-/// Median of blocks with its standard error, as if they were normal between their quartiles; of few blocks it
-/// is no more than an order of magnitude.
+/// Median of blocks with its standard error, as if they were normal between their quartiles.
 #[derive(Debug, Clone, Copy, Default)]
 struct Middle {
     value: f64,
@@ -257,8 +258,7 @@ struct Middle {
 }
 
 impl Middle {
-    /// Of powers with so many independent numbers in each: their median lies below their mean (Wilson and Hilferty
-    /// 1931), which is what is reported. 0 of none.
+    /// Of powers with so many independent numbers in each; 0 of none.
     fn of(mut values: Vec<f64>, freedom: f64) -> Self {
         values.sort_by(f64::total_cmp);
         let n = values.len();
@@ -268,6 +268,7 @@ impl Middle {
         };
         // quartiles of a normal distribution are 1.349 apart, and its median has 1.2533 times the mean's error
         let spread = (at(0.75) - at(0.25)) / 1.349;
+        // the median lies below the mean (Wilson and Hilferty 1931), which is reported
         let below = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
         let value = at(0.5) / below;
         let error = match n < MIN_BLOCKS {
@@ -281,8 +282,28 @@ impl Middle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::unexplained::normal;
     use crate::motion::FilterSettings;
-    use rand::{RngExt, SeedableRng};
+
+    /// The floor of raw residuals of one joint, each with its time step, and the mean square of their rows.
+    fn floor_and_power(raw: &[(f64, Vec<f64>)]) -> [f64; 2] {
+        let stretch = |(dt, raw): &(f64, Vec<f64>)| Stretch {
+            dt: *dt,
+            q: vec![vec![0.0; raw.len()]],
+            t: vec![0.0; raw.len()],
+            ..Stretch::default()
+        };
+        let stretches: Vec<Stretch> = raw.iter().map(stretch).collect();
+        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
+        let residuals: Vec<_> = raw.iter().map(|(_, x)| vec![x.clone()]).collect();
+        let still = vec![vec![false]; raw.len()];
+        let found = floor_of(&residuals, &stretches, &filters, (10.0, false), &still);
+        let rows = stretches.iter().zip(raw);
+        let rows = rows.flat_map(|(s, (_, x))| filters.of(s).run(&[x]).unwrap().remove(0));
+        let squares: Vec<f64> = rows.map(|x| x * x).collect();
+        let power = squares.iter().sum::<f64>() / squares.len() as f64;
+        [found.unwrap()[0], power]
+    }
 
     #[test]
     fn noise_that_rises_is_told_from_white_noise_and_what_it_hides_is_its_standard_error() {
@@ -311,118 +332,54 @@ mod tests {
 
     #[test]
     fn a_middle_has_the_standard_error_of_a_median() {
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(9);
-        let mut draw = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
-        let found: Vec<Middle> = (0..2000)
-            .map(|_| Middle::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY))
-            .collect();
+        let mut draw = normal(9);
+        let mut middle = |_| Middle::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY);
+        let found: Vec<Middle> = (0..2000).map(&mut middle).collect();
         let scatter = found.iter().map(|m| (m.value - 3.0).powi(2)).sum::<f64>() / 2000.0;
         let shown = found.iter().map(|m| m.error).sum::<f64>() / 2000.0;
-        assert!(
-            (shown / scatter.sqrt() - 1.0).abs() < 0.1,
-            "{shown} {scatter}"
-        );
+        let off = (shown / scatter.sqrt() - 1.0).abs();
+        assert!(off < 0.1, "{shown} {scatter}");
     }
 
-    /// White noise beside noise that rises much higher beyond the band: the floor is that of both, in one log
-    /// or cut in four.
     #[test]
     fn white_noise_beside_an_encoders_has_its_floor_in_one_log_and_in_four() {
-        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(12);
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let mut normal = normal(12);
         let n = 80_000;
         let rounding: Vec<f64> = (0..n + 2).map(|_| normal()).collect();
-        let noise: Vec<f64> = (0..n)
-            .map(|k| {
-                let twice = rounding[k] - 2.0 * rounding[k + 1] + rounding[k + 2];
-                normal() + 60.0 * twice
-            })
-            .collect();
-        let mut filtered = noise.clone();
-        parallel.smooth(&mut filtered).unwrap();
-        let inner = &filtered[500..n - 500];
-        let wanted = inner.iter().map(|x| x * x).sum::<f64>() / inner.len() as f64;
+        // the encoder's noise rises much higher beyond the band
+        let twice = |w: &[f64]| w[0] - 2.0 * w[1] + w[2];
+        let noise = rounding.windows(3).map(|w| normal() + 60.0 * twice(w));
+        let noise: Vec<f64> = noise.collect();
         let of = |parts: usize| {
-            let pieces: Vec<Vec<Vec<f64>>> = noise
-                .chunks_exact(n / parts)
-                .map(|part| vec![part.to_vec()])
-                .collect();
-            let stretch = Stretch {
-                dt: 1e-3,
-                q: vec![vec![0.0; n / parts]],
-                t: vec![0.0; n / parts],
-                ..Stretch::default()
-            };
-            let stretches = vec![stretch; parts];
-            let stationary = vec![vec![false]; parts];
-            let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
-            floor(&pieces, &stretches, &filters, 10.0, false, &stationary).unwrap()[0]
+            let pieces = noise.chunks_exact(n / parts);
+            let pieces: Vec<_> = pieces.map(|part| (1e-3, part.to_vec())).collect();
+            floor_and_power(&pieces)
         };
-        let (whole, four) = (of(1), of(4));
+        let ([whole, wanted], [four, _]) = (of(1), of(4));
         assert!((whole / wanted - 1.0).abs() < 0.3, "{whole} {wanted}");
         assert!((four / whole - 1.0).abs() < 0.15, "{four} {whole}");
     }
 
     #[test]
     fn white_noise_is_its_own_floor_and_a_smooth_residual_adds_nothing() {
-        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(3);
-        let n = 40_000;
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
-        let noise: Vec<f64> = (0..n).map(|_| 0.3 * normal()).collect();
-        let stretch = Stretch {
-            dt: 1e-3,
-            q: vec![vec![0.0; n]],
-            t: vec![0.0; n],
-            ..Stretch::default()
-        };
-        let mut filtered = noise.clone();
-        parallel.smooth(&mut filtered).unwrap();
-        let seen = filtered[500..n - 500].iter().map(|x| x * x).sum::<f64>() / (n - 1000) as f64;
-        let smooth: Vec<f64> = noise
-            .iter()
-            .enumerate()
-            .map(|(k, x)| x + 2.0 * (0.02 * k as f64).sin())
-            .collect();
-        let stretches = [stretch];
-        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
-        for raw in [noise, smooth] {
-            let found = floor(
-                &[vec![raw]],
-                &stretches,
-                &filters,
-                10.0,
-                false,
-                &[vec![false]],
-            )
-            .unwrap()[0];
-            assert!((found / seen - 1.0).abs() < 0.1, "{found} {seen}");
+        let mut normal = normal(3);
+        let noise: Vec<f64> = (0..40_000).map(|_| 0.3 * normal()).collect();
+        let wave = |(k, x): (usize, &f64)| x + 2.0 * (0.02 * k as f64).sin();
+        let smooth = noise.iter().enumerate().map(wave).collect();
+        let [beside, _] = floor_and_power(&[(1e-3, smooth)]);
+        let [alone, power] = floor_and_power(&[(1e-3, noise)]);
+        for found in [alone, beside] {
+            assert!((found / power - 1.0).abs() < 0.1, "{found} {power}");
         }
     }
 
-    /// The same torque noise per sample, logged at 1000 and at 400 Hz: the filter lets more of the slow log through.
     #[test]
     fn logs_of_two_rates_have_the_floor_of_each_by_its_rows() {
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let mut normal = normal(5);
+        // the same noise per sample: the filter lets more of the slow log through
         let logs = [(1e-3, 60_000), (2.5e-3, 24_000)];
-        let stretches = logs.map(|(dt, n)| Stretch {
-            dt,
-            q: vec![vec![0.0; n]],
-            t: vec![0.0; n],
-            ..Stretch::default()
-        });
-        let noise = logs.map(|(_, n)| vec![(0..n).map(|_| normal()).collect::<Vec<f64>>()]);
-        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
-        let stationary = vec![vec![false]; 2];
-        let found = floor(&noise, &stretches, &filters, 10.0, false, &stationary).unwrap()[0];
-        let (mut squares, mut rows) = (0.0, 0.0);
-        for (stretch, noise) in stretches.iter().zip(&noise) {
-            let kept = filters.of(stretch).run(&[&noise[0]]).unwrap();
-            squares += kept[0].iter().map(|x| x * x).sum::<f64>();
-            rows += kept[0].len() as f64;
-        }
-        assert!((found / (squares / rows) - 1.0).abs() < 0.1);
+        let logs = logs.map(|(dt, n)| (dt, (0..n).map(|_| normal()).collect()));
+        let [found, power] = floor_and_power(&logs);
+        assert!((found / power - 1.0).abs() < 0.1, "{found} {power}");
     }
 }

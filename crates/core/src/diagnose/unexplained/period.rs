@@ -10,19 +10,14 @@ const SHORTEST: f64 = 0.02;
 /// Mean square of what a joint does not repeat over its variance: one per cent of its travel.
 const REPEATS: f64 = 1e-4;
 
-/// Samples of one period of a motion, `[joint][sample]`, that comes at least twice; none where nothing
-/// repeats. Joints that do not move have no say.
+/// Samples of one period of a motion, `[joint][sample]`, that comes at least twice; joints that do not move have no say.
 pub fn period(q: &[Vec<f64>]) -> Option<usize> {
     let samples = q.first()?.len();
     let step = samples.div_ceil(COARSE).max(1);
-    let moving: Vec<(&Vec<f64>, f64)> = q
-        .iter()
-        .map(|q| (q, variance(q)))
-        .filter(|(_, v)| *v > 0.0)
-        .collect();
+    let mut moving: Vec<(&Vec<f64>, f64)> = q.iter().map(|q| (q, variance(q))).collect();
     // a stationary joint's play is no motion
     let least = 1e-4 * moving.iter().map(|(_, v)| *v).fold(0.0, f64::max);
-    let moving: Vec<(&Vec<f64>, f64)> = moving.into_iter().filter(|(_, v)| *v > least).collect();
+    moving.retain(|(_, v)| *v > least);
     if moving.is_empty() {
         return None;
     }
@@ -43,15 +38,13 @@ pub fn period(q: &[Vec<f64>]) -> Option<usize> {
     let mut fine = valleys.map(|i| {
         let around = lags[i].saturating_sub(step)..=(lags[i] + step).min(samples / 2);
         let found = around.map(|lag| (off(lag, step), lag));
-        found
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .unwrap_or((f64::INFINITY, 0))
+        let least = found.min_by(|a, b| a.0.total_cmp(&b.0));
+        least.unwrap_or((f64::INFINITY, 0))
     });
     fine.find(|(off, _)| *off < REPEATS).map(|(_, lag)| lag)
 }
 
-/// Variance of what a signal does not repeat from period to period, over whole periods of `rows`; none
-/// with fewer than two of them.
+/// Variance of what a signal does not repeat over whole periods of `rows`; none with fewer than two of them.
 pub(crate) fn unrepeated(signal: &[f64], rows: Range<usize>, period: usize) -> Option<f64> {
     let signal = signal.get(rows)?;
     let count = signal.len().checked_div(period)?;
@@ -83,7 +76,7 @@ fn apart(x: &[f64], lag: usize, stride: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{RngExt, SeedableRng};
+    use crate::diagnose::unexplained::normal;
 
     fn motion(samples: usize, period: f64) -> Vec<Vec<f64>> {
         let wave = |n: f64, phase: f64| {
@@ -102,25 +95,19 @@ mod tests {
     fn the_period_of_a_series_is_found_to_a_sample_and_a_sweep_has_none() {
         for wanted in [2500.0, 5003.0] {
             let found = period(&motion(20_000, wanted));
-            assert!(
-                found.is_some_and(|p| p.abs_diff(wanted as usize) <= 1),
-                "{found:?}"
-            );
+            let found_it = found.is_some_and(|p| p.abs_diff(wanted as usize) <= 1);
+            assert!(found_it, "{found:?}");
         }
-        assert_eq!(
-            period(&motion(4000, 2500.0)),
-            None,
-            "it comes less than twice"
-        );
+        // it comes less than twice
+        assert_eq!(period(&motion(4000, 2500.0)), None);
         let sweep = (0..20_000).map(|k| (3e-8 * f64::from(k) * f64::from(k)).sin());
         assert_eq!(period(&[sweep.collect()]), None);
     }
 
     #[test]
     fn what_does_not_repeat_is_the_noise_and_what_repeats_does_not_count() {
-        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let n = 40_000;
-        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let mut normal = normal(5);
         let structure = &motion(n, 5000.0)[0];
         let signal: Vec<f64> = structure.iter().map(|s| 3.0 * s + 0.2 * normal()).collect();
         let found = unrepeated(&signal, 100..n - 100, 5000).unwrap();

@@ -47,13 +47,11 @@ pub(in crate::diagnose) fn values(
 
 /// Time since a joint last turned [s].
 fn since_reversal(stretch: &Stretch, j: usize) -> Vec<f64> {
-    let mut since = 0.0;
-    let mut before = 0.0;
+    let (mut since, mut before) = (0.0, 0.0);
     let step = |v: &f64| {
-        since = if v * before < 0.0 {
-            0.0
-        } else {
-            since + stretch.dt
+        since = match v * before < 0.0 {
+            true => 0.0,
+            false => since + stretch.dt,
         };
         if *v != 0.0 {
             before = *v;
