@@ -281,19 +281,6 @@ pub fn inverse_dynamics(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4], k: &Coefficien
     })
 }
 
-/// Acceleration M^-1 (torque - C v - G) for a torque from which friction is already taken off.
-///
-/// `None` where M is not positive definite, which no physical theta gives.
-pub fn forward_dynamics(
-    q: &[f64; 4],
-    v: &[f64; 4],
-    torque: &[f64; 4],
-    k: &Coefficients,
-) -> Option<[f64; 4]> {
-    let (m, bias) = inertia_and_bias(q, v, k);
-    solve_positive(&m, &std::array::from_fn(|i| torque[i] - bias[i]))
-}
-
 /// x with M x = b for a symmetric positive definite M, by L D L^T written out (no square roots,
 /// four divisions); `None` when M is not.
 #[inline]
@@ -321,19 +308,4 @@ pub(crate) fn solve_positive(m: &[[f64; 4]; 4], b: &[f64; 4]) -> Option<[f64; 4]
     let x2 = y2 * i2 - l23 * x3;
     let x1 = y1 * i1 - l12 * x2 - l13 * x3;
     Some([y0 * i0 - l1 * x1 - l2 * x2 - l3 * x3, x1, x2, x3])
-}
-
-/// [`inertia`] from theta_1..theta_12.
-pub fn mass_matrix(q: &[f64; 4], theta: &[f64; 12]) -> [[f64; 4]; 4] {
-    inertia(q, &Coefficients::from_theta12(theta))
-}
-
-/// [`coriolis`] from theta_1..theta_12.
-pub fn coriolis_matrix(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> [[f64; 4]; 4] {
-    coriolis(q, v, &Coefficients::from_theta12(theta))
-}
-
-/// [`gravity_torque`] from theta_1..theta_12.
-pub fn gravity(q: &[f64; 4], theta: &[f64; 12]) -> [f64; 4] {
-    gravity_torque(q, &Coefficients::from_theta12(theta))
 }

@@ -4,7 +4,9 @@
 use super::geometry::{D, D6, GRAVITY, L2, L4, L5, L6, L7};
 use super::links::PseudoInertia;
 use crate::robot::joint::JointKind;
+use crate::robot::standard::standard_of;
 use crate::robot::tree::{Coordinate, DependentCoordinate, Link, Sine, Tree, TreeError};
+use nalgebra::Matrix4;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Moving links 1..8; link 8 is at rest on link 7 and a frame of its own in Table 2.
@@ -139,20 +141,7 @@ impl PseudoInertia {
     /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of the frame [kg m^2], first moments [kg m] and
     /// mass [kg]: I = trace(J) 1 - J.
     pub fn standard(&self) -> [f64; 10] {
-        let j = &self.0;
-        let [xx, yy, zz] = [j[0][0], j[1][1], j[2][2]];
-        [
-            yy + zz,
-            -j[0][1],
-            -j[0][2],
-            xx + zz,
-            -j[1][2],
-            xx + yy,
-            j[0][3],
-            j[1][3],
-            j[2][3],
-            j[3][3],
-        ]
+        standard_of(&Matrix4::from(self.0))
     }
 }
 
