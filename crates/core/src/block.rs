@@ -63,10 +63,7 @@ impl Block {
             }
             kept += 1;
         }
-        self.t.truncate(kept);
-        self.q.truncate(kept * widths[0]);
-        self.tau.truncate(kept * widths[1]);
-        self.dq.truncate(kept * widths[2]);
+        self.truncate(kept);
     }
 
     /// Keeps the first rows alone.
