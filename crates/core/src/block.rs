@@ -22,12 +22,10 @@ impl Block {
     /// Rows that a reader puts into one block.
     pub const ROWS: usize = 4096;
 
-    /// Number of rows.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// Whether the block holds no row.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }

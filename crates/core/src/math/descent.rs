@@ -59,12 +59,15 @@ pub enum Trial<S> {
     NoStep,
 }
 
+/// What is made of a point and the damping.
+pub type DescentStep<'a, S, E> = dyn FnMut(&S, f64) -> Result<Trial<S>, E> + 'a;
+
 /// Descends from `start` by at most so many tried steps: `step` gets the present point and the damping. The point at the end, how it ended, and the steps that were tried.
 pub fn descend<S, E>(
     start: S,
     control: &StepControl,
     most: usize,
-    step: &mut dyn FnMut(&S, f64) -> Result<Trial<S>, E>,
+    step: &mut DescentStep<S, E>,
 ) -> Result<(S, Ending, usize), E> {
     let (mut at, mut damping) = (start, START);
     let [least, greatest] = control.range;

@@ -54,7 +54,6 @@ pub struct KeptRows {
     pub samples: usize,
     pub channels: usize,
     pub first: usize,
-    /// Number of outputs.
     pub kept: usize,
 }
 

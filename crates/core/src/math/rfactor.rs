@@ -16,8 +16,7 @@ use super::lanes::{LaneWork, Simd, widest};
 /// Rows folded at once: the block of 13 columns stays in a first-level cache of 32 KiB.
 const BLOCK_ROWS: usize = 256;
 
-/// A column whose squares sum to less counts as zero: the reflector would divide by what underflows.
-/// The tails of filters leave such numbers in columns that are structurally zero.
+/// A column whose squares sum to less counts as zero, as the tails of filters do: a reflector would divide by underflow.
 const TINY: f64 = 1e-280;
 
 /// R factor of a stacked matrix of `columns` columns, built up by rows.
@@ -57,7 +56,6 @@ impl RFactor {
         }
     }
 
-    /// Number of columns.
     pub fn columns(&self) -> usize {
         self.columns
     }
@@ -140,7 +138,6 @@ impl RFactor {
         }
     }
 
-    /// Forgets all rows.
     pub fn clear(&mut self) {
         self.triangle.fill(0.0);
         self.pending = 0;
@@ -158,8 +155,7 @@ impl RFactor {
     }
 }
 
-/// Annihilates k rows of the column-major `block` of n columns, which begin `stride` numbers apart, under the row-major
-/// upper `triangle`.
+/// Annihilates k rows of the column-major `block`, whose n columns begin `stride` apart, under the row-major `triangle`.
 fn reduce(size: [usize; 3], triangle: &mut [f64], block: &mut [f64]) {
     widest(Reduction {
         size,

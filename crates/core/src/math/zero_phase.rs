@@ -27,7 +27,6 @@ impl ZeroPhase {
         Self { sos, steady }
     }
 
-    /// The cascade.
     pub fn sos(&self) -> &Sos {
         &self.sos
     }

@@ -13,7 +13,6 @@ use super::{Form, Robot};
 /// How a robot's inertial parameters follow from links and drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StandardMap {
-    /// Names of the links.
     pub links: Vec<String>,
     /// Joints whose drives have an inertia of their own.
     pub drives: Vec<usize>,
@@ -23,7 +22,6 @@ pub struct StandardMap {
 }
 
 impl StandardMap {
-    /// Number of standard parameters.
     pub fn columns(&self) -> usize {
         self.matrix.ncols()
     }
@@ -56,13 +54,9 @@ impl Robot {
                     let mut links = [PseudoInertia([[0.0; 4]; 4]); linkage::LINKS];
                     // symmetric: rows are columns
                     links[column / STANDARD] = PseudoInertia(pseudo_inertia(&unit).into());
-                    for (x, of) in matrix
-                        .column_mut(column)
-                        .iter_mut()
-                        .zip(base_parameters(&links))
-                    {
-                        *x = of;
-                    }
+                    let base = base_parameters(&links);
+                    let rows = matrix.nrows();
+                    matrix.column_mut(column).copy_from_slice(&base[..rows]);
                 }
             }
             // one moving body: all that shows is its mass, or its moment about the axis

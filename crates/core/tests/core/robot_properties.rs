@@ -234,15 +234,9 @@ fn the_robot_names_joints_units_and_parameters() {
 }
 
 #[test]
-fn friction_parameters_carry_their_theta_numbers_and_units() {
-    use cft_ident_core::robot::cft::FRICTION;
-    for (n, parameter) in FRICTION.iter().enumerate() {
-        assert_eq!(parameter.theta, Some(13 + n as u32));
-        assert_eq!(parameter.name, format!("theta_{}", 13 + n));
-    }
-    // theta_17 is Bf1 of q1, theta_26 is w1 of q2.
-    assert_eq!(FRICTION[4].unit, "N");
-    assert!(FRICTION[4].meaning.starts_with("Bf1 of q1"));
-    assert_eq!(FRICTION[13].unit, "s/rad");
-    assert!(FRICTION[13].meaning.starts_with("w1 of q2"));
+fn friction_parameters_carry_their_theta_numbers() {
+    let robot = Robot::cft(Setup::default(), Structure::default());
+    // theta_17 is Bf1 of q1, theta_26 is w1 of q2
+    let numbers = [(0, 0), (0, 1), (1, 3), (3, 4)].map(|(j, k)| robot.friction_theta(j, k));
+    assert_eq!(numbers, [13, 17, 26, 32].map(Some));
 }

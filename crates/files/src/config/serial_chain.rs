@@ -10,7 +10,7 @@ use super::serial_section::{
     BASE, CouplingSection, FollowsSection, LinkSection, MOST_LINKS, SineSection,
 };
 use cft_ident_core::explain::Explain;
-use cft_ident_core::robot::tree::space::{Rotation, Vector};
+use cft_ident_core::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
 use cft_ident_core::robot::tree::{
     Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError,
 };
@@ -146,11 +146,9 @@ fn placement(i: usize, section: &LinkSection) -> Result<((Rotation, Vector), Vec
         let remedy = "give three numbers that are not all 0";
         return Err(Misfit::of_link(i, "axis", "has no length", remedy));
     }
-    let placed = Link::of_origin(
-        section.xyz.unwrap_or_default(),
-        section.rpy.unwrap_or_default(),
-    );
-    Ok((placed, axis.map(|x| x / length)))
+    let rotation = of_roll_pitch_yaw(&section.rpy.unwrap_or_default());
+    let origin = section.xyz.unwrap_or_default();
+    Ok(((rotation, origin), axis.map(|x| x / length)))
 }
 
 /// Names that a section gives and refers to.

@@ -25,7 +25,7 @@ mod parameters;
 
 pub use actuation::{ActuationLimits, Setup};
 pub use dynamics::Coefficients;
-pub use parameters::{EXTENDED, FRICTION, PRINTED, UNPRINTED};
+pub use parameters::{EXTENDED, PRINTED, UNPRINTED};
 
 /// Joint names in the order of all vectors.
 pub const JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];
