@@ -22,12 +22,10 @@ impl Block {
     /// Rows that a reader puts into one block.
     pub const ROWS: usize = 4096;
 
-    /// Number of rows.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// Whether the block holds no row.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
@@ -63,10 +61,7 @@ impl Block {
             }
             kept += 1;
         }
-        self.t.truncate(kept);
-        self.q.truncate(kept * widths[0]);
-        self.tau.truncate(kept * widths[1]);
-        self.dq.truncate(kept * widths[2]);
+        self.truncate(kept);
     }
 
     /// Keeps the first rows alone.

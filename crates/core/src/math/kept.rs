@@ -54,7 +54,6 @@ pub struct KeptRows {
     pub samples: usize,
     pub channels: usize,
     pub first: usize,
-    /// Number of outputs.
     pub kept: usize,
 }
 
@@ -208,10 +207,7 @@ impl KeptEvery {
             let found = sums_of(&work.rows[g * GROUP..], stride, &self.of_sample, (width, k));
             sums.copy_from_slice(&found);
         }
-        let s: [Lanes; MOST_STATES] = std::array::from_fn(|m| match m < states {
-            true => lanes(&work.state, m * stride + g * GROUP),
-            false => ZERO,
-        });
+        let s: [Lanes; MOST_STATES] = group(&work.state, (g, stride), states);
         for (s, weights) in s.iter().zip(&self.of_forward) {
             for (sum, w) in sums.iter_mut().zip(weights) {
                 add(sum, *w, s);
@@ -235,11 +231,7 @@ impl KeptEvery {
         extension.clear();
         extension
             .extend((1..=pad).map(|i| reflected(last, lanes(&work.rows, place(count - 1 - i)))));
-        let states = self.of_forward.len();
-        let mut s: [Lanes; MOST_STATES] = std::array::from_fn(|m| match m < states {
-            true => lanes(&work.state, m * stride + g * GROUP),
-            false => ZERO,
-        });
+        let mut s: [Lanes; MOST_STATES] = group(&work.state, (g, stride), self.of_forward.len());
         for k in 0..count {
             let y = self.step(&mut s, lanes(&work.rows, place(k)));
             put(&mut work.rows, place(k), &y);
@@ -261,11 +253,8 @@ impl KeptEvery {
     /// Back over a stretch: z takes the place of its part.
     #[inline(always)]
     fn back(&self, work: &mut KeptWork, (g, stride): (usize, usize), at: usize) {
-        let states = self.of_backward.len();
-        let mut sums: [Lanes; MOST_STATES + 1] = std::array::from_fn(|m| match m <= states {
-            true => lanes(&work.parts, at + m * stride + g * GROUP),
-            false => ZERO,
-        });
+        let count = self.of_backward.len() + 1;
+        let mut sums: [Lanes; MOST_STATES + 1] = group(&work.parts[at..], (g, stride), count);
         for (m, weights) in self.of_backward.iter().enumerate() {
             let r = lanes(&work.state, m * stride + g * GROUP);
             for (sum, w) in sums.iter_mut().zip(weights) {
@@ -419,6 +408,15 @@ fn lanes(of: &[f64], at: usize) -> Lanes {
     let mut out = ZERO;
     out.copy_from_slice(&of[at..at + GROUP]);
     out
+}
+
+/// A group's channels of each of `count` rows, and zeros for those that are not there.
+#[inline(always)]
+fn group<const N: usize>(of: &[f64], (g, stride): (usize, usize), count: usize) -> [Lanes; N] {
+    std::array::from_fn(|m| match m < count {
+        true => lanes(of, m * stride + g * GROUP),
+        false => ZERO,
+    })
 }
 
 #[inline(always)]

@@ -29,13 +29,10 @@ pub enum SearchEnding {
 /// The best point that a search evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
-    /// The point.
     pub x: Vec<f64>,
-    /// The function's value there.
     pub value: f64,
     /// Evaluations of the function (and its gradient) that were spent.
     pub evaluations: u64,
-    /// How the search ended.
     pub ending: SearchEnding,
 }
 
@@ -54,7 +51,7 @@ pub fn nelder_mead(
 ) -> Minimum {
     let mut values = |x: &[f64], _: &mut [f64]| f(x);
     let mut search = Search::new(&mut values, start, max_evaluations);
-    search.refuses = Refusal::ByBestValue;
+    search.levels_out = true;
     if let Some(ending) = search.begin() {
         return search.end(ending);
     }
@@ -125,27 +122,19 @@ pub fn lbfgs(
     }
 }
 
-/// The answer to `argmin` when it asks beyond the limit.
-#[derive(Clone, Copy, PartialEq)]
-enum Refusal {
-    Error,
-    /// The simplex method unwraps errors; with the best value so far it levels out and ends.
-    ByBestValue,
-}
-
 /// The function with its budget and the best point so far.
 struct Search<'a> {
     f: &'a mut dyn FnMut(&[f64], &mut [f64]) -> f64,
     evaluations: u64,
     limit: u64,
-    refuses: Refusal,
+    /// Beyond the limit the simplex method, which unwraps errors, gets the best value so far: it levels out and ends.
+    levels_out: bool,
     /// Whether an evaluation beyond the limit was asked for.
     refused: bool,
     /// Factor from the function to what `argmin` sees.
     scale: f64,
     best: (Vec<f64>, f64),
-    /// Point of the latest evaluation, with its gradient: `argmin` asks for value and gradient of
-    /// one point apart.
+    /// Point of the latest evaluation: `argmin` asks for its value and gradient apart.
     latest: (Vec<f64>, f64),
     gradient: Vec<f64>,
 }
@@ -156,7 +145,7 @@ impl<'a> Search<'a> {
             f,
             evaluations: 0,
             limit,
-            refuses: Refusal::Error,
+            levels_out: false,
             refused: false,
             scale: 1.0,
             best: (start.to_vec(), f64::INFINITY),
@@ -228,7 +217,7 @@ impl CostFunction for Problem<'_, '_> {
     fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
         let mut search = self.0.borrow_mut();
         let value = match search.at(x) {
-            Err(_) if search.refuses == Refusal::ByBestValue => Ok(search.best.1),
+            Err(_) if search.levels_out => Ok(search.best.1),
             value => value,
         };
         Ok(value? * search.scale)

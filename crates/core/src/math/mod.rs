@@ -1,23 +1,5 @@
 //! Small general mathematics: the mergeable R factor, rank and singular values, recursive filters,
 //! minimisation.
-//!
-//! | file | what | outside crate behind it |
-//! |---|---|---|
-//! | [`rfactor`] | triangular factor of a stacked matrix that never exists as a whole | none |
-//! | [`rank`] | singular values, rank, condition number | `faer` |
-//! | `rank_revealing` | inverse of a normal matrix with redundant columns | none |
-//! | `jacobi` | one-sided Jacobi singular values: fallback and test oracle | none |
-//! | [`covariance`] | the information that a covariance holds | none |
-//! | `bootstrap` | 95 % intervals of statistics of pieces of data | none |
-//! | [`gram`] | sums of products of rows | none |
-//! | [`cholesky`] | normal equations in place | none |
-//! | `lanes` | loops compiled for the widest vectors of the processor | `pulp` |
-//! | [`descent`] | step control of the Gauss-Newton loops | none |
-//! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
-//! | [`formula`] | formulas of users, evaluated or as text of a program | `exmex` |
-//! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
-//! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
-//! | [`kept`] | the same where few outputs are kept | none |
 
 pub mod bootstrap;
 pub mod causal;
@@ -46,16 +28,13 @@ use thiserror::Error;
 /// What the room `math` cannot compute, with the numbers that offend.
 #[derive(Debug, Clone, PartialEq, Explain, Error)]
 pub enum MathError {
-    /// An entry is NaN or infinite.
+    /// An entry is NaN or infinite; rows and columns count from 0.
     #[explain(
         "matrix entry ({row}, {column}) is {value}: find the row of data that is not finite and leave it out"
     )]
     NotFinite {
-        /// Row, counted from 0.
         row: usize,
-        /// Column, counted from 0.
         column: usize,
-        /// The entry.
         value: f64,
     },
 
@@ -64,9 +43,7 @@ pub enum MathError {
         "singular values of a {rows} x {columns} matrix have square sum {found:e}, its entries {expected:e}: scale the columns to norm 1 first"
     )]
     NoConvergence {
-        /// Rows of the matrix.
         rows: usize,
-        /// Columns of the matrix.
         columns: usize,
         /// Sum of the squared singular values.
         found: f64,
@@ -93,33 +70,21 @@ pub enum MathError {
         ),
         "lower the cut-off, or correct the times of the log if its rate is another"
     )]
-    Cutoff {
-        /// Cut-off frequency (Hz).
-        cutoff_hz: f64,
-        /// Sampling rate (Hz).
-        rate_hz: f64,
-    },
+    Cutoff { cutoff_hz: f64, rate_hz: f64 },
 
     /// A filter order outside 1..=16.
     #[explain("a filter of order {order} is not offered: choose 1 to 16")]
-    FilterOrder {
-        /// The order asked for.
-        order: usize,
-    },
+    FilterOrder { order: usize },
 
     /// A pass-band ripple that is not a positive number of decibels.
     #[explain("a pass-band ripple of {ripple_db} dB is not possible: choose more than 0, 0.05 say")]
-    Ripple {
-        /// Ripple (dB).
-        ripple_db: f64,
-    },
+    Ripple { ripple_db: f64 },
 
     /// A signal shorter than the extension at its ends.
     #[explain(
         "{samples} samples are too few for a zero-phase filter that extends each end by {needed}: give a longer record or a filter of lower order"
     )]
     TooShort {
-        /// Samples of the signal.
         samples: usize,
         /// Samples of the extension; the signal needs one more.
         needed: usize,

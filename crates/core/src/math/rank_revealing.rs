@@ -15,7 +15,6 @@ pub struct RankRevealingInverse {
 const LEAST_OWN: f64 = 1e-9;
 
 impl RankRevealingInverse {
-    /// Inverts.
     pub fn of(normal: &DMatrix<f64>) -> Self {
         let u = normal.nrows();
         let scale: Vec<f64> = (0..u).map(|i| normal[(i, i)].max(0.0).sqrt()).collect();
@@ -56,17 +55,14 @@ impl RankRevealingInverse {
         self.redundant[i]
     }
 
-    /// Inverse times a vector.
     pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         &self.matrix * b
     }
 
-    /// Inverse times a matrix.
     pub fn times(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
         &self.matrix * b
     }
 
-    /// The inverse itself.
     pub fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }

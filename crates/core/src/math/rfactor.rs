@@ -16,8 +16,7 @@ use super::lanes::{LaneWork, Simd, widest};
 /// Rows folded at once: the block of 13 columns stays in a first-level cache of 32 KiB.
 const BLOCK_ROWS: usize = 256;
 
-/// A column whose squares sum to less counts as zero: the reflector would divide by what underflows.
-/// The tails of filters leave such numbers in columns that are structurally zero.
+/// A column whose squares sum to less counts as zero, as the tails of filters do: a reflector would divide by underflow.
 const TINY: f64 = 1e-280;
 
 /// R factor of a stacked matrix of `columns` columns, built up by rows.
@@ -57,7 +56,6 @@ impl RFactor {
         }
     }
 
-    /// Number of columns.
     pub fn columns(&self) -> usize {
         self.columns
     }
@@ -140,7 +138,6 @@ impl RFactor {
         }
     }
 
-    /// Forgets all rows.
     pub fn clear(&mut self) {
         self.triangle.fill(0.0);
         self.pending = 0;
@@ -158,8 +155,7 @@ impl RFactor {
     }
 }
 
-/// Annihilates k rows of the column-major `block` of n columns, which begin `stride` numbers apart, under the row-major
-/// upper `triangle`.
+/// Annihilates k rows of the column-major `block`, whose n columns begin `stride` apart, under the row-major `triangle`.
 fn reduce(size: [usize; 3], triangle: &mut [f64], block: &mut [f64]) {
     widest(Reduction {
         size,
@@ -180,55 +176,55 @@ impl LaneWork for Reduction<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        reflect_all(self.size, self.triangle, self.block);
-    }
-}
+        let Self {
+            size: [n, k, stride],
+            triangle,
+            block,
+        } = self;
+        for j in 0..n {
+            let (left, right) = block.split_at_mut((j + 1) * stride);
+            let u = &left[j * stride..j * stride + k];
+            let below = dot(u, u);
+            if below < TINY {
+                continue;
+            }
+            let diagonal = triangle[j * n + j];
+            let norm = (diagonal * diagonal + below).sqrt();
+            // The reflector is I - w w' / h with w = [u0; u]; the sign avoids cancellation in u0.
+            let (u0, r) = if diagonal > 0.0 {
+                (diagonal + norm, -norm)
+            } else {
+                (diagonal - norm, norm)
+            };
+            let inverse_h = 1.0 / (norm * (norm + diagonal.abs()));
+            triangle[j * n + j] = r;
 
-#[inline(always)]
-fn reflect_all([n, k, stride]: [usize; 3], triangle: &mut [f64], block: &mut [f64]) {
-    for j in 0..n {
-        let (left, right) = block.split_at_mut((j + 1) * stride);
-        let u = &left[j * stride..j * stride + k];
-        let below = dot(u, u);
-        if below < TINY {
-            continue;
-        }
-        let diagonal = triangle[j * n + j];
-        let norm = (diagonal * diagonal + below).sqrt();
-        // The reflector is I - w w' / h with w = [u0; u]; the sign avoids cancellation in u0.
-        let (u0, r) = if diagonal > 0.0 {
-            (diagonal + norm, -norm)
-        } else {
-            (diagonal - norm, norm)
-        };
-        let inverse_h = 1.0 / (norm * (norm + diagonal.abs()));
-        triangle[j * n + j] = r;
-
-        let row = &mut triangle[j * n + j + 1..(j + 1) * n];
-        let mut quads = right.chunks_exact_mut(4 * stride);
-        let mut entries = row.chunks_exact_mut(4);
-        for (columns, r) in (&mut quads).zip(&mut entries) {
-            let (a, rest) = columns.split_at_mut(stride);
-            let (b, rest) = rest.split_at_mut(stride);
-            let (c, d) = rest.split_at_mut(stride);
-            reflect_four(
-                u,
-                [&mut a[..k], &mut b[..k], &mut c[..k], &mut d[..k]],
-                r,
-                u0,
-                inverse_h,
-            );
-        }
-        for (column, r) in quads
-            .into_remainder()
-            .chunks_exact_mut(stride)
-            .zip(entries.into_remainder())
-        {
-            let column = &mut column[..k];
-            let s = (u0 * *r + dot(u, column)) * inverse_h;
-            *r -= s * u0;
-            for (x, y) in column.iter_mut().zip(u) {
-                *x -= s * y;
+            let row = &mut triangle[j * n + j + 1..(j + 1) * n];
+            let mut quads = right.chunks_exact_mut(4 * stride);
+            let mut entries = row.chunks_exact_mut(4);
+            for (columns, r) in (&mut quads).zip(&mut entries) {
+                let (a, rest) = columns.split_at_mut(stride);
+                let (b, rest) = rest.split_at_mut(stride);
+                let (c, d) = rest.split_at_mut(stride);
+                reflect_four(
+                    u,
+                    [&mut a[..k], &mut b[..k], &mut c[..k], &mut d[..k]],
+                    r,
+                    u0,
+                    inverse_h,
+                );
+            }
+            for (column, r) in quads
+                .into_remainder()
+                .chunks_exact_mut(stride)
+                .zip(entries.into_remainder())
+            {
+                let column = &mut column[..k];
+                let s = (u0 * *r + dot(u, column)) * inverse_h;
+                *r -= s * u0;
+                for (x, y) in column.iter_mut().zip(u) {
+                    *x -= s * y;
+                }
             }
         }
     }
@@ -292,7 +288,6 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DVector;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -408,35 +403,5 @@ mod tests {
                 found: 4
             })
         );
-    }
-
-    #[test]
-    fn a_merged_factor_solves_the_least_squares_problem() {
-        let theta = DVector::from_vec(vec![3.0, -0.02, 150.0, 1e-3]);
-        let scales = [1.0, 50.0, 0.01, 1000.0];
-        let mut parts = vec![RFactor::new(5); 7];
-        let mut rng = ChaCha8Rng::seed_from_u64(11);
-        for k in 0..9000 {
-            let mut row = [0.0; 5];
-            for j in 0..4 {
-                row[j] = scales[j] * rng.random_range(-1.0..1.0);
-                row[4] += row[j] * theta[j];
-            }
-            parts[k % 7].fold(&row);
-        }
-        let mut total = RFactor::new(5);
-        for part in &parts {
-            total.merge(part).expect("same width");
-        }
-        assert_eq!(total.rows(), 9000);
-        let r = total.r();
-        let found = r
-            .view((0, 0), (4, 4))
-            .solve_upper_triangular(&r.view((0, 4), (4, 1)))
-            .expect("full rank");
-        for j in 0..4 {
-            assert!((found[j] / theta[j] - 1.0).abs() < 1e-11, "{j}");
-        }
-        assert!(r[(4, 4)].abs() < 1e-9, "no residual: {}", r[(4, 4)]);
     }
 }

@@ -53,7 +53,6 @@ pub fn steady(sections: &[Section]) -> Vec<[f64; 2]> {
     sections.iter().map(of).collect()
 }
 
-/// A cascade of sections.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sos {
     sections: Vec<Section>,
@@ -148,8 +147,7 @@ impl Sos {
             .product()
     }
 
-    /// Bilinear transform of the prototype (cut-off 1 rad/s) whose poles lie on an ellipse with the
-    /// given semi-axes along the real and imaginary axis, scaled to `warped` = tan(pi f / fs).
+    /// Bilinear transform of poles on an ellipse (semi-axes real, imaginary), scaled to `warped` = tan(pi f / fs).
     fn from_prototype(order: usize, warped: f64, axes: [f64; 2], gain: f64) -> Self {
         let mut sections: Vec<Section> = (0..order.div_ceil(2))
             .map(|k| {

@@ -5,7 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::MotionError;
-use super::stretch::{Parallel, Stretch};
+use super::settings::Parallel;
+use super::stretch::Stretch;
 
 impl Parallel {
     /// The stretch with white noise of its own positions' level, times `sign`, added to them. In the mean over both
@@ -40,13 +41,11 @@ impl Parallel {
         Ok(noisy)
     }
 
-    /// Samples over which a difference of a joint's motion shows most of what is as fast as the position filter lets through, and next
-    /// to nothing of motion.
+    /// Samples over which a difference shows most of what the position filter lets through, and next to nothing of motion.
     pub(super) fn rough_lag(&self, joint: usize, dt: f64) -> usize {
         let cutoff = self.position.as_ref().map(|f| f.cutoff_hz(joint));
-        cutoff
-            .map_or(1, |hz| (1.0 / (3.0 * hz * dt)) as usize)
-            .max(1)
+        let lag = cutoff.map_or(1, |hz| (1.0 / (3.0 * hz * dt)) as usize);
+        lag.max(1)
     }
 
     /// What white noise of a joint's positions, even over an interval of 1, becomes: position, velocity, acceleration.
@@ -56,16 +55,22 @@ impl Parallel {
         stretch: &Stretch,
         chance: &mut ChaCha8Rng,
     ) -> Result<[Vec<f64>; 3], MotionError> {
-        let mut q: Vec<f64> = stretch
-            .t
-            .iter()
-            .map(|_| chance.random::<f64>() - 0.5)
-            .collect();
+        let noise = stretch.t.iter().map(|_| chance.random::<f64>() - 0.5);
+        self.motion_of(joint, noise.collect(), stretch.dt)
+    }
+
+    /// Position, velocity and acceleration of a joint by its unfiltered positions.
+    pub(super) fn motion_of(
+        &self,
+        joint: usize,
+        mut q: Vec<f64>,
+        dt: f64,
+    ) -> Result<[Vec<f64>; 3], MotionError> {
         if let Some(filter) = &self.position {
             filter.of(joint).run(&mut q, 1)?;
         }
         let (mut v, mut a) = (vec![0.0; q.len()], vec![0.0; q.len()]);
-        self.differences.apply(&q, 1, stretch.dt, &mut v, &mut a);
+        self.differences.apply(&q, 1, dt, &mut v, &mut a);
         Ok([q, v, a])
     }
 }
@@ -75,8 +80,7 @@ const BLOCK: usize = 12;
 /// Lags that a fourth difference spans.
 const SPAN: usize = 4;
 
-/// Median over blocks of the rms of the fourth difference over a lag, to which motion gives next to nothing, and a
-/// jerk at a reversal only a few of the blocks. 0 for less than a block.
+/// Median over blocks of the rms of the fourth difference over a lag, which motion hardly moves; 0 for less than a block.
 pub(super) fn middle_roughness(x: &[f64], lag: usize) -> f64 {
     let reach = SPAN * lag;
     let rough = |k: usize| {
@@ -99,8 +103,7 @@ mod tests {
     use super::*;
     use crate::motion::FilterSettings;
 
-    /// A slow motion read by an encoder of a known count, sampled slowly and fast, filtered wide and narrow: the
-    /// noise that comes to it has the variance of the rounding, and the two signs are opposite.
+    /// A slow motion, read by encoders of known counts at several rates and through filters of several widths.
     #[test]
     fn the_noise_that_comes_to_a_stretch_is_that_of_its_encoder() {
         for (rate, hz, count) in [

@@ -55,11 +55,9 @@ impl CausalFilter {
         let filter = PositionFilter::design(settings.q_order, cutoffs, rate)?;
         let sos = filter.map(|f| f.narrowest().sos().clone());
         let late = sos.as_ref().map_or(0.0, delay_samples) + LATE_SAMPLES as f64;
+        let settle = |sos: &Sos| sos.settle_samples(SETTLING_TIME_CONSTANTS);
         Ok(Self {
-            settle: sos
-                .as_ref()
-                .map_or(0, |sos| sos.settle_samples(SETTLING_TIME_CONSTANTS))
-                + POINTS,
+            settle: sos.as_ref().map_or(0, settle) + POINTS,
             delay_s: late * dt,
             sos,
         })
@@ -149,16 +147,12 @@ impl CausalMotion {
 
 impl Chain {
     fn design(joints: usize, settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
-        let CausalFilter {
-            sos,
-            settle,
-            delay_s,
-        } = CausalFilter::design(settings, dt)?;
+        let of = CausalFilter::design(settings, dt)?;
         Ok(Self {
             dt,
-            delay_s,
-            settle,
-            filter: Causal::new(sos.as_ref(), 2 * joints),
+            delay_s: of.delay_s,
+            settle: of.settle,
+            filter: Causal::new(of.sos.as_ref(), 2 * joints),
             ring: vec![0.0; 2 * joints * POINTS],
             at: 0,
             count: 0,

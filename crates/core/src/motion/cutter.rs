@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::settings::FilterChain;
+use super::settings::Parallel;
 use super::time_base::Event;
 use super::window::FilterWindow;
 
@@ -12,7 +12,6 @@ const LISTED: usize = 20;
 /// Stretches of a log that were too short to filter.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Skipped {
-    /// How many.
     pub segments: usize,
     /// Their samples together.
     pub samples: u64,
@@ -22,7 +21,7 @@ pub struct Skipped {
 
 /// Cuts the segments of a log into windows.
 pub(super) struct WindowCutter {
-    pub chain: Arc<FilterChain>,
+    pub chain: Arc<Parallel>,
     joints: usize,
     /// Samples of the segment in work, from index `first` of the segment on.
     t: Vec<f64>,
@@ -42,7 +41,7 @@ pub(super) struct WindowCutter {
 }
 
 impl WindowCutter {
-    pub fn new(chain: FilterChain, joints: usize) -> Self {
+    pub fn new(chain: Parallel, joints: usize) -> Self {
         Self {
             chain: Arc::new(chain),
             joints,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::MotionError;
 use super::position_filter::PositionFilter;
 use super::settings::{FilterSettings, edge};
-use super::time_base::{Event, SampleClock, TimeBase, lagrange};
+use super::time_base::{Event, SampleClock, TimeBase, interpolate};
 use super::window::step_of;
 use crate::block::Block;
 
@@ -138,13 +138,7 @@ fn at_rows(t: &[f64], grid: &[f64], x: &[f64], joints: usize) -> Vec<f64> {
         }
         let first = above.saturating_sub(2).min(grid.len().saturating_sub(4));
         let nodes = &grid[first..grid.len().min(first + 4)];
-        for m in 0..nodes.len() {
-            let weight = lagrange(nodes, m, time);
-            let at = (first + m) * joints;
-            for (sum, value) in row.iter_mut().zip(&x[at..at + joints]) {
-                *sum += weight * value;
-            }
-        }
+        interpolate(nodes, &x[first * joints..], time, row);
     }
     out
 }

@@ -15,21 +15,6 @@
 //! Nothing is differentiated or filtered across a gap. Logs of any length pass through in windows
 //! that overlap by so many time constants that the result is that of filtering whole segments, to
 //! 1e-9; the number of threads changes no bit.
-//!
-//! | file | what |
-//! |---|---|
-//! | `settings` | what the user chooses |
-//! | `time_base` | uniform steps, gaps, torque by a zero-order hold |
-//! | `differences` | v and a from q |
-//! | `causal` | the same sample by sample, from rows as they arrive |
-//! | `position_filter` | what positions come through, of all joints or of each |
-//! | [`position_cutoff`] | what a position cut-off costs the friction at reversals |
-//! | `run` | the windows of a streamed log |
-//! | `zero_order_hold` | motor forces between two samples, where a linkage turns them |
-//! | `rest` | what rows weigh where a joint stands or turns |
-//! | `full_rate` | smooth q, v, a at every sample of one short record |
-//! | `stretch` | whole stretches in memory, for searches |
-//! | `added_noise` | what noise of positions becomes, and how rough a signal is |
 
 mod added_noise;
 mod causal;
@@ -50,9 +35,9 @@ pub use causal::{CausalFilter, CausalMotion, CausalSample};
 pub use cutter::Skipped;
 pub use full_rate::{Smooth, full_rate, segments};
 pub use run::{RunError, Summary, run};
-pub use settings::{Differences, FilterSettings, ParallelFilter, TorqueTiming};
+pub use settings::{Differences, FilterSettings, Parallel, ParallelFilter, TorqueTiming};
 pub(crate) use stretch::alike;
-pub use stretch::{Parallel, ParallelFilters, Stretch, stretches};
+pub use stretch::{ParallelFilters, Stretch, stretches};
 pub use zero_order_hold::ZeroOrderHold;
 
 use crate::explain::Explain;
@@ -111,10 +96,7 @@ pub enum MotionError {
 
     /// Fewer samples than a sampling step needs.
     #[explain("the log holds {samples} samples: two are the least that has a sampling step")]
-    TooFewSamples {
-        /// Samples of the log.
-        samples: u64,
-    },
+    TooFewSamples { samples: u64 },
 
     /// A block of another width than the robot.
     #[explain(
@@ -123,31 +105,20 @@ pub enum MotionError {
     Shape {
         /// `q` or `tau`.
         channel: &'static str,
-        /// Values in the block.
         values: usize,
-        /// Rows of the block.
         rows: usize,
-        /// Joints expected.
         joints: usize,
     },
 
-    /// Time stands still or runs backwards.
+    /// Time stands still or runs backwards [s].
     #[explain("time goes from {before} s to {after} s: sort the log and remove repeated rows")]
-    Time {
-        /// Time of a row (s).
-        before: f64,
-        /// Time of the next row (s).
-        after: f64,
-    },
+    Time { before: f64, after: f64 },
 
     /// A setting out of its range.
     #[explain("{name} = {value} is not possible: {remedy}")]
     Setting {
-        /// Name of the setting.
         name: &'static str,
-        /// Its value.
         value: f64,
-        /// What is possible.
         remedy: &'static str,
     },
 
@@ -157,33 +128,18 @@ pub enum MotionError {
         "bridge gaps that are short beside the motion by `gap_factor = 8` in [filter], raise `cutoff_hz`, or record longer"
     )]
     NoSegment {
-        /// Stretches between gaps.
         segments: usize,
-        /// Samples of the longest.
         longest: usize,
-        /// Samples that the filters need.
         needed: usize,
     },
 
-    /// A record that must be of one piece has a gap.
+    /// A record that must be of one piece has a gap [s].
     #[explain("no row between {from} s and {to} s: smooth the stretches before and after it apart")]
-    Gap {
-        /// Last time before the gap (s).
-        from: f64,
-        /// First time after it (s).
-        to: f64,
-    },
+    Gap { from: f64, to: f64 },
 
-    /// A computed channel is NaN or infinite.
+    /// A computed channel, counted from 0, is NaN or infinite at a time [s].
     #[explain(
         "channel {channel} is {value} at t = {t} s: the position there is outside of what the model covers"
     )]
-    NotFinite {
-        /// Channel, counted from 0.
-        channel: usize,
-        /// Its value.
-        value: f64,
-        /// Time (s).
-        t: f64,
-    },
+    NotFinite { channel: usize, value: f64, t: f64 },
 }

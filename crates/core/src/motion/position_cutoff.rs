@@ -18,12 +18,11 @@ use serde::{Deserialize, Serialize};
 
 use super::added_noise::middle_roughness;
 use super::position_filter::HIGHEST_SHARE;
-use super::settings::FilterSettings;
-use super::stretch::{Parallel, Stretch};
+use super::settings::{FilterSettings, Parallel};
+use super::stretch::Stretch;
 use super::{MotionError, rest};
 
-/// Cut-offs that are tried, over that of the parallel filter. Below the first, the filter takes from the band that
-/// is kept.
+/// Cut-offs that are tried, over that of the parallel filter; a lower one would take from the band that is kept.
 const TRIED: [f64; 7] = [4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0];
 /// Cut-off of the filter by which the smear is seen, over the one that is tried.
 const NARROWER: f64 = 0.6;
@@ -109,11 +108,7 @@ impl<'a> CutoffTrial<'a> {
     /// [`MotionError`] for a cut-off that its sampling rate does not carry.
     pub fn add(&mut self, stretch: &Stretch) -> Result<(), MotionError> {
         let design = |cutoff: f64| {
-            let settings = FilterSettings {
-                q_cutoff_hz: Some(cutoff),
-                joint_q_cutoffs_hz: Vec::new(),
-                ..self.settings.clone()
-            };
+            let settings = self.settings.with_one_position_filter(cutoff);
             Parallel::design(&settings, stretch.dt)
         };
         let pair = |hz: &f64| Ok([design(*hz)?, design(NARROWER * hz)?]);
@@ -122,7 +117,9 @@ impl<'a> CutoffTrial<'a> {
         let edge = designs.iter().flatten().filter_map(Parallel::unsettled);
         let edge = edge.max().unwrap_or(0);
         let kept = stretch.len().saturating_sub(2 * edge);
-        if designs.iter().flatten().any(|d| kept < d.shortest()) {
+        // the edges of the stretch are left off already
+        let shortest = |d: &Parallel| d.shortest - 2 * d.edge;
+        if designs.iter().flatten().any(|d| kept < shortest(d)) {
             return Ok(());
         }
         let (friction, rest_speed) = (self.friction, self.rest_speed);
@@ -193,14 +190,8 @@ impl OneJoint<'_> {
 
     /// Velocity and acceleration through the position filter of a design.
     fn smoothed(&self, design: &Parallel) -> Result<[Vec<f64>; 2], MotionError> {
-        let mut q = self.stretch.q[self.joint].clone();
-        if let Some(filter) = &design.position {
-            filter.of(self.joint).run(&mut q, 1)?;
-        }
-        let (mut v, mut a) = (vec![0.0; q.len()], vec![0.0; q.len()]);
-        design
-            .differences
-            .apply(&q, 1, self.stretch.dt, &mut v, &mut a);
+        let q = self.stretch.q[self.joint].clone();
+        let [_, v, a] = design.motion_of(self.joint, q, self.stretch.dt)?;
         Ok([v, a])
     }
 
@@ -255,20 +246,11 @@ impl Parallel {
     /// Samples at a stretch's end in which the position filter has not settled.
     fn unsettled(&self) -> Option<usize> {
         let filter = self.position.as_ref()?;
-        Some(
-            filter
-                .narrowest()
-                .sos()
-                .settle_samples(SETTLING_TIME_CONSTANTS)
-                + self.differences.reach(),
-        )
-    }
-
-    /// Samples of the shortest stretch that gives a row.
-    fn shortest(&self) -> usize {
-        let filter = self.position.as_ref();
-        let position = filter.map_or(0, |f| f.narrowest().sos().pad_samples());
-        2 * self.trim + 3 * position.max(self.pad_samples()) + 3
+        let settled = filter
+            .narrowest()
+            .sos()
+            .settle_samples(SETTLING_TIME_CONSTANTS);
+        Some(settled + self.differences.reach())
     }
 }
 
@@ -280,8 +262,7 @@ mod tests {
     const COUNT: f64 = 2e-5;
     const SLOPE: f64 = 60.0;
 
-    /// A joint that swings to and fro in `period` seconds, its acceleration a tenth less while it speeds up than
-    /// while it slows down, for friction turns; and the same read by an encoder.
+    /// A joint that swings to and fro in `period` seconds, slower to speed up than to slow down; and its encoder.
     fn swing(period: f64, amplitude: f64) -> [Vec<f64>; 3] {
         let samples = 40_000;
         let w = std::f64::consts::TAU / period;

@@ -54,8 +54,7 @@ pub fn weigh(
     }
 }
 
-/// Samples over which a position filter with this cut-off \[Hz\] answers to one of them, where positions are differenced
-/// over `differences` to each side.
+/// Samples over which a position filter and differences over so many to each side answer to one sample.
 pub(super) fn response(cutoff_hz: Option<f64>, dt: f64, differences: usize) -> usize {
     let of_filter = cutoff_hz.map_or(0, |hz| (1.0 / (hz * dt)).round() as usize);
     of_filter.max(differences)

@@ -8,7 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::cutter::{Skipped, WindowCutter};
-use super::settings::{FilterChain, FilterSettings};
+use super::settings::{FilterSettings, Parallel};
 use super::time_base::TimeBase;
 use super::window::FilterWindow;
 use super::{FilteredRow, MotionError, MotionSample};
@@ -17,7 +17,6 @@ use crate::block::Block;
 /// Why a log could not be run through: its source failed, or it cannot be turned into rows.
 #[derive(Debug, Error)]
 pub enum RunError<E> {
-    /// The source's own error.
     #[error("{0}")]
     Source(E),
     /// The log cannot be turned into rows.
@@ -173,7 +172,7 @@ impl<'a> Intake<'a> {
             let cutter = match &mut self.cutter {
                 Some(cutter) => cutter,
                 none => none.insert(WindowCutter::new(
-                    FilterChain::design(self.settings, clock.dt)?,
+                    Parallel::design(self.settings, clock.dt)?,
                     self.joints,
                 )),
             };

@@ -7,8 +7,7 @@ use crate::math::kept::KeptEvery;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 
-/// Time constants of the position filter by which windows overlap. More than for the parallel
-/// filter, as differentiation makes up to 1 / step^2 of what is left.
+/// Time constants of the position filter by which windows overlap: derivatives take up to 1 / step^2 of what is left.
 const POSITION_OVERLAP: f64 = 45.0;
 /// Time constants of the parallel filter by which windows overlap.
 const PARALLEL_OVERLAP: f64 = 28.0;
@@ -117,33 +116,34 @@ pub enum TorqueTiming {
     ZeroOrderHold,
 }
 
-/// The filters and lengths for one sampling step.
+/// The declared filters, the parallel one among them, and lengths for one sampling step.
 #[derive(Debug, Clone)]
-pub(super) struct FilterChain {
+pub struct Parallel {
     /// Sampling step (s).
-    pub dt: f64,
-    pub differences: Differences,
-    pub position: Option<PositionFilter>,
-    pub parallel: ZeroPhase,
+    pub(super) dt: f64,
+    pub(super) differences: Differences,
+    pub(super) position: Option<PositionFilter>,
+    pub(super) parallel: ZeroPhase,
     /// The same, of which the rows are kept.
-    pub kept: KeptEvery,
+    pub(super) kept: KeptEvery,
+    /// Every how many samples a row is kept.
     pub decimation: usize,
     /// Samples dropped at a segment's end before the parallel filter.
-    pub edge: usize,
-    /// Samples dropped at a segment's end after the parallel filter.
+    pub(super) edge: usize,
+    /// Samples dropped at each end of a segment, or of a stretch, after the parallel filter.
     pub trim: usize,
     /// Samples at a window's artificial end that the position filter has not settled in.
-    pub position_overlap: usize,
+    pub(super) position_overlap: usize,
     /// Samples of overlap in all.
-    pub overlap: usize,
+    pub(super) overlap: usize,
     /// Samples of a window besides its overlaps.
-    pub core: usize,
+    pub(super) core: usize,
     /// Samples of the shortest segment that is used.
-    pub shortest: usize,
+    pub(super) shortest: usize,
     /// Speed up to which each joint rests, and the response of its position filter in samples.
-    pub rests: Vec<(f64, usize)>,
+    pub(super) rests: Vec<(f64, usize)>,
     /// Samples over which a row takes most of what it holds.
-    pub row_samples: usize,
+    pub(super) row_samples: usize,
 }
 
 impl FilterSettings {
@@ -191,20 +191,21 @@ impl FilterSettings {
     }
 }
 
-impl FilterChain {
-    pub(super) fn design(settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
+impl Parallel {
+    /// The filters for one sampling step [s].
+    ///
+    /// # Errors
+    /// [`MotionError`] for settings that the sampling rate does not carry.
+    pub fn design(settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
         let rate = 1.0 / dt;
-        let decimation = match settings.decimation {
-            Some(0) => {
-                return Err(MotionError::Setting {
-                    name: "decimation",
-                    value: 0.0,
-                    remedy: "1 keeps every row",
-                });
-            }
-            Some(every) => every,
-            None => settings.decimation_at(dt),
-        };
+        if settings.decimation == Some(0) {
+            return Err(MotionError::Setting {
+                name: "decimation",
+                value: 0.0,
+                remedy: "1 keeps every row",
+            });
+        }
+        let decimation = settings.decimation_at(dt);
         let parallel = match settings.filter {
             ParallelFilter::Butterworth { order } => {
                 Sos::butterworth(order, settings.cutoff_hz, rate)?
@@ -235,15 +236,10 @@ impl FilterChain {
             let cutoff = position.as_ref().map(|f| f.cutoff_hz(j));
             (*speed, response(cutoff, dt, reach))
         };
-        let rests = settings
-            .rest_speed
-            .iter()
-            .enumerate()
-            .map(of_joint)
-            .collect();
+        let joints = settings.rest_speed.iter().enumerate();
         Ok(Self {
             dt,
-            rests,
+            rests: joints.map(of_joint).collect(),
             row_samples: (0.5 / (settings.cutoff_hz * dt)) as usize + 1,
             differences: settings.differences,
             position,
@@ -270,8 +266,7 @@ pub(super) fn edge(
     Ok(asked.unwrap_or_else(|| settled(settings, position, 10.0)))
 }
 
-/// Samples after which `factor` time constants of the position filter have passed, and the
-/// differences reach no further back.
+/// Samples after which `factor` time constants of the position filter and the reach of the differences have passed.
 fn settled(settings: &FilterSettings, position: Option<&PositionFilter>, factor: f64) -> usize {
     position.map_or(0, |f| f.narrowest().sos().settle_samples(factor))
         + settings.differences.reach()

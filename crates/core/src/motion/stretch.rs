@@ -1,13 +1,11 @@
 //! Uninterrupted stretches of a log at full rate, for searches that go over the same samples many
 //! times: whole in memory, 8 bytes x 4 channels x joints a sample.
 
-use super::position_filter::PositionFilter;
 use super::run::{RunError, Summary, run};
-use super::settings::{Differences, FilterChain, FilterSettings};
+use super::settings::{FilterSettings, Parallel};
 use super::{MotionError, rest};
 use crate::block::Block;
-use crate::math::kept::{KeptEvery, KeptRows, KeptWork};
-use crate::math::zero_phase::ZeroPhase;
+use crate::math::kept::{KeptRows, KeptWork};
 
 /// One uninterrupted stretch, smoothed and differentiated; every channel `[joint][sample]`.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -36,12 +34,10 @@ pub struct Stretch {
 }
 
 impl Stretch {
-    /// Number of samples.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
@@ -60,9 +56,8 @@ impl Stretch {
         if !alike(self.dt, other.dt) || from < 0.0 || to > self.len() as f64 {
             return None;
         }
-        let began = other.began;
         Some(Stretch {
-            began,
+            began: other.began,
             ..self.part(from as usize, to as usize)
         })
     }
@@ -90,7 +85,6 @@ impl Stretch {
         self.temperature.get(joint).is_some_and(|x| !x.is_empty())
     }
 
-    /// Number of joints.
     pub fn joints(&self) -> usize {
         self.q.len()
     }
@@ -165,48 +159,15 @@ pub fn stretches<E>(
         stretch.began -= first.unwrap_or(0.0);
     }
     // what was done to the log is reported with its own decimation
-    let declared = FilterChain::design(settings, summary.dt)?;
-    Ok((
-        found,
-        Summary {
-            decimation: declared.decimation,
-            ..summary
-        },
-    ))
-}
-
-/// The declared parallel filter for whole stretches.
-#[derive(Debug, Clone)]
-pub struct Parallel {
-    filter: ZeroPhase,
-    kept: KeptEvery,
-    /// The filter that the positions of its stretches came through.
-    pub(super) position: Option<PositionFilter>,
-    /// How they were differentiated.
-    pub(super) differences: Differences,
-    /// Every how many samples a row is kept.
-    pub decimation: usize,
-    /// Samples left off at each end of a stretch.
-    pub trim: usize,
+    let decimation = Parallel::design(settings, summary.dt)?.decimation;
+    let summary = Summary {
+        decimation,
+        ..summary
+    };
+    Ok((found, summary))
 }
 
 impl Parallel {
-    /// The filter for one sampling step.
-    ///
-    /// # Errors
-    /// [`MotionError`] for settings that the sampling rate does not carry.
-    pub fn design(settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
-        let chain = FilterChain::design(settings, dt)?;
-        Ok(Parallel {
-            filter: chain.parallel,
-            kept: chain.kept,
-            position: chain.position,
-            differences: chain.differences,
-            decimation: chain.decimation,
-            trim: chain.trim,
-        })
-    }
-
     /// What each sample of a joint weighs that rests up to `rest_speed`, as in [`MotionSample`](super::MotionSample).
     pub fn weights(&self, stretch: &Stretch, joint: usize, rest_speed: f64) -> Vec<f64> {
         let cutoff = self.position.as_ref().map(|f| f.cutoff_hz(joint));
@@ -214,11 +175,6 @@ impl Parallel {
         let mut out = vec![0.0; stretch.len()];
         rest::weigh(&stretch.v[joint], (1, 0), rest_speed, reach, &mut out);
         out
-    }
-
-    /// Samples by which the filter extends a stretch at each end.
-    pub(super) fn pad_samples(&self) -> usize {
-        self.filter.sos().pad_samples()
     }
 
     /// Rows that a stretch of `samples` gives.
@@ -239,7 +195,7 @@ impl Parallel {
     /// # Errors
     /// [`MotionError`] where the stretch is too short for the filter.
     pub fn smooth(&self, channel: &mut [f64]) -> Result<(), MotionError> {
-        Ok(self.filter.run(channel, 1)?)
+        Ok(self.parallel.run(channel, 1)?)
     }
 
     /// Filters channels of a stretch and keeps every `decimation`-th sample.
@@ -264,14 +220,8 @@ impl Parallel {
                     .zip(group)
                     .for_each(|(x, channel)| *x = channel[k]);
             })?;
-            let of_channel = |l: usize| {
-                filtered
-                    .iter()
-                    .skip(l)
-                    .step_by(group.len())
-                    .copied()
-                    .collect()
-            };
+            let own = |l: usize| filtered.iter().skip(l).step_by(group.len());
+            let of_channel = |l: usize| own(l).copied().collect();
             out.extend((0..group.len()).map(of_channel));
         }
         Ok(out)

@@ -28,7 +28,6 @@ pub(super) enum Event<'a> {
     Sample {
         /// Time (s).
         t: f64,
-        /// Positions.
         q: &'a [f64],
         /// Torques at time t.
         tau: &'a [f64],
@@ -169,7 +168,6 @@ impl TimeBase {
         })
     }
 
-    /// The clock, once known.
     pub fn clock(&self) -> Option<SampleClock> {
         self.clock
     }
@@ -226,18 +224,14 @@ impl TimeBase {
         while let Some(gap) = self.find_gap(clock)? {
             self.advance(clock, gap, true, out);
             out(Event::End);
-            self.forget(gap);
-            self.checked = 0;
-            self.cursor = 0;
+            self.begin_behind(gap);
         }
         self.advance(clock, self.checked, last, out);
         if last {
             if self.checked > 0 {
                 out(Event::End);
             }
-            self.forget(self.t.len());
-            self.checked = 0;
-            self.cursor = 0;
+            self.begin_behind(self.t.len());
         } else if self.cursor > HISTORY + BUFFER {
             let rows = self.cursor - HISTORY;
             self.forget(rows);
@@ -312,10 +306,6 @@ impl TimeBase {
     }
 
     /// Extends `acting` over the rows before `end` whose neighbours are known.
-    ///
-    /// A torque by a zero-order hold is a staircase. Its mean over the step about t_k, corrected so that the first
-    /// error is of fourth order in frequency, is
-    /// (13 (tau_k-1 + tau_k) - (tau_k-2 + tau_k+1)) / 24.
     fn bring_torques(&mut self, clock: SampleClock, end: usize, closed: bool) {
         let n = self.joints;
         let from = self.acting.len() / n;
@@ -331,6 +321,7 @@ impl TimeBase {
                     let wide = k >= 2 && k + 1 < end && (k - 2..=k).all(even);
                     for i in k * n..(k + 1) * n {
                         let tau = &self.tau;
+                        // the mean of the staircase about t_k, its first error of fourth order in frequency
                         self.acting.push(if wide {
                             (13.0 * (tau[i - n] + tau[i]) - (tau[i - 2 * n] + tau[i + n])) / 24.0
                         } else if k >= 1 {
@@ -352,18 +343,15 @@ impl TimeBase {
             .saturating_sub(2)
             .min(ready.saturating_sub(NODES));
         let nodes = &self.t[first..ready.min(first + NODES)];
-        self.out_q.fill(0.0);
-        self.out_tau.fill(0.0);
-        for m in 0..nodes.len() {
-            let weight = lagrange(nodes, m, due);
-            let row = (first + m) * n..(first + m + 1) * n;
-            for (sum, value) in self.out_q.iter_mut().zip(&self.q[row.clone()]) {
-                *sum += weight * value;
-            }
-            for (sum, value) in self.out_tau.iter_mut().zip(&self.acting[row]) {
-                *sum += weight * value;
-            }
-        }
+        interpolate(nodes, &self.q[first * n..], due, &mut self.out_q);
+        interpolate(nodes, &self.acting[first * n..], due, &mut self.out_tau);
+    }
+
+    /// Drops the rows of a stretch that is over.
+    fn begin_behind(&mut self, rows: usize) {
+        self.forget(rows);
+        self.checked = 0;
+        self.cursor = 0;
     }
 
     /// Drops rows from the front of the buffers.
@@ -376,13 +364,19 @@ impl TimeBase {
     }
 }
 
-/// Weight of the value at `nodes[m]` in the polynomial through all nodes, taken at `x`.
-pub(super) fn lagrange(nodes: &[f64], m: usize, x: f64) -> f64 {
-    let mut weight = 1.0;
-    for (l, node) in nodes.iter().enumerate() {
-        if l != m {
-            weight *= (x - node) / (nodes[m] - node);
+/// Writes what the rows `x` at the times `nodes` are at time `due`, by the polynomial through all of them.
+pub(super) fn interpolate(nodes: &[f64], x: &[f64], due: f64, out: &mut [f64]) {
+    out.fill(0.0);
+    let rows = x.chunks_exact(out.len());
+    for (m, (node, row)) in nodes.iter().zip(rows).enumerate() {
+        let mut weight = 1.0;
+        for (l, other) in nodes.iter().enumerate() {
+            if l != m {
+                weight *= (due - other) / (node - other);
+            }
+        }
+        for (sum, value) in out.iter_mut().zip(row) {
+            *sum += weight * value;
         }
     }
-    weight
 }

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use super::settings::FilterChain;
+use super::settings::Parallel;
 use super::{FilteredRow, MotionError, MotionSample, rest};
 use crate::math::kept::{KeptRows, KeptWork};
 
@@ -14,8 +14,7 @@ thread_local! {
     static WORK: RefCell<KeptWork> = RefCell::default();
 }
 
-/// A stretch of one segment, with the overlaps that its filters need, and the rows that come of it.
-/// Its memory is reused from window to window.
+/// A stretch of one segment with the overlaps that its filters need, and its rows; its memory serves again and again.
 #[derive(Debug, Default)]
 pub(super) struct FilterWindow {
     /// Number of the segment among those that are used.
@@ -43,10 +42,9 @@ pub(super) struct FilterWindow {
 }
 
 impl FilterWindow {
-    /// Computes the rows.
     pub fn process(
         &mut self,
-        chain: &FilterChain,
+        chain: &Parallel,
         joints: usize,
         channels: usize,
         fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
@@ -85,7 +83,7 @@ impl FilterWindow {
     }
 
     /// Weighs the samples of every joint, and sees which of them rest.
-    fn weigh(&mut self, chain: &FilterChain, joints: usize) {
+    fn weigh(&mut self, chain: &Parallel, joints: usize) {
         self.weight.clear();
         self.weight.resize(self.t.len() * joints, 1.0);
         self.rests.clear();
@@ -110,7 +108,7 @@ impl FilterWindow {
     fn filter(
         &mut self,
         work: &mut KeptWork,
-        chain: &FilterChain,
+        chain: &Parallel,
         span: std::ops::Range<usize>,
         (joints, channels): (usize, usize),
         fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
@@ -153,9 +151,8 @@ impl FilterWindow {
         })
     }
 
-    /// Every m-th sample of the core, counted from where the segment's parallel filter starts, and
-    /// none within the trim.
-    fn choose_rows(&mut self, chain: &FilterChain, samples: usize) {
+    /// Every m-th sample of the core, counted from where the segment's parallel filter starts, and none within the trim.
+    fn choose_rows(&mut self, chain: &Parallel, samples: usize) {
         let lowest = chain.edge + chain.trim;
         let highest = if self.ends {
             (self.first + samples).saturating_sub(lowest)
@@ -217,8 +214,7 @@ impl FilterWindow {
     }
 }
 
-/// The sampling step of a window: the log's, unless the window's own times run away from it by a
-/// tenth of a step (a clock that drifts).
+/// The log's sampling step, unless the window's own times run away from it by a tenth of a step (a clock that drifts).
 pub(super) fn step_of(t: &[f64], dt: f64) -> f64 {
     match t {
         [first, .., last] => {

@@ -13,7 +13,6 @@ use super::{Form, Robot};
 /// How a robot's inertial parameters follow from links and drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StandardMap {
-    /// Names of the links.
     pub links: Vec<String>,
     /// Joints whose drives have an inertia of their own.
     pub drives: Vec<usize>,
@@ -23,7 +22,6 @@ pub struct StandardMap {
 }
 
 impl StandardMap {
-    /// Number of standard parameters.
     pub fn columns(&self) -> usize {
         self.matrix.ncols()
     }
@@ -56,13 +54,9 @@ impl Robot {
                     let mut links = [PseudoInertia([[0.0; 4]; 4]); linkage::LINKS];
                     // symmetric: rows are columns
                     links[column / STANDARD] = PseudoInertia(pseudo_inertia(&unit).into());
-                    for (x, of) in matrix
-                        .column_mut(column)
-                        .iter_mut()
-                        .zip(base_parameters(&links))
-                    {
-                        *x = of;
-                    }
+                    let base = base_parameters(&links);
+                    let rows = matrix.nrows();
+                    matrix.column_mut(column).copy_from_slice(&base[..rows]);
                 }
             }
             // one moving body: all that shows is its mass, or its moment about the axis
@@ -172,10 +166,8 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::cft::links::MassProperties;
     use crate::robot::cft::{Setup, Structure};
-    use crate::robot::standard::standard_of;
-    use nalgebra::Matrix4;
+    use crate::robot::standard::Body;
 
     /// In a vertical plane.
     fn double_pendulum(drive_inertia: bool) -> Robot {
@@ -241,20 +233,17 @@ mod tests {
 
     #[test]
     fn the_map_of_the_cft_robot_gives_its_base_parameters() {
-        let link = |i: f64| MassProperties {
+        let link = |i: f64| Body {
             mass: 2.0 + i,
             centre: [0.1 * i, -0.03, 0.02 * i],
-            moments: [0.2 + 0.01 * i, 0.3, 0.25],
-            products: [0.01, -0.02 * i, 0.004],
+            inertia: [0.2 + 0.01 * i, -0.01, 0.02 * i, 0.3, -0.004, 0.25],
         };
-        let links: [MassProperties; linkage::LINKS] = std::array::from_fn(|i| link(i as f64));
-        let pseudo: [PseudoInertia; linkage::LINKS] = std::array::from_fn(|i| (&links[i]).into());
+        let links: [[f64; STANDARD]; linkage::LINKS] =
+            std::array::from_fn(|i| link(i as f64).standard());
+        let pseudo = links.map(|link| PseudoInertia(pseudo_inertia(&link).into()));
         let robot = Robot::cft(Setup::default(), Structure::Full22);
-        let mut standard = Vec::new();
-        for p in &pseudo {
-            standard.extend(standard_of(&Matrix4::from(p.0)));
-        }
-        let found = robot.standard_map().matrix * nalgebra::DVector::from_vec(standard);
+        let standard = nalgebra::DVector::from_column_slice(links.as_flattened());
+        let found = robot.standard_map().matrix * standard;
         for (a, b) in found.iter().zip(base_parameters(&pseudo)) {
             assert!((a - b).abs() < 1e-12 * b.abs().max(1.0), "{a} {b}");
         }

@@ -19,7 +19,6 @@ pub struct Deviation<'a> {
 /// What the torque of a joint holds.
 #[derive(Debug, Clone)]
 struct OfJoint {
-    /// Inertial parameters.
     theta: Vec<usize>,
     /// Covariance of those, the joint's friction and its offset, row-major.
     covariance: Vec<f64>,

@@ -38,12 +38,10 @@ impl Robot {
 }
 
 impl Dynamics {
-    /// The robot.
     pub fn robot(&self) -> &Robot {
         &self.robot
     }
 
-    /// The inertial parameters.
     pub fn theta(&self) -> &[f64] {
         &self.theta
     }

@@ -1,22 +1,6 @@
 //! The physical model: pure functions of q, v, a and parameters; no files, no estimation.
 //!
 //! Vectors are in joint order, units are SI and radians.
-//!
-//! | file | what |
-//! |---|---|
-//! | [`joint`] | kinds of joints, words of parameters |
-//! | [`drive`] | what turns a joint |
-//! | [`friction`] | friction laws of a joint |
-//! | [`standard`] | bodies in standard parameters |
-//! | [`tree`] | links as a tree, its regressor and base parameters |
-//! | [`cft`] | the report's closed forms of the CFT robot |
-//! | [`transmission`] | from motors to joints |
-//! | this one | a robot: a tree of links, its parameters, its transmission |
-//! | [`bodies`] | its parameters from those of links and drives, and back |
-//! | [`dynamics`] | its inertia matrix and bias |
-//! | [`undeclared`] | what a declared model leaves out: tilt, payload, dropped parameters |
-//! | [`model`] | a robot with its numbers |
-//! | [`practice`] | numbers that stand for it, how it is run |
 
 pub mod bodies;
 pub mod cft;
@@ -243,7 +227,7 @@ impl Robot {
     /// [`friction::DoubleTanh::NAMES`]) of joint `j`, where it has one: 13 + 4 k + j.
     pub fn friction_theta(&self, j: usize, k: usize) -> Option<u32> {
         match &self.0.form {
-            Form::Report(_) => cft::FRICTION[4 * k + j].theta,
+            Form::Report(_) => Some((13 + 4 * k + j) as u32),
             Form::Inertia | Form::Recursion(_) => None,
         }
     }

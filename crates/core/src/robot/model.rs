@@ -6,7 +6,6 @@ use super::friction::{DoubleTanh, ViscousCoulomb, sign};
 /// Friction of one joint in a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum JointFriction {
-    /// No friction term.
     None,
     /// Law (18).
     DoubleTanh(DoubleTanh),
@@ -81,7 +80,6 @@ pub struct Model {
     pub robot: Robot,
     /// Inertial parameters, in the order of the regressor's columns.
     pub theta: Vec<f64>,
-    /// Friction per joint.
     pub friction: Vec<JointFriction>,
     /// Constant torque per joint [N or N m].
     pub offset: Vec<f64>,

@@ -7,7 +7,6 @@ use super::friction::DoubleTanh;
 pub struct Nominal {
     /// Inertial parameters, in the order of the regressor's columns.
     pub theta: Vec<f64>,
-    /// Friction of each joint.
     pub friction: Vec<DoubleTanh>,
 }
 
@@ -24,7 +23,6 @@ pub struct Practice {
     pub joint_ladders: Vec<[f64; 2]>,
     /// The same where a motor's coordinate runs the ladder.
     pub coordinate_ladders: Vec<[f64; 2]>,
-    /// Excitation of all motors.
     pub excitation: Excitation,
     /// Least clearance of a designed motion, see [`super::Transmission::clearance`], and the joint on which
     /// it depends.

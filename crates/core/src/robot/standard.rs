@@ -15,24 +15,12 @@ pub const STANDARD_NAMES: [&str; STANDARD] = [
 pub fn pseudo_inertia(s: &[f64; STANDARD]) -> Matrix4<f64> {
     let [xx, xy, xz, yy, yz, zz, mx, my, mz, m] = *s;
     let half = 0.5 * (xx + yy + zz);
-    Matrix4::new(
-        half - xx,
-        -xy,
-        -xz,
-        mx, //
-        -xy,
-        half - yy,
-        -yz,
-        my, //
-        -xz,
-        -yz,
-        half - zz,
-        mz, //
-        mx,
-        my,
-        mz,
-        m,
-    )
+    Matrix4::from([
+        [half - xx, -xy, -xz, mx],
+        [-xy, half - yy, -yz, my],
+        [-xz, -yz, half - zz, mz],
+        [mx, my, mz, m],
+    ])
 }
 
 /// Standard parameters of a pseudo-inertia: the inverse of [`pseudo_inertia`].

@@ -95,24 +95,31 @@ impl Transmission {
         self.pantograph
     }
 
+    /// Writes `x` itself where the motors are at the joints, else what the pantograph makes of it.
+    #[inline]
+    fn moved(
+        &self,
+        x: &[f64],
+        out: &mut [f64],
+        found: impl FnOnce(Setup) -> Result<[f64; 4], RobotError>,
+    ) -> Result<(), RobotError> {
+        match self.pantograph {
+            None => out.copy_from_slice(x),
+            Some(setup) => out.copy_from_slice(&found(setup)?),
+        }
+        Ok(())
+    }
+
     /// Joint positions of the motors' positions.
     #[inline]
     pub fn joints(&self, x: &[f64], q: &mut [f64]) -> Result<(), RobotError> {
-        match self.pantograph {
-            None => q.copy_from_slice(x),
-            Some(_) => q.copy_from_slice(&pantograph::joints(four(x))?),
-        }
-        Ok(())
+        self.moved(x, q, |_| pantograph::joints(four(x)))
     }
 
     /// Joint velocities of the motors' velocities at the pose q.
     #[inline]
     pub fn joint_velocities(&self, q: &[f64], xd: &[f64], v: &mut [f64]) -> Result<(), RobotError> {
-        match self.pantograph {
-            None => v.copy_from_slice(xd),
-            Some(_) => v.copy_from_slice(&pantograph::joint_velocities(four(q), four(xd))?),
-        }
-        Ok(())
+        self.moved(xd, v, |_| pantograph::joint_velocities(four(q), four(xd)))
     }
 
     /// Joint accelerations of the motors' accelerations at q and v.
@@ -124,14 +131,9 @@ impl Transmission {
         xdd: &[f64],
         a: &mut [f64],
     ) -> Result<(), RobotError> {
-        match self.pantograph {
-            None => a.copy_from_slice(xdd),
-            Some(_) => {
-                let found = pantograph::joint_accelerations(four(q), four(v), four(xdd))?;
-                a.copy_from_slice(&found);
-            }
-        }
-        Ok(())
+        self.moved(xdd, a, |_| {
+            pantograph::joint_accelerations(four(q), four(v), four(xdd))
+        })
     }
 
     /// The motors' positions at a pose.
@@ -176,11 +178,9 @@ impl Transmission {
     /// Volts of joint torques \[N or N m\] at a pose.
     #[inline]
     pub fn volts(&self, q: &[f64], tau: &[f64], volts: &mut [f64]) -> Result<(), RobotError> {
-        match self.pantograph {
-            None => volts.copy_from_slice(tau),
-            Some(setup) => volts.copy_from_slice(&setup.torques_to_volts(four(q), four(tau))?),
-        }
-        Ok(())
+        self.moved(tau, volts, |setup| {
+            setup.torques_to_volts(four(q), four(tau))
+        })
     }
 
     /// How far a pose is from one where the motors lose hold of a joint, 1 being farthest: sin q5 of the

@@ -12,7 +12,7 @@ use super::tree::newton_euler::{torques, walk};
 use super::tree::{MOST_JOINTS, Tree};
 use super::{Form, Robot, four};
 
-/// Torques of a gravity of one along two directions of the base, its x and its y as a rule. Masses m_i at p_i have the potential
+/// Torques of a gravity of one along the x and the y of the base. Masses m_i at p_i have the potential
 /// -sum m_i (gx p_x + gy p_y); the first moments of the CFT robot's chain are those of its kinetic energy
 /// (eq. (60)), those of other links are their base parameters. First moments that are no parameter, as those
 /// about a vertical first axis, count as none.
@@ -30,20 +30,14 @@ enum Moments {
 impl Robot {
     /// What a base that stands askew adds, for inertial parameters `theta`.
     pub fn tilt(&self, theta: &[f64]) -> Tilt {
-        self.tilt_along(theta, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    }
-
-    /// The same along two other directions; of the CFT robot, whose gravity is along its z, always x and y.
-    pub fn tilt_along(&self, theta: &[f64], directions: [[f64; 3]; 2]) -> Tilt {
         Tilt(match &self.0.form {
             Form::Inertia => Moments::Unknown,
-            Form::Report(_) => match self.coefficients(theta) {
-                Some(closed) => Moments::Report(Box::new(closed)),
-                None => Moments::Unknown,
-            },
+            Form::Report(_) => (self.coefficients(theta))
+                .map_or(Moments::Unknown, |closed| Moments::Report(Box::new(closed))),
             Form::Recursion(_) => {
                 let along = |gravity| self.tree().in_gravity(gravity);
-                Moments::Links(Box::new(directions.map(along)), self.link_parameters(theta))
+                let trees = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(along);
+                Moments::Links(Box::new(trees), self.link_parameters(theta))
             }
         })
     }
@@ -88,8 +82,7 @@ impl Robot {
         out
     }
 
-    /// Links that ask of the joints what a ball on the last link does: its mass and its moment of inertia, the
-    /// same about every axis, about its centre in that link's frame. Standard parameters of each link.
+    /// Standard parameters of links of which only the last is there: a ball with a mass and a moment of inertia.
     pub(crate) fn tool_links(
         &self,
         [mass, ball]: [f64; 2],
@@ -198,8 +191,7 @@ fn of_report(chain: &Coefficients, joint: usize, q: &[f64; 4]) -> [f64; 2] {
     }
 }
 
-/// Base parameters of a unit mass, unit first moments and a unit second moment along x in the frame of
-/// the CFT robot's last link.
+/// Base parameters of a unit mass, unit first moments and a unit second moment along x of the CFT robot's last link.
 static BODIES: LazyLock<[[f64; 22]; 5]> = LazyLock::new(|| {
     let place = [(3, 3), (0, 3), (1, 3), (2, 3), (0, 0)];
     place.map(|(r, c)| {

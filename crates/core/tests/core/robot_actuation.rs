@@ -1,69 +1,21 @@
-//! Volts, motor forces, counts, and the dynamics in Cartesian space.
+//! Volts, motor forces, and what noise of motors and encoders is at the joints.
 
 use crate::robot_oracle;
 
-use cft_ident_core::robot::cft::cartesian::{CartesianDynamics, Space, forces_of_torques};
-use cft_ident_core::robot::cft::links::{MassProperties, PseudoInertia};
 use cft_ident_core::robot::cft::{Coefficients, Setup, actuation, dynamics, pantograph};
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
+use cft_ident_core::robot::standard::{Body, pseudo_inertia};
 use robot_oracle::{Draw, Oracle, assert_close, assert_close_rows};
-
-#[test]
-fn cartesian_dynamics_need_the_forces_of_the_joint_torques() {
-    let oracle = Oracle::load();
-    let k = Coefficients::from_theta12(&oracle.theta);
-    let laws = DoubleTanh::cft_joints(&oracle.friction);
-    let mut draw = Draw::new(31);
-    for _ in 0..200 {
-        let (q, v, a) = draw.state();
-        let friction: [f64; 4] = std::array::from_fn(|i| laws[i].torque(v[i]));
-        let rigid = dynamics::inverse_dynamics(&q, &v, &a, &k);
-        let tau: [f64; 4] = std::array::from_fn(|i| rigid[i] + friction[i]);
-
-        let wrist = CartesianDynamics::at(&q, &v, &k, &friction, Space::Wrist).unwrap();
-        let xdd = pantograph::cartesian_accelerations(&q, &v, &a);
-        let want = forces_of_torques(&q, &tau, Space::Wrist).unwrap();
-        assert_close(&wrist.force(&xdd), &want, 1e-10, "wrist");
-
-        // Motors: x_1 = -y_r, x_2 = x_r move 7 and 6 times less than the wrist.
-        let motor = CartesianDynamics::at(&q, &v, &k, &friction, Space::Motor).unwrap();
-        let moved = [xdd[0] / 7.0, xdd[1] / 6.0, xdd[2], xdd[3]];
-        let want = actuation::torques_to_forces(&q, &tau).unwrap();
-        assert_close(&motor.force(&moved), &want, 1e-10, "motor");
-    }
-}
-
-#[test]
-fn cartesian_inertia_keeps_the_kinetic_energy() {
-    let oracle = Oracle::load();
-    let k = Coefficients::from_theta12(&oracle.theta);
-    let mut draw = Draw::new(32);
-    for _ in 0..100 {
-        let (q, v, _) = draw.state();
-        let m = dynamics::inertia(&q, &k);
-        let form = |m: &[[f64; 4]; 4], v: &[f64; 4]| -> f64 {
-            (0..4)
-                .map(|i| (0..4).map(|j| v[i] * m[i][j] * v[j]).sum::<f64>())
-                .sum()
-        };
-        let dynamics = CartesianDynamics::at(&q, &v, &k, &[0.0; 4], Space::Wrist).unwrap();
-        let xd = pantograph::cartesian_velocities(&q, &v);
-        let (joint, cartesian) = (form(&m, &v), form(&dynamics.inertia, &xd));
-        assert!(
-            (joint - cartesian).abs() < 1e-11 * joint,
-            "{joint} and {cartesian}"
-        );
-    }
-}
 
 #[test]
 fn one_kilogram_at_the_wrist_needs_7_g_on_x_c1_and_nothing_on_x_c2_in_any_pose() {
     let mut theta = [0.0; 12];
     theta[11] = 1.0;
+    let k = Coefficients::from_theta12(&theta);
     let mut draw = Draw::new(33);
     for _ in 0..200 {
         let (q, _, _) = draw.state();
-        let force = actuation::torques_to_forces(&q, &dynamics::gravity(&q, &theta)).unwrap();
+        let force = actuation::torques_to_forces(&q, &dynamics::gravity_torque(&q, &k)).unwrap();
         assert!(
             (force[0] + 7.0 * 9.81).abs() < 1e-11,
             "F_xc1 = {}",
@@ -71,10 +23,6 @@ fn one_kilogram_at_the_wrist_needs_7_g_on_x_c1_and_nothing_on_x_c2_in_any_pose()
         );
         assert!(force[1].abs() < 1e-11, "F_xc2 = {}", force[1]);
         assert_eq!((force[2], force[3]), (0.0, 0.0));
-        // At the wrist itself it is g, downwards along x_c1.
-        let k = Coefficients::from_theta12(&theta);
-        let still = CartesianDynamics::at(&q, &[0.0; 4], &k, &[0.0; 4], Space::Wrist).unwrap();
-        assert_close(&still.gravity, &[-9.81, 0.0, 0.0, 0.0], 1e-12, "G_x");
     }
 }
 
@@ -83,7 +31,7 @@ fn the_synthetic_arm_at_rest_needs_the_volts_of_the_model_page() {
     let oracle = Oracle::load();
     // Mid-workspace: the offsets of the report's trajectory.
     let q = pantograph::joints(&[-0.1343, 0.2766, 2.4, 0.0869]).unwrap();
-    let g = dynamics::gravity(&q, &oracle.theta);
+    let g = dynamics::gravity_torque(&q, &Coefficients::from_theta12(&oracle.theta));
     assert!(
         (g[2] + 3.67).abs() < 0.01 && (g[3] + 13.71).abs() < 0.01,
         "G = {g:?}"
@@ -147,19 +95,6 @@ fn gains_follow_from_amplifier_motor_and_gears_of_table_6() {
 }
 
 #[test]
-fn counts_round_to_half_a_count_and_return() {
-    let mut draw = Draw::new(35);
-    for _ in 0..500 {
-        let x = draw.position(&Setup::Tuedacs.limits());
-        let back = actuation::coordinates_of_counts(&actuation::counts(&x));
-        for i in 0..4 {
-            assert!((x[i] - back[i]).abs() <= 0.5001 * actuation::ENCODER_SCALE[i]);
-        }
-        assert_eq!(actuation::counts(&back), actuation::counts(&x));
-    }
-}
-
-#[test]
 fn limits_find_the_coordinate_that_is_outside() {
     let limits = Setup::Dspace.limits();
     assert_eq!(limits.first_outside(&limits.middles()), None);
@@ -197,40 +132,31 @@ fn sample_covariance(samples: &[[f64; 4]]) -> [[f64; 4]; 4] {
 }
 
 #[test]
-fn encoder_and_volt_noise_correlate_the_joints_as_the_covariances_say() {
+fn encoder_noise_correlates_the_joints_as_the_covariance_says() {
     let mut draw = Draw::new(36);
     let x = [-0.2, 0.4, 1.0, 0.1];
     let q = pantograph::joints(&x).unwrap();
-    let (mut joints, mut torques) = (Vec::new(), Vec::new());
+    let mut joints = Vec::new();
     for _ in 0..200_000 {
         let error: [f64; 4] = draw.vector(-0.5, 0.5);
         let read = std::array::from_fn(|i| x[i] + actuation::ENCODER_SCALE[i] * error[i]);
         let moved = pantograph::joints(&read).unwrap();
         joints.push(std::array::from_fn(|i| moved[i] - q[i]));
-        torques.push(actuation::forces_to_torques(&q, &error));
     }
-    let check = |got: [[f64; 4]; 4], sampled: [[f64; 4]; 4]| {
-        for i in 0..4 {
-            for j in 0..4 {
-                let scale = (sampled[i][i] * sampled[j][j]).sqrt();
-                assert!(
-                    (got[i][j] - sampled[i][j]).abs() < 0.01 * scale,
-                    "({i}, {j})"
-                );
-            }
-        }
-        // q4 and q5 do not err independently.
-        assert!(got[2][3].abs() > 0.3 * (got[2][2] * got[3][3]).sqrt());
-    };
     let variance = actuation::quantisation_variance();
-    check(
-        actuation::joint_covariance(&q, &variance).unwrap(),
-        sample_covariance(&joints),
-    );
-    check(
-        actuation::torque_covariance(&q, &[1.0 / 12.0; 4]),
-        sample_covariance(&torques),
-    );
+    let got = actuation::joint_covariance(&q, &variance).unwrap();
+    let sampled = sample_covariance(&joints);
+    for i in 0..4 {
+        for j in 0..4 {
+            let scale = (sampled[i][i] * sampled[j][j]).sqrt();
+            assert!(
+                (got[i][j] - sampled[i][j]).abs() < 0.01 * scale,
+                "({i}, {j})"
+            );
+        }
+    }
+    // q4 and q5 do not err independently.
+    assert!(got[2][3].abs() > 0.3 * (got[2][2] * got[3][3]).sqrt());
 }
 
 #[test]
@@ -290,11 +216,17 @@ fn a_links_pseudo_inertia_is_the_integral_over_its_points() {
             .sum()
     };
     let (xx, yy, zz) = (about(0, 0), about(1, 1), about(2, 2));
-    let link = MassProperties {
+    let link = Body {
         mass,
         centre,
-        moments: [yy + zz, xx + zz, xx + yy],
-        products: [about(0, 1), about(0, 2), about(1, 2)],
+        inertia: [
+            yy + zz,
+            -about(0, 1),
+            -about(0, 2),
+            xx + zz,
+            -about(1, 2),
+            xx + yy,
+        ],
     };
     let mut want = [[0.0; 4]; 4];
     for (p, m) in &points {
@@ -305,17 +237,17 @@ fn a_links_pseudo_inertia_is_the_integral_over_its_points() {
             }
         }
     }
-    let got = PseudoInertia::from(&link);
-    assert_close_rows(&got.0, &want, 1e-12, "J");
-    assert!(got.smallest_eigenvalue() > 0.0);
-    let rod = MassProperties {
+    let got = pseudo_inertia(&link.standard());
+    assert_close_rows(&got.into(), &want, 1e-12, "J");
+    assert!(got.symmetric_eigenvalues().min() > 0.0);
+    let rod = Body {
         mass: 1.0,
         centre: [0.0; 3],
-        moments: [3.0, 1.0, 1.0],
-        products: [0.0; 3],
+        inertia: [3.0, 0.0, 0.0, 1.0, 0.0, 1.0],
     };
+    let rod = pseudo_inertia(&rod.standard());
     assert!(
-        PseudoInertia::from(&rod).smallest_eigenvalue() < 0.0,
+        rod.symmetric_eigenvalues().min() < 0.0,
         "breaks the triangle inequality"
     );
 }

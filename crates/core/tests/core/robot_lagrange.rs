@@ -5,7 +5,8 @@
 use crate::robot_oracle;
 
 use cft_ident_core::robot::cft::links::{PseudoInertia, base_parameters};
-use cft_ident_core::robot::cft::{Coefficients, chain, dynamics, regressor};
+use cft_ident_core::robot::cft::{Coefficients, dynamics, linkage, regressor};
+use cft_ident_core::robot::tree::pose;
 use num_dual::{Dual, DualNum, HyperDual64, HyperHyperDual64};
 use robot_oracle::{Draw, Oracle, apply, assert_close, assert_close_rows};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -261,13 +262,14 @@ fn inertia_and_christoffel_matrix_equal_the_derivatives_of_the_kinetic_energy() 
 
 #[test]
 fn the_library_chain_equals_the_chain_of_this_test() {
+    let chain = linkage::chain().unwrap();
     let mut draw = Draw::new(5);
     for _ in 0..50 {
         let (q, _, _) = draw.state();
-        for (got, want) in chain::frames(&q).iter().zip(frames(&q)) {
+        for ((rotation, origin), want) in pose::frames(&chain, &q).iter().zip(frames(&q)) {
             for (i, wanted) in want[..3].iter().enumerate() {
-                let row = got.rotation[i];
-                let joined = [row[0], row[1], row[2], got.origin[i]];
+                let row = rotation[i];
+                let joined = [row[0], row[1], row[2], origin[i]];
                 assert_close(&joined, wanted, 1e-14, "frame");
             }
         }

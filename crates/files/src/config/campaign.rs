@@ -123,12 +123,8 @@ impl Campaign {
         ] {
             for spec in specs {
                 if let Err(error) = spec.parse::<LogSpec>() {
-                    let at = ["logs", role];
-                    return Err(document.value(
-                        &at,
-                        "holds a log that cannot be used",
-                        &error.to_string(),
-                    ));
+                    let problem = "holds a log that cannot be used";
+                    return Err(document.value(&["logs", role], problem, &error.to_string()));
                 }
             }
         }
@@ -138,9 +134,8 @@ impl Campaign {
                 return Err(document.value(&at, "is no time", "give seconds, 0 or more"));
             }
         }
-        if let Some(limit) = campaign.settings.max_relative_error {
-            document.positive(&["settings", "max_relative_error"], limit)?;
-        }
+        let limit = campaign.settings.max_relative_error;
+        document.positive(&["settings", "max_relative_error"], limit)?;
         Ok(campaign)
     }
 }

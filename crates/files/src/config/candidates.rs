@@ -15,7 +15,6 @@ const MAX_EFFECTS: usize = 100;
 /// Most columns of one effect, and most shapes.
 const MOST_COLUMNS: usize = 12;
 const MOST_SHAPES: usize = 3;
-/// Longest formula.
 const MAX_FORMULA_CHARACTERS: usize = 400;
 
 /// An effect of a user's own: a torque linear in some coefficients, each with a formula in the motion.
@@ -69,8 +68,7 @@ fn is_one(unit: &String) -> bool {
     unit == "1"
 }
 
-/// A file of candidates.
-#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CandidatesToml {
     candidate: Vec<CandidateSection>,
@@ -108,53 +106,53 @@ pub(super) fn check(
     }
     for (index, candidate) in candidates.iter().enumerate() {
         let index_text = index.to_string();
-        let at = |key| ["candidate", index_text.as_str(), key];
+        let wrong = |at: &[&str], problem: &str, remedy: &str| {
+            let at = [&["candidate", index_text.as_str()], at].concat();
+            Err(document.value(&at, problem, remedy))
+        };
         if !is_name(&candidate.name) {
             let remedy = "give letters, digits, `-` and `_`, beginning with a letter";
-            return Err(document.value(&at("name"), "is no name for an effect", remedy));
+            return wrong(&["name"], "is no name for an effect", remedy);
         }
         if candidates[..index].iter().any(|c| c.name == candidate.name) {
-            return Err(document.value(&at("name"), "is there twice", "give each its own name"));
+            return wrong(&["name"], "is there twice", "give each its own name");
         }
         let columns = candidate.formulas.len();
         if columns == 0 || columns > MOST_COLUMNS {
-            let problem = format!("has {columns} entries");
             let remedy =
                 "give one formula for each coefficient, 1 to 12: formulas = { c = \"cos(q) * v\" }";
-            return Err(document.value(&at("formulas"), &problem, remedy));
+            return wrong(&["formulas"], &format!("has {columns} entries"), remedy);
         }
-        if candidate.shapes.len() > MOST_SHAPES {
-            let problem = format!("has {} entries", candidate.shapes.len());
-            return Err(document.value(&at("shapes"), &problem, "search at most three shapes"));
+        let shapes = candidate.shapes.len();
+        if shapes > MOST_SHAPES {
+            let problem = format!("has {shapes} entries");
+            return wrong(&["shapes"], &problem, "search at most three shapes");
         }
         for (name, formula) in &candidate.formulas {
-            let at = ["candidate", index_text.as_str(), "formulas", name.as_str()];
+            let at = ["formulas", name];
             if formula.len() > MAX_FORMULA_CHARACTERS {
-                return Err(document.value(&at, "is too long", "give at most 400 characters"));
+                return wrong(&at, "is too long", "give at most 400 characters");
             }
-            let taken = candidate.shapes.contains_key(name);
-            if !is_key(name) || taken {
+            if !is_key(name) || candidate.shapes.contains_key(name) {
                 let remedy = "give letters, digits and underscores, another name than the signals and shapes have";
-                return Err(document.value(&at, "has no name for a coefficient", remedy));
+                return wrong(&at, "has no name for a coefficient", remedy);
             }
         }
-        for unit in candidate.units.keys() {
-            if !candidate.formulas.contains_key(unit) {
-                let at = ["candidate", index_text.as_str(), "units", unit.as_str()];
-                let remedy = "name a coefficient of `formulas`";
-                return Err(document.value(&at, "is the unit of no coefficient", remedy));
-            }
+        let has = |unit: &&String| candidate.formulas.contains_key(*unit);
+        if let Some(unit) = candidate.units.keys().find(|unit| !has(unit)) {
+            let remedy = "name a coefficient of `formulas`";
+            return wrong(&["units", unit], "is the unit of no coefficient", remedy);
         }
         for (name, range) in &candidate.shapes {
-            let at = ["candidate", index_text.as_str(), "shapes", name.as_str()];
+            let at = ["shapes", name];
             if !is_key(name) {
                 let remedy =
                     "give letters, digits and underscores, another name than the signals have";
-                return Err(document.value(&at, "has no name for a shape", remedy));
+                return wrong(&at, "has no name for a shape", remedy);
             }
             if range.from >= range.to {
                 let problem = format!("goes from {} to {}", range.from, range.to);
-                return Err(document.value(&at, &problem, "give `from` below `to`"));
+                return wrong(&at, &problem, "give `from` below `to`");
             }
         }
     }

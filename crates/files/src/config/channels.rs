@@ -32,8 +32,7 @@ impl RobotFile {
         }
     }
 
-    /// Columns as this tool writes them itself, for a robot whose own logs call them otherwise: what `simulate` and
-    /// `excite --samples` write is read with the robot's file too.
+    /// Columns as `simulate` and `excite --samples` write them, for a robot whose own logs call them otherwise.
     fn own_columns(&self) -> Option<Box<Layout>> {
         let renamed = !self.log.joint.is_empty() || self.log.time.is_some();
         let names = self.joint_names();
@@ -266,8 +265,7 @@ fn to_joint_side(setup: Setup) -> Conversion {
     })
 }
 
-/// Motor side to joint side, for gears that take joint positions to those of the motors, p = R q:
-/// q = R^-1 p + offset, tau = R' c. `None` where R has no inverse.
+/// Motor side to joint side for p = R q: q = R^-1 p + offset, tau = R' c; `None` where R has no inverse.
 fn through_gears(gears: &[Vec<f64>], offsets: Vec<f64>) -> Option<Conversion> {
     let n = gears.len();
     let inverse = gear_matrix(gears)?.try_inverse()?;

@@ -1,7 +1,7 @@
 //! What a robot file may say: everything that no type can rule out.
 
 use super::document::Document;
-use super::robot_file::{FilterKind, FrictionLawKind, ModelKind, RobotFile};
+use super::robot_file::{FilterKind, ModelKind, RobotFile};
 use super::{ConfigError, check_limits, check_log, serial_chain};
 
 /// Checks a robot file that was read from `document`.
@@ -27,28 +27,25 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
 }
 
 fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+    use ModelKind::{Cft, Serial, SingleJoint};
     let robot = &file.robot;
     let keys = [
-        ("gravity", robot.gravity.is_some(), ModelKind::Serial),
-        (
-            "drive_inertia",
-            robot.drive_inertia.is_some(),
-            ModelKind::Serial,
-        ),
-        ("urdf", robot.urdf.is_some(), ModelKind::Serial),
-        ("tip", robot.tip.is_some(), ModelKind::Serial),
+        ("gravity", robot.gravity.is_some(), Serial),
+        ("drive_inertia", robot.drive_inertia.is_some(), Serial),
+        ("urdf", robot.urdf.is_some(), Serial),
+        ("tip", robot.tip.is_some(), Serial),
         (
             "angles_as_written",
             robot.angles_as_written.is_some(),
-            ModelKind::Serial,
+            Serial,
         ),
-        ("coupling", !robot.coupling.is_empty(), ModelKind::Serial),
-        ("link", !robot.link.is_empty(), ModelKind::Serial),
-        ("frame", !robot.frame.is_empty(), ModelKind::Serial),
-        ("setup", robot.setup.is_some(), ModelKind::Cft),
-        ("parameters", robot.parameters.is_some(), ModelKind::Cft),
-        ("joint", robot.joint.is_some(), ModelKind::SingleJoint),
-        ("kind", robot.kind.is_some(), ModelKind::SingleJoint),
+        ("coupling", !robot.coupling.is_empty(), Serial),
+        ("link", !robot.link.is_empty(), Serial),
+        ("frame", !robot.frame.is_empty(), Serial),
+        ("setup", robot.setup.is_some(), Cft),
+        ("parameters", robot.parameters.is_some(), Cft),
+        ("joint", robot.joint.is_some(), SingleJoint),
+        ("kind", robot.kind.is_some(), SingleJoint),
     ];
     let foreign = |(_, given, model): &&(&str, bool, ModelKind)| *given && *model != robot.model;
     if let Some((key, _, model)) = keys.iter().find(foreign) {
@@ -57,8 +54,8 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     }
     let missing = |key, remedy| Err(document.missing(&["robot", key], remedy));
     match robot.model {
-        ModelKind::Serial => serial_chain::check(robot, document),
-        ModelKind::Cft => match (robot.setup, robot.parameters) {
+        Serial => serial_chain::check(robot, document),
+        Cft => match (robot.setup, robot.parameters) {
             (None, _) => missing("setup", "`setup = \"tuedacs\"` or `\"dspace\"`"),
             (_, None | Some(12 | 22)) => Ok(()),
             (_, Some(count)) => Err(document.value(
@@ -67,16 +64,16 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
                 "give 12 (the report's structure) or 22 (the full chain)",
             )),
         },
-        ModelKind::SingleJoint => match (&robot.joint, robot.kind) {
-            (None, _) => missing("joint", "the joint's name, e.g. `joint = \"q1\"`"),
-            (Some(joint), kind) => {
-                document.plain_name(&["robot", "joint"], joint)?;
-                match kind {
-                    None => missing("kind", "`kind = \"prismatic\"` or `\"revolute\"`"),
-                    Some(_) => Ok(()),
-                }
+        SingleJoint => {
+            let Some(joint) = &robot.joint else {
+                return missing("joint", "the joint's name, e.g. `joint = \"q1\"`");
+            };
+            document.plain_name(&["robot", "joint"], joint)?;
+            match robot.kind {
+                None => missing("kind", "`kind = \"prismatic\"` or `\"revolute\"`"),
+                Some(_) => Ok(()),
             }
-        },
+        }
     }
 }
 
@@ -94,25 +91,19 @@ fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     for (joint, start) in &friction.joint {
         let at = |key| ["friction", "joint", joint.as_str(), key];
         let keys = [
-            ("viscous", start.viscous, true, true),
-            ("coulomb", start.coulomb, false, true),
-            ("coulomb_1", start.coulomb_1, true, false),
-            ("coulomb_2", start.coulomb_2, true, false),
-            ("slope_1", start.slope_1, true, false),
-            ("slope_2", start.slope_2, true, false),
+            ("viscous", start.viscous),
+            ("coulomb", start.coulomb),
+            ("coulomb_1", start.coulomb_1),
+            ("coulomb_2", start.coulomb_2),
+            ("slope_1", start.slope_1),
+            ("slope_2", start.slope_2),
         ];
-        for (key, value, in_double_tanh, in_viscous_coulomb) in keys {
+        for (key, value) in keys {
             let Some(value) = value else { continue };
-            let belongs = match law {
-                FrictionLawKind::DoubleTanh => in_double_tanh,
-                FrictionLawKind::ViscousCoulomb => in_viscous_coulomb,
-            };
-            if !belongs {
-                return Err(document.value(
-                    &at(key),
-                    "does not belong to this friction law",
-                    "delete it, or choose the other `law`",
-                ));
+            if !law.names().contains(&key) {
+                let problem = "does not belong to this friction law";
+                let remedy = "delete it, or choose the other `law`";
+                return Err(document.value(&at(key), problem, remedy));
             }
             if key.starts_with("slope") {
                 document.positive(&at(key), value)?;
@@ -121,11 +112,8 @@ fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
         if let (Some(first), Some(second)) = (start.slope_1, start.slope_2)
             && first <= second
         {
-            return Err(document.value(
-                &at("slope_1"),
-                "is not above slope_2",
-                "exchange the two terms: slope_1 is the steeper one",
-            ));
+            let remedy = "exchange the two terms: slope_1 is the steeper one";
+            return Err(document.value(&at("slope_1"), "is not above slope_2", remedy));
         }
     }
     Ok(())
@@ -139,21 +127,13 @@ fn filter(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
         ("position_cutoff_hz", filter.position_cutoff_hz),
         ("ripple_db", filter.ripple_db),
     ] {
-        if let Some(value) = value {
-            document.positive(&at(key), value)?;
-        }
+        document.positive(&at(key), value)?;
     }
     document.not_negative(&at("trim_s"), filter.trim_s)?;
     document.not_negative(&at("position_trim_s"), filter.position_trim_s)?;
-    if let Some(factor) = filter.gap_factor
-        && !(factor.is_finite() && factor > 1.0)
-    {
-        return Err(document.value(
-            &at("gap_factor"),
-            &format!("is {factor}"),
-            "give a number above 1, e.g. 2.5",
-        ));
-    }
+    let above_1 = |x: f64| x.is_finite() && x > 1.0;
+    let remedy = "give a number above 1, e.g. 2.5";
+    document.number(&at("gap_factor"), filter.gap_factor, above_1, remedy)?;
     if filter.decimation == Some(0) {
         return Err(document.value(&at("decimation"), "is 0", "1 keeps every row"));
     }
@@ -164,11 +144,8 @@ fn filter(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
         if let Some(order) = order
             && !(lowest..=12).contains(&order)
         {
-            return Err(document.value(
-                &at(key),
-                &format!("is {order}"),
-                &format!("give an order from {lowest} to 12"),
-            ));
+            let remedy = format!("give an order from {lowest} to 12");
+            return Err(document.value(&at(key), &format!("is {order}"), &remedy));
         }
     }
     if filter.ripple_db.is_some() && filter.kind != Some(FilterKind::ChebyshevDecimate) {
@@ -196,9 +173,7 @@ fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
             ("torque", limits.torque),
             ("volts", limits.volts),
         ] {
-            if let Some(value) = value {
-                document.positive(&at(key), value)?;
-            }
+            document.positive(&at(key), value)?;
         }
     }
     check_limits::check(file, document)
@@ -214,9 +189,7 @@ fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
         ("saturation_v", control.saturation_v),
         ("derivative_filter_hz", control.derivative_filter_hz),
     ] {
-        if let Some(value) = value {
-            document.positive(&["control", key], value)?;
-        }
+        document.positive(&["control", key], value)?;
     }
     let sensors = &file.sensors;
     for (key, value) in [
@@ -229,33 +202,21 @@ fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     }
     for (key, value) in [("jitter", sensors.jitter), ("dropouts", sensors.dropouts)] {
         if value.is_some_and(|value| value >= 0.5) {
-            return Err(document.value(
-                &["sensors", key],
-                "is a fraction of 0.5 or more",
-                "give a fraction below 0.5",
-            ));
+            let (problem, remedy) = ("is a fraction of 0.5 or more", "give a fraction below 0.5");
+            return Err(document.value(&["sensors", key], problem, remedy));
         }
     }
-    document.known_names(
-        &["sensors", "temperature"],
-        &sensors.temperature,
-        &file.joint_names(),
-    )?;
+    let at = ["sensors", "temperature"];
+    document.known_names(&at, &sensors.temperature, &file.joint_names())?;
     for (joint, course) in &sensors.temperature {
         let at = |key| ["sensors", "temperature", joint.as_str(), key];
         document.positive(&at("time_constant_s"), course.time_constant_s)?;
-        if let Some(cycle) = course.cycle_s {
-            document.positive(&at("cycle_s"), cycle)?;
-        }
+        document.positive(&at("cycle_s"), course.cycle_s)?;
     }
-    per_joint(
-        document,
-        &["sensors", "torque_noise"],
-        &sensors.torque_noise,
-        joints,
-    )?;
+    let at = ["sensors", "torque_noise"];
+    per_joint(document, &at, &sensors.torque_noise, joints)?;
     for &value in &sensors.torque_noise {
-        document.not_negative(&["sensors", "torque_noise"], Some(value))?;
+        document.not_negative(&at, Some(value))?;
     }
     if !sensors.torque_noise.is_empty() && sensors.torque_noise_relative.is_some() {
         return Err(document.value(
@@ -276,11 +237,8 @@ fn per_joint(
 ) -> Result<(), ConfigError> {
     if !values.is_empty() && values.len() != joints {
         let problem = format!("holds {} numbers", values.len());
-        return Err(document.value(
-            at,
-            &problem,
-            &format!("give {joints}, one for each joint or coordinate"),
-        ));
+        let remedy = format!("give {joints}, one for each joint or coordinate");
+        return Err(document.value(at, &problem, &remedy));
     }
     Ok(())
 }

@@ -1,14 +1,12 @@
 //! What `[limits]` may say of points and links.
 
-use super::document::Document;
+use super::document::{Document, near_and_all};
 use super::limits::link_of;
 use super::serial_section::BASE;
 use super::{ConfigError, RobotFile};
-use cft_ident_logs::log::{list, nearest};
 
 /// Most capsules: a motion is looked through for every pair of links.
 pub(super) const MOST_CAPSULES: usize = 64;
-/// Most points.
 const MOST_POINTS: usize = 64;
 
 /// Checks what `[limits]` says of points and links.
@@ -25,15 +23,11 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
             "delete floor, box, distance, touching, point and capsule; `position` bounds the joint",
         ));
     }
-    for (key, too_many, most) in [
-        ("point", limits.point.len() > MOST_POINTS, MOST_POINTS),
-        (
-            "capsule",
-            limits.capsule.len() > MOST_CAPSULES,
-            MOST_CAPSULES,
-        ),
+    for (key, count, most) in [
+        ("point", limits.point.len(), MOST_POINTS),
+        ("capsule", limits.capsule.len(), MOST_CAPSULES),
     ] {
-        if too_many {
+        if count > most {
             let problem = format!("stands more than {most} times");
             return Err(document.value(&["limits", key], &problem, "keep those that matter"));
         }
@@ -44,9 +38,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
         let remedy = "write the low corner first: box = [[-1.0, -1.0, 0.0], [1.0, 1.0, 1.5]]";
         return Err(document.value(&["limits", "box"], "is empty", remedy));
     }
-    if let Some(distance) = limits.distance {
-        document.positive(&["limits", "distance"], distance)?;
-    }
+    document.positive(&["limits", "distance"], limits.distance)?;
     for (key, given) in [
         ("floor", limits.floor.is_some()),
         ("box", limits.bounds.is_some()),
@@ -62,16 +54,8 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     let known = |path: &[&str], link: &str| match link_of(robot.tree(), link) {
         Some(_) => Ok(()),
         None => {
-            let links = || {
-                let names = robot.tree().links().iter().map(|link| link.name.as_str());
-                names.chain([BASE])
-            };
-            let near = nearest(link, links()).map(|near| format!("did you mean `{near}`? "));
-            let remedy = format!(
-                "{}the links are {}",
-                near.unwrap_or_default(),
-                list(links())
-            );
+            let links = robot.tree().links().iter().map(|link| link.name.as_str());
+            let remedy = near_and_all(link, links.chain([BASE]), "the links are");
             Err(document.value(path, "is no link of this robot", &remedy))
         }
     };
@@ -85,8 +69,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
         known(&["limits", "capsule", &i, "link"], &capsule.link)?;
         document.positive(&["limits", "capsule", &i, "radius"], capsule.radius)?;
     }
-    let links = limits.touching.iter().flatten();
-    for link in links {
+    for link in limits.touching.iter().flatten() {
         known(&["limits", "touching"], link)?;
     }
     Ok(())

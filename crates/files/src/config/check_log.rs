@@ -9,22 +9,20 @@ use super::robot_file::{ModelKind, RobotFile};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::COORDINATES;
 use cft_ident_logs::log::{
-    ActuatorChannels, ColumnName, JointChannels, PositionUnit, TorqueIs, TorqueUnit,
+    ActuatorChannels, ColumnName, JointChannels, LogSection, PositionUnit, TorqueIs, TorqueUnit,
 };
 
 /// Checks the `[log]` section of a robot file.
 pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let log = &file.log;
     document.known_names(&["log", "joint"], &log.joint, &file.joint_names())?;
-    if let Some(rate) = log.rate_hz {
-        document.positive(&["log", "rate_hz"], rate)?;
-        if log.time.is_some() || log.time_unit.is_some() {
-            return Err(document.value(
-                &["log", "rate_hz"],
-                "stands beside a column of times",
-                "keep one of the two: `rate_hz` is for logs that have no times",
-            ));
-        }
+    document.positive(&["log", "rate_hz"], log.rate_hz)?;
+    if log.rate_hz.is_some() && (log.time.is_some() || log.time_unit.is_some()) {
+        return Err(document.value(
+            &["log", "rate_hz"],
+            "stands beside a column of times",
+            "keep one of the two: `rate_hz` is for logs that have no times",
+        ));
     }
     gears(file, document)?;
     foreign_effort(file, document)?;
@@ -35,19 +33,10 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     }
     let robot = file.robot();
     for (joint, channels) in &log.joint {
-        let index = robot
-            .joint_names()
-            .iter()
-            .position(|name| name == joint)
-            .unwrap_or(0);
-        joint_channels(
-            document,
-            joint,
-            channels,
-            robot.joint_kind(index),
-            log.torque_is,
-            !log.gears.is_empty(),
-        )?;
+        let names = robot.joint_names();
+        let index = names.iter().position(|name| name == joint).unwrap_or(0);
+        let kind = robot.joint_kind(index);
+        joint_channels(document, joint, channels, kind, log)?;
         let named = [
             ("position", &channels.position),
             ("velocity", &channels.velocity),
@@ -56,41 +45,30 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
             ("temperature", &channels.temperature),
         ];
         for (key, column) in named {
-            claim(
-                document,
-                &mut columns,
-                column,
-                &["log", "joint", joint, key],
-            )?;
+            let at = ["log", "joint", joint, key];
+            claim(document, &mut columns, column, &at)?;
         }
     }
     if file.robot.model != ModelKind::Cft
         && let Some(name) = log.actuator.keys().next()
     {
-        return Err(document.value(
-            &["log", "actuator", name],
-            "does not belong to this model",
-            "map the channels of this joint in [log.joint]",
-        ));
+        let remedy = "map the channels of this joint in [log.joint]";
+        let at = ["log", "actuator", name];
+        return Err(document.value(&at, "does not belong to this model", remedy));
     }
     let coordinates = COORDINATES.map(str::to_owned);
     document.known_names(&["log", "actuator"], &log.actuator, &coordinates)?;
     for (name, channels) in &log.actuator {
         actuator_channels(document, name, channels)?;
         for (key, column) in [("position", &channels.position), ("volts", &channels.volts)] {
-            claim(
-                document,
-                &mut columns,
-                column,
-                &["log", "actuator", name, key],
-            )?;
+            let at = ["log", "actuator", name, key];
+            claim(document, &mut columns, column, &at)?;
         }
     }
     Ok(())
 }
 
-/// Refuses to take the effort of a foreign recording for a torque at the joint: many drivers publish
-/// motor currents there.
+/// Refuses to take the effort of a foreign recording for a joint torque: many drivers publish motor currents there.
 fn foreign_effort(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let log = &file.log;
     let mapped = log.joint.values().any(|channels| channels.name.is_some());
@@ -113,18 +91,13 @@ fn gears(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let joints = file.robot().joints();
     let matrix = gear_matrix(&log.gears).filter(|matrix| matrix.nrows() == joints);
     let Some(matrix) = matrix else {
-        return Err(document.value(
-            &at,
-            &format!("is no matrix of {joints} rows and columns"),
-            "give one row for each motor: its turns per unit of each joint",
-        ));
+        let problem = format!("is no matrix of {joints} rows and columns");
+        let remedy = "give one row for each motor: its turns per unit of each joint";
+        return Err(document.value(&at, &problem, remedy));
     };
     if matrix.try_inverse().is_none() {
-        return Err(document.value(
-            &at,
-            "cannot be inverted: some motion of the joints moves no motor",
-            "correct the ratios",
-        ));
+        let problem = "cannot be inverted: some motion of the joints moves no motor";
+        return Err(document.value(&at, problem, "correct the ratios"));
     }
     match log.torque_is {
         Some(TorqueIs::Motor | TorqueIs::Current) => Ok(()),
@@ -162,8 +135,7 @@ fn joint_channels(
     joint: &str,
     channels: &JointChannels,
     kind: JointKind,
-    torque_is: Option<TorqueIs>,
-    geared: bool,
+    log: &LogSection,
 ) -> Result<(), ConfigError> {
     let at = |key| ["log", "joint", joint, key];
     let position_fits = match channels.position_unit {
@@ -202,12 +174,12 @@ fn joint_channels(
     scale(document, &at("position_scale"), channels.position_scale)?;
     scale(document, &at("torque_scale"), channels.torque_scale)?;
     range(document, &at("wrap"), channels.wrap)?;
-    match (torque_is, &channels.torque) {
+    match (log.torque_is, &channels.torque) {
         (None, Some(_)) => Err(document.missing(
             &["log", "torque_is"],
             "what the torque column is: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
         )),
-        (Some(TorqueIs::Motor), _) if !scaled && !geared => Err(document.missing(
+        (Some(TorqueIs::Motor), _) if !scaled && log.gears.is_empty() => Err(document.missing(
             &at("torque_scale"),
             "the gear ratio that takes motor torque to the joint (1 where there is no gear)",
         )),
@@ -248,32 +220,16 @@ fn actuator_channels(
 }
 
 fn range(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
-    match value {
-        Some(value) if !(value > 0.0 && value.is_finite()) => Err(document.value(
-            at,
-            &format!("is {value}"),
-            "give the range of the encoder in the unit of its column: 360, 6.283185307179586, 4096",
-        )),
-        _ => Ok(()),
-    }
+    let remedy =
+        "give the range of the encoder in the unit of its column: 360, 6.283185307179586, 4096";
+    document.number(at, value, |x| x > 0.0 && x.is_finite(), remedy)
 }
 
 fn sign(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
-    match value {
-        Some(value) if value.abs() != 1.0 => {
-            Err(document.value(at, &format!("is {value}"), "give 1 or -1"))
-        }
-        _ => Ok(()),
-    }
+    document.number(at, value, |x| x.abs() == 1.0, "give 1 or -1")
 }
 
 fn scale(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
-    match value {
-        Some(value) if value == 0.0 || !value.is_finite() => Err(document.value(
-            at,
-            &format!("is {value}"),
-            "give a finite factor other than 0",
-        )),
-        _ => Ok(()),
-    }
+    let remedy = "give a finite factor other than 0";
+    document.number(at, value, |x| x != 0.0 && x.is_finite(), remedy)
 }

@@ -6,8 +6,6 @@ use serde::{Deserialize, Serialize};
 use super::ConfigError;
 use super::document::Document;
 use super::model_file::{Covariance, EffectSection, ModelFile, Parameter};
-use super::robot_file::FrictionLawKind;
-use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_logs::log::escape;
 
 /// The parts of a model file. Values may be edited; a table that is taken out is taken out here as well.
@@ -55,8 +53,8 @@ fn effect_key(effect: &EffectSection) -> String {
 }
 
 impl Contents {
-    /// What a model holds.
     pub(super) fn of(model: &ModelFile) -> Self {
+        let priors = model.friction_prior.iter();
         let rows = |of: &Option<Covariance>| of.as_ref().map_or(0, |c| c.names.len());
         Self {
             parameters: model.parameters.iter().map(Parameter::key).collect(),
@@ -64,11 +62,7 @@ impl Contents {
             covariance: rows(&model.covariance),
             estimate_covariance: rows(&model.estimate_covariance),
             residual_std: model.residual_std.keys().cloned().collect(),
-            friction_prior: model
-                .friction_prior
-                .iter()
-                .map(|p| p.joint.clone())
-                .collect(),
+            friction_prior: priors.map(|p| p.joint.clone()).collect(),
             held_out: model.held_out.iter().map(|h| h.joint.clone()).collect(),
             links: model.links.len(),
             drive_inertia: model.drive_inertia.keys().cloned().collect(),
@@ -76,8 +70,7 @@ impl Contents {
         }
     }
 
-    /// Refuses a model that lacks something of the list; it may hold more. `written` are the keys of its
-    /// parameters as they stand in the file: a URDF beside it may have taken some in.
+    /// Refuses a model that lacks something of the list; `written` are the keys of the file, without those of a URDF.
     pub(super) fn check(
         &self,
         model: &ModelFile,
@@ -146,10 +139,7 @@ fn lost(document: &Document, list: &str, problem: &str) -> ConfigError {
 /// Refuses a file without a list that lacks what its robot asks for, as far as that can be known.
 pub(super) fn check_by_robot(model: &ModelFile, file: &str) -> Result<(), ConfigError> {
     let robot = model.robot.robot();
-    let names: &[&str] = match model.robot.friction_law() {
-        FrictionLawKind::DoubleTanh => &DoubleTanh::NAMES,
-        FrictionLawKind::ViscousCoulomb => &ViscousCoulomb::NAMES,
-    };
+    let names = model.robot.friction_law().names();
     let mut inertial = robot.parameters().iter();
     let has_inertial = inertial.any(|p| model.find(&p.name, None).is_some());
     if has_inertial {
@@ -158,10 +148,8 @@ pub(super) fn check_by_robot(model: &ModelFile, file: &str) -> Result<(), Config
     let friction = &model.robot.friction;
     let all = has_inertial && (friction.fitted_with_inertias || model.robot.needs_friction_first());
     for joint in robot.joint_names() {
-        let some = names
-            .iter()
-            .any(|name| model.find(name, Some(joint)).is_some());
-        if all || some {
+        let has = |name: &&str| model.find(name, Some(joint)).is_some();
+        if all || names.iter().any(has) {
             for name in names {
                 model.parameter(file, name, Some(joint))?;
             }

@@ -28,19 +28,16 @@ impl Edit {
     /// The table that it belongs to, as a header.
     pub fn table(&self) -> String {
         let tables = self.path.len().saturating_sub(1);
-        let parts: Vec<String> = self.path[..tables]
-            .iter()
-            .map(|part| quoted(part))
-            .collect();
+        let parts = self.path[..tables].iter().map(|part| quoted(part));
+        let parts: Vec<String> = parts.collect();
         format!("[{}]", parts.join("."))
     }
 }
 
 /// A text with these keys set; `None` where it is no TOML.
 pub fn edited(text: &str, edits: &[Edit]) -> Option<String> {
-    edits
-        .iter()
-        .try_fold(text.to_owned(), |text, edit| set(&text, edit))
+    let mut edits = edits.iter();
+    edits.try_fold(text.to_owned(), |text, edit| set(&text, edit))
 }
 
 fn set(text: &str, edit: &Edit) -> Option<String> {
@@ -56,17 +53,14 @@ fn set(text: &str, edit: &Edit) -> Option<String> {
     if let Some(old) = table.and_then(|t| t.get(key.as_str())) {
         let span = old.span();
         let plain = !matches!(old.get_ref(), DeValue::Table(_));
-        return plain
-            .then(|| format!("{}{}{}", &text[..span.start], edit.value, &text[span.end..]));
+        let (before, behind) = (&text[..span.start], &text[span.end..]);
+        return plain.then(|| format!("{before}{}{behind}", edit.value));
     }
     // inside braces
     if let Some(span) = span.filter(|span| text[span.clone()].starts_with('{')) {
         let (head, tail) = text.split_at(span.start + 1);
-        let comma = if tail.trim_start().starts_with('}') {
-            ""
-        } else {
-            ","
-        };
+        let alone = tail.trim_start().starts_with('}');
+        let comma = if alone { "" } else { "," };
         return Some(format!("{head} {}{comma}{tail}", edit.line()));
     }
     // below a header of its own
@@ -81,11 +75,8 @@ fn set(text: &str, edit: &Edit) -> Option<String> {
             return Some(format!("{head}{end}{}\n{tail}", edit.line()));
         }
     }
-    let end = if text.is_empty() || text.ends_with('\n') {
-        ""
-    } else {
-        "\n"
-    };
+    let ended = text.is_empty() || text.ends_with('\n');
+    let end = if ended { "" } else { "\n" };
     Some(format!("{text}{end}\n{header}\n{}\n", edit.line()))
 }
 

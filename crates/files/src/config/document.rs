@@ -107,49 +107,52 @@ impl<'a> Document<'a> {
     /// Turns an error of the TOML reader into ours.
     fn explain(&self, error: &toml::de::Error) -> ConfigError {
         let line = error.span().map_or(1, |span| self.line(span.start));
-        let message = one_line(error.message());
-        let listed = between_backticks(error.message());
+        // the TOML reader may append more lines
+        let message = error.message().lines().collect::<Vec<_>>().join(" ");
+        let listed: Vec<&str> = error.message().split('`').skip(1).step_by(2).collect();
         // serde words an unknown name as: unknown field `x`, expected one of `a`, `b`
-        if let Some((name, known)) = listed.split_first() {
-            if message.starts_with("unknown field") {
+        let file = self.file.to_owned();
+        let (what, remedy) = match &listed[..] {
+            [name, known @ ..] if message.starts_with("unknown field") => {
+                let remedy = nearest_or_all(name, known, "known keys here");
                 return ConfigError::UnknownKey {
-                    file: self.file.to_owned(),
+                    file,
                     line,
                     key: escape(name),
-                    remedy: nearest_or_all(name, known, "known keys here"),
+                    remedy,
                 };
             }
-            if message.starts_with("unknown variant") {
-                return ConfigError::Syntax {
-                    file: self.file.to_owned(),
-                    line,
-                    problem: ErrorText::new(format!("`{}` is no known value", escape(name)))
-                        .remedy(nearest_or_all(name, known, "known values")),
-                };
-            }
-        }
-        let message = escape_whole(&message);
-        let problem =
-            if let Some([name]) = message.strip_prefix("missing field").map(|_| &listed[..]) {
+            [name, known @ ..] if message.starts_with("unknown variant") => (
+                format!("`{}` is no known value", escape(name)),
+                nearest_or_all(name, known, "known values"),
+            ),
+            [name] if message.starts_with("missing field") => {
                 return ConfigError::MissingKey {
-                    file: self.file.to_owned(),
+                    file,
                     line,
                     key: escape(name),
                     remedy: "it\nthe files in configs/ show how".to_owned(),
                 };
-            } else if message == "duplicate key" {
+            }
+            _ if message == "duplicate key" => {
                 let name = error.span().and_then(|span| self.text.get(span));
                 let name = escape(name.unwrap_or_default().trim());
-                ErrorText::new(format!("duplicate key `{name}`")).remedy("keep one of the two")
-            } else if message.starts_with("invalid type") || message.starts_with("wanted") {
-                ErrorText::new(message).remedy("give a value of that kind")
-            } else {
-                ErrorText::new(message).remedy("correct this line: `key = value`, text in quotes")
-            };
+                let what = format!("duplicate key `{name}`");
+                (what, "keep one of the two".to_owned())
+            }
+            _ => {
+                let of_type = message.starts_with("invalid type") || message.starts_with("wanted");
+                let remedy = match of_type {
+                    true => "give a value of that kind",
+                    false => "correct this line: `key = value`, text in quotes",
+                };
+                (escape_whole(&message), remedy.to_owned())
+            }
+        };
         ConfigError::Syntax {
-            file: self.file.to_owned(),
+            file,
             line,
-            problem,
+            problem: ErrorText::new(what).remedy(remedy),
         }
     }
 
@@ -162,8 +165,7 @@ impl<'a> Document<'a> {
             .count()
     }
 
-    /// Line of the key at `path`, or of the innermost table on the way that exists.
-    /// A number stands for an element of an array.
+    /// Line of the key at `path`, or of the innermost table on the way; a number stands for an element of an array.
     pub(crate) fn line_of(&self, path: &[&str]) -> usize {
         let mut best = None;
         self.follow(path, |key, _| best = Some(key));
@@ -251,20 +253,36 @@ impl<'a> Document<'a> {
         let Some(name) = entries.keys().find(|name| !known.contains(name)) else {
             return Ok(());
         };
-        let all = || known.iter().map(String::as_str);
-        let near = nearest(name, all())
-            .map(|near| format!("did you mean `{near}`? "))
-            .unwrap_or_default();
         let path = [table, &[name.as_str()]].concat();
-        let remedy = format!("{near}this robot has {}", list(all()));
+        let all = known.iter().map(String::as_str);
+        let remedy = near_and_all(name, all, "this robot has");
         Err(self.value(&path, "is nothing that this robot has", &remedy))
     }
 
-    /// Refuses what is not above 0.
-    pub(crate) fn positive(&self, path: &[&str], value: f64) -> Result<(), ConfigError> {
-        if value >= number::SMALLEST {
+    /// Refuses a joint that the robot does not have.
+    pub(crate) fn known_joint(
+        &self,
+        path: &[&str],
+        joint: &str,
+        joints: &[String],
+    ) -> Result<(), ConfigError> {
+        if joints.iter().any(|known| known == joint) {
             return Ok(());
         }
+        let remedy = format!("this robot has {}", joints.join(", "));
+        Err(self.value(path, "is no joint of this robot", &remedy))
+    }
+
+    /// Refuses what is not above 0, where it is given.
+    pub(crate) fn positive(
+        &self,
+        path: &[&str],
+        value: impl Into<Option<f64>>,
+    ) -> Result<(), ConfigError> {
+        let value = match value.into() {
+            Some(value) if value.is_nan() || value < number::SMALLEST => value,
+            _ => return Ok(()),
+        };
         let remedy = match value > 0.0 {
             true => format!("give a number of at least {:e}", number::SMALLEST),
             false => "give a number above 0".to_owned(),
@@ -278,9 +296,21 @@ impl<'a> Document<'a> {
         path: &[&str],
         value: Option<f64>,
     ) -> Result<(), ConfigError> {
+        let possible = |x: f64| x >= 0.0 || x.is_nan();
+        self.number(path, value, possible, "give 0 or a number above it")
+    }
+
+    /// Refuses a number that is given and not possible.
+    pub(crate) fn number(
+        &self,
+        path: &[&str],
+        value: Option<f64>,
+        possible: impl Fn(f64) -> bool,
+        remedy: &str,
+    ) -> Result<(), ConfigError> {
         match value {
-            Some(value) if value < 0.0 => {
-                Err(self.value(path, &format!("is {value}"), "give 0 or a number above it"))
+            Some(value) if !possible(value) => {
+                Err(self.value(path, &format!("is {value}"), remedy))
             }
             _ => Ok(()),
         }
@@ -304,14 +334,14 @@ fn dotted(path: &[&str]) -> String {
     shown.join(".")
 }
 
-/// The parts of a message that stand between backticks.
-fn between_backticks(message: &str) -> Vec<&str> {
-    message.split('`').skip(1).step_by(2).collect()
-}
-
-/// First line of a message: the TOML reader may append more.
-fn one_line(message: &str) -> String {
-    message.lines().collect::<Vec<_>>().join(" ")
+/// "did you mean `x`? " where a known name is near, and behind `all` the list of known names.
+pub(super) fn near_and_all<'k>(
+    name: &str,
+    known: impl Iterator<Item = &'k str> + Clone,
+    all: &str,
+) -> String {
+    let near = nearest(name, known.clone()).map(|near| format!("did you mean `{near}`? "));
+    format!("{}{all} {}", near.unwrap_or_default(), list(known))
 }
 
 /// "did you mean `x`?" where a known name is near, else the list of known names.

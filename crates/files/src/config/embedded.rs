@@ -11,60 +11,31 @@ use super::trajectory::Trajectory;
 use super::{ConfigError, check, serial_chain, urdf};
 use cft_ident_logs::log::{did_you_mean, list, named_beside_of, remedy, shown};
 
+/// Paths and texts of files in `configs/`.
+macro_rules! configs {
+    [$($name:literal),* $(,)?] => {
+        [$((
+            concat!("configs/", $name),
+            include_str!(concat!("../../../../configs/", $name)),
+        )),*]
+    };
+}
+
 /// The files that come with the tool, by the path under which they are asked for.
-pub const EMBEDDED: [(&str, &str); 13] = [
-    (
-        "configs/cft.toml",
-        include_str!("../../../../configs/cft.toml"),
-    ),
-    (
-        "configs/cft-validation.toml",
-        include_str!("../../../../configs/cft-validation.toml"),
-    ),
-    (
-        "configs/cft-excitation.toml",
-        include_str!("../../../../configs/cft-excitation.toml"),
-    ),
-    (
-        "configs/cft-dspace.toml",
-        include_str!("../../../../configs/cft-dspace.toml"),
-    ),
-    (
-        "configs/emps.toml",
-        include_str!("../../../../configs/emps.toml"),
-    ),
-    (
-        "configs/emps-symmetric.toml",
-        include_str!("../../../../configs/emps-symmetric.toml"),
-    ),
-    (
-        "configs/bldc.toml",
-        include_str!("../../../../configs/bldc.toml"),
-    ),
-    (
-        "configs/panda.toml",
-        include_str!("../../../../configs/panda.toml"),
-    ),
-    (
-        "configs/tx40.toml",
-        include_str!("../../../../configs/tx40.toml"),
-    ),
-    (
-        "configs/ur10.toml",
-        include_str!("../../../../configs/ur10.toml"),
-    ),
-    (
-        "configs/kr300.toml",
-        include_str!("../../../../configs/kr300.toml"),
-    ),
-    (
-        "configs/pendulum.toml",
-        include_str!("../../../../configs/pendulum.toml"),
-    ),
-    (
-        "configs/table3.toml",
-        include_str!("../../../../configs/table3.toml"),
-    ),
+pub const EMBEDDED: [(&str, &str); 13] = configs![
+    "cft.toml",
+    "cft-validation.toml",
+    "cft-excitation.toml",
+    "cft-dspace.toml",
+    "emps.toml",
+    "emps-symmetric.toml",
+    "bldc.toml",
+    "panda.toml",
+    "tx40.toml",
+    "ur10.toml",
+    "kr300.toml",
+    "pendulum.toml",
+    "table3.toml",
 ];
 
 /// Text of a file that comes with the tool.
@@ -131,20 +102,15 @@ pub fn text_of_kind(path: &Path, wanted: Wanted) -> Result<String, ConfigError> 
         }
         let known = EMBEDDED.iter().filter(|(_, text)| wanted.is(text));
         let known = list(known.map(|(name, _)| *name));
-        let more = match known.is_empty() {
-            true => String::new(),
-            false => format!(
-                "\n{}these come with the tool: {known}",
-                did_you_mean(&shown(path), &known)
-            ),
-        };
+        let mut said = remedy(&error).to_owned();
+        said += &named_beside_of(path, &["toml"], &|beside| wanted.may_be(beside));
+        if !known.is_empty() {
+            let near = did_you_mean(&shown(path), &known);
+            said += &format!("\n{near}these come with the tool: {known}");
+        }
         return Err(ConfigError::Read {
             file: shown(path),
-            remedy: format!(
-                "{}{}{more}",
-                remedy(&error),
-                named_beside_of(path, &["toml"], &|beside| wanted.may_be(beside))
-            ),
+            remedy: said,
             source: error,
         });
     }
@@ -216,22 +182,16 @@ impl RobotFile {
 
     /// Reads and checks a robot file, or one that comes with the tool.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse_in(
-            &shown(path),
-            &text_of_kind(path, Wanted::Robot)?,
-            path.parent(),
-        )
+        let text = text_of_kind(path, Wanted::Robot)?;
+        Self::parse_in(&shown(path), &text, path.parent())
     }
 }
 
 impl ModelFile {
     /// Reads and checks a model file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse_in(
-            &shown(path),
-            &text_of_kind(path, Wanted::Own)?,
-            path.parent(),
-        )
+        let text = text_of_kind(path, Wanted::Own)?;
+        Self::parse_in(&shown(path), &text, path.parent())
     }
 }
 

@@ -59,36 +59,46 @@ impl HeldOut {
 
     /// What does not fit together, where something does not.
     pub(super) fn fault(&self) -> Option<(&'static str, &'static str)> {
-        let rising = |x: &[f64]| x.windows(2).all(|p| p[0] < p[1]);
         let sizes = |x: &[f64]| x.iter().all(|x| *x >= 0.0 && x.is_finite());
-        let (speeds, torques) = (self.speed_edges.len() + 1, self.torque_edges.len() + 1);
-        let rows = &self.half_width_95;
-        if !rising(&self.speed_edges) || !sizes(&self.speed_edges) {
-            return Some(("speed_edges", "must rise from 0 on"));
-        }
-        if !rising(&self.torque_edges) || !sizes(&self.torque_edges) {
-            return Some(("torque_edges", "must rise from 0 on"));
-        }
-        if rows.len() != speeds || rows.iter().any(|row| row.len() != torques) {
-            return Some((
-                "half_width_95",
-                "must have one list for each range of speed, with a number for each range of torque",
-            ));
-        }
-        if !rows.iter().all(|row| sizes(row)) {
-            return Some(("half_width_95", "must be numbers of 0 or more"));
-        }
+        let edges = |x: &[f64]| sizes(x) && x.windows(2).all(|p| p[0] < p[1]);
         let above = |x: &f64| *x > 0.0 && x.is_finite();
-        if self.external_std.len() != speeds || !self.external_std.iter().all(above) {
-            return Some((
+        let (speeds, torques) = (self.speed_edges.len() + 1, self.torque_edges.len() + 1);
+        let (rows, external) = (&self.half_width_95, &self.external_std);
+        let whole = rows.len() == speeds && rows.iter().all(|row| row.len() == torques);
+        let of_speeds = external.len() == speeds && external.iter().all(above);
+        let lists =
+            "must have one list for each range of speed, with a number for each range of torque";
+        let faults = [
+            (
+                edges(&self.speed_edges),
+                "speed_edges",
+                "must rise from 0 on",
+            ),
+            (
+                edges(&self.torque_edges),
+                "torque_edges",
+                "must rise from 0 on",
+            ),
+            (whole, "half_width_95", lists),
+            (
+                rows.iter().all(|row| sizes(row)),
+                "half_width_95",
+                "must be numbers of 0 or more",
+            ),
+            (
+                of_speeds,
                 "external_std",
                 "must have one number above 0 for each range of speed",
-            ));
-        }
-        if !above(&self.position_cutoff_hz) {
-            return Some(("position_cutoff_hz", "must be above 0"));
-        }
-        (!above(&self.external_99)).then_some(("external_99", "must be above 0"))
+            ),
+            (
+                above(&self.position_cutoff_hz),
+                "position_cutoff_hz",
+                "must be above 0",
+            ),
+            (above(&self.external_99), "external_99", "must be above 0"),
+        ];
+        let first = faults.into_iter().find(|(right, ..)| !right);
+        first.map(|(_, key, problem)| (key, problem))
     }
 }
 

@@ -108,11 +108,10 @@ impl ModelFile {
     /// # Errors
     /// [`ConfigError::MissingParameter`] where it holds a part of a law.
     pub fn joint_friction(&self, file: &str, joint: &str) -> Result<JointFriction, ConfigError> {
-        Ok(if self.find("slope_1", Some(joint)).is_some() {
-            JointFriction::DoubleTanh(self.double_tanh(file, joint)?)
-        } else if self.find("coulomb", Some(joint)).is_some() {
+        let has = |name| self.find(name, Some(joint)).is_some();
+        Ok(if !has("slope_1") && has("coulomb") {
             JointFriction::ViscousCoulomb(self.viscous_coulomb(file, joint)?)
-        } else if self.find("viscous", Some(joint)).is_some() {
+        } else if has("slope_1") || has("viscous") {
             // a viscous term alone is half a law: say what is missing
             JointFriction::DoubleTanh(self.double_tanh(file, joint)?)
         } else {
@@ -122,13 +121,9 @@ impl ModelFile {
 
     /// Covariance in the order of [`Model::parameters`], row-major; 0 where unknown.
     pub fn model_covariance(&self, model: &Model) -> Vec<f64> {
-        let mut keys: Vec<String> = model
-            .robot
-            .parameters()
-            .iter()
-            .map(|p| p.name.to_string())
-            .collect();
-        for (joint, friction) in model.robot.joint_names().iter().zip(&model.friction) {
+        let (inertial, joints) = (model.robot.parameters(), model.robot.joint_names());
+        let mut keys: Vec<String> = inertial.iter().map(|p| p.name.to_string()).collect();
+        for (joint, friction) in joints.iter().zip(&model.friction) {
             let names: &[&str] = match friction {
                 JointFriction::None => &[],
                 JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
@@ -136,13 +131,7 @@ impl ModelFile {
             };
             keys.extend(names.iter().map(|n| format!("{n}:{joint}")));
         }
-        keys.extend(
-            model
-                .robot
-                .joint_names()
-                .iter()
-                .map(|j| format!("offset:{j}")),
-        );
+        keys.extend(joints.iter().map(|j| format!("offset:{j}")));
         self.covariance_of(&keys)
     }
 
@@ -177,24 +166,16 @@ impl ModelFile {
     /// Puts a block of covariance in place of what the file has between these keys; entries between
     /// them and other keys are dropped.
     pub fn replace_covariance(&mut self, keys: &[String], block: &dyn Fn(usize, usize) -> f64) {
-        let old = self.covariance.take().unwrap_or_default();
-        let kept: Vec<usize> = (0..old.names.len())
-            .filter(|i| !keys.contains(&old.names[*i]))
-            .collect();
-        let mut names: Vec<String> = kept.iter().map(|i| old.names[*i].clone()).collect();
+        self.forget_covariance(keys);
+        let Covariance { names, matrix } = self.covariance.get_or_insert_default();
+        for row in matrix.iter_mut() {
+            row.resize(names.len() + keys.len(), 0.0);
+        }
+        for i in 0..keys.len() {
+            let before = vec![0.0; names.len()];
+            let own = (0..keys.len()).map(|j| block(i, j));
+            matrix.push(before.into_iter().chain(own).collect());
+        }
         names.extend_from_slice(keys);
-        let first = kept.len();
-        let matrix = (0..names.len())
-            .map(|i| {
-                (0..names.len())
-                    .map(|j| match (i < first, j < first) {
-                        (true, true) => old.matrix[kept[i]][kept[j]],
-                        (false, false) => block(i - first, j - first),
-                        _ => 0.0,
-                    })
-                    .collect()
-            })
-            .collect();
-        self.covariance = Some(Covariance { names, matrix });
     }
 }

@@ -26,7 +26,6 @@ mod serial_chain;
 pub mod serial_section;
 mod text_file;
 pub mod trajectory;
-mod trajectory_text;
 mod urdf;
 
 pub use campaign::Campaign;

@@ -216,28 +216,27 @@ pub struct ModelProvenance {
     pub inputs: Vec<Provenance>,
 }
 
-/// Puts what a covariance has between these keys into a block, row by row.
-fn put_block(covariance: Option<&Covariance>, keys: &[String], block: &mut [f64]) {
-    let Some(covariance) = covariance else {
-        return;
-    };
-    let place = |key: &String| covariance.names.iter().position(|name| name == key);
-    let places: Vec<Option<usize>> = keys.iter().map(place).collect();
-    for (i, row) in places.iter().enumerate() {
-        for (j, column) in places.iter().enumerate() {
-            if let (Some(row), Some(column)) = (*row, *column) {
-                block[i * keys.len() + j] = covariance.matrix[row][column];
+/// What covariances have between these keys, row-major; the last one that has both counts, and 0 where none has.
+fn between(covariances: [&Option<Covariance>; 2], keys: &[String]) -> Vec<f64> {
+    let mut block = vec![0.0; keys.len() * keys.len()];
+    for covariance in covariances.into_iter().flatten() {
+        let place = |key: &String| covariance.names.iter().position(|name| name == key);
+        let places: Vec<Option<usize>> = keys.iter().map(place).collect();
+        for (i, row) in places.iter().enumerate() {
+            for (j, column) in places.iter().enumerate() {
+                if let (Some(row), Some(column)) = (*row, *column) {
+                    block[i * keys.len() + j] = covariance.matrix[row][column];
+                }
             }
         }
     }
+    block
 }
 
-/// A model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
     /// The robot, so that no robot file is needed; its `[filter]` is the model's own processing.
     pub robot: RobotFile,
-    /// Every parameter.
     pub parameters: Vec<Parameter>,
     /// Their covariance, where it was estimated.
     pub covariance: Option<Covariance>,
@@ -251,7 +250,6 @@ pub struct ModelFile {
     pub excesses: Option<Excesses>,
     /// Formulas of those effects that are the user's own.
     pub candidates: Vec<CandidateSection>,
-    /// Effects added to the declared model.
     pub effects: Vec<EffectSection>,
     /// The physical numbers, where the parameters and effects above predict with less of an effect than was estimated.
     pub estimates: Vec<Estimate>,
@@ -295,14 +293,13 @@ impl ModelFile {
         joint: Option<&str>,
     ) -> Result<&Parameter, ConfigError> {
         self.find(name, joint).ok_or_else(|| {
-            let key = match joint {
-                Some(joint) => format!("{name}:{joint}"),
-                None => name.to_owned(),
+            let (name, command) = match joint {
+                Some(joint) => (format!("{name}:{joint}"), "friction"),
+                None => (name.to_owned(), "lsq"),
             };
-            let command = if joint.is_some() { "friction" } else { "lsq" };
             ConfigError::MissingParameter {
                 file: file.to_owned(),
-                name: key,
+                name,
                 remedy: format!(
                     "identify it with `cft-ident {command}`, or add a [[parameter]] table"
                 ),
@@ -354,17 +351,12 @@ impl ModelFile {
 
     /// Covariance of the parameters with these keys ([`Parameter::key`]), row-major; 0 where unknown.
     pub fn covariance_of(&self, keys: &[String]) -> Vec<f64> {
-        let mut block = vec![0.0; keys.len() * keys.len()];
-        put_block(self.covariance.as_ref(), keys, &mut block);
-        block
+        between([&None, &self.covariance], keys)
     }
 
     /// The same with the estimates' where the parameters are none.
     pub fn estimated_covariance_of(&self, keys: &[String]) -> Vec<f64> {
-        let mut block = vec![0.0; keys.len() * keys.len()];
-        put_block(self.estimate_covariance.as_ref(), keys, &mut block);
-        put_block(self.covariance.as_ref(), keys, &mut block);
-        block
+        between([&self.estimate_covariance, &self.covariance], keys)
     }
 
     /// Limits where a robot file gives none: what the logs of the model have seen.

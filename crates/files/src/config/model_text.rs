@@ -1,11 +1,11 @@
 //! Model files as text: read with checks, written to be read by people.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::candidates::{self, CandidateSection};
 use super::contents::{self, Contents};
@@ -24,7 +24,7 @@ use super::robot_file::{
 use super::robot_file::{ModelKind, Notes};
 use super::{ConfigError, check, urdf};
 use cft_ident_core::robot::drive::JointDrive;
-use cft_ident_logs::log::LogSection;
+use cft_ident_logs::log::{LogSection, escape};
 
 /// The file as it is written: the sections of a robot file, and what was identified.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -70,6 +70,31 @@ pub(super) struct ModelToml {
     #[serde(default)]
     drive_inertia: BTreeMap<String, f64>,
     provenance: Option<ModelProvenance>,
+}
+
+/// Appends what was written of a part of the file.
+fn put(
+    text: &mut String,
+    head: &str,
+    written: Result<String, toml::ser::Error>,
+) -> Result<(), ConfigError> {
+    text.push_str(head);
+    text.push_str(&written.map_err(|error| ConfigError::Syntax {
+        file: "model".to_owned(),
+        line: 1,
+        problem: format!("cannot be written: {error}").into(),
+    })?);
+    Ok(())
+}
+
+/// Appends a table, or several of one name.
+fn put_table(
+    text: &mut String,
+    head: &str,
+    key: &str,
+    value: &impl Serialize,
+) -> Result<(), ConfigError> {
+    put(text, head, toml::to_string(&BTreeMap::from([(key, value)])))
 }
 
 impl Covariance {
@@ -183,20 +208,15 @@ impl ModelFile {
     /// A content that TOML cannot hold.
     pub fn sections(&self) -> Result<String, ConfigError> {
         let mut text = String::new();
-        let unwritable = |error: toml::ser::Error| ConfigError::Syntax {
-            file: "model".to_owned(),
-            line: 1,
-            problem: format!("cannot be written: {error}").into(),
-        };
-        text.push_str("# What this file must hold, so that a part that is lost is noticed. Values may be edited.\n");
-        let contents = BTreeMap::from([("contents", Contents::of(self))]);
-        text.push_str(&toml::to_string_pretty(&contents).map_err(unwritable)?);
-        text.push('\n');
-        text.push_str(&toml::to_string(&self.robot).map_err(unwritable)?);
+        put(
+            &mut text,
+            "# What this file must hold, so that a part that is lost is noticed. Values may be edited.\n",
+            toml::to_string_pretty(&BTreeMap::from([("contents", Contents::of(self))])),
+        )?;
+        put(&mut text, "\n", toml::to_string(&self.robot))?;
         text.push_str("\n# Parameters: value and standard deviation of the fit in `unit`, theta as in the report's Table 4. Torques are computed\n# with `consistent` where it stands: the nearest numbers of links, drives and friction that can exist.\n");
         for parameter in &self.parameters {
-            text.push_str("\n[[parameter]]\n");
-            text.push_str(&toml::to_string(parameter).map_err(unwritable)?);
+            put(&mut text, "\n[[parameter]]\n", toml::to_string(parameter))?;
         }
         if let Some(covariance) = &self.covariance {
             text.push_str(
@@ -205,40 +225,51 @@ impl ModelFile {
             covariance.write(&mut text);
         }
         if !self.residual_std.is_empty() {
-            text.push_str(
-                "\n# Standard deviation of the torque residual by joint.\n[residual_std]\n",
-            );
-            text.push_str(&toml::to_string(&self.residual_std).map_err(unwritable)?);
+            put_table(
+                &mut text,
+                "\n# Standard deviation of the torque residual by joint.\n",
+                "residual_std",
+                &self.residual_std,
+            )?;
         }
         if !self.friction_prior.is_empty() {
-            text.push_str("\n# Friction by one-joint logs: the speeds and logs, and where other logs refined it the values and\n# the covariance of before. A fit of the same logs begins there, so that none counts twice.\n");
-            let priors = BTreeMap::from([("friction_prior", &self.friction_prior)]);
-            text.push_str(&toml::to_string(&priors).map_err(unwritable)?);
+            put_table(
+                &mut text,
+                "\n# Friction by one-joint logs: the speeds and logs, and where other logs refined it the values and\n# the covariance of before. A fit of the same logs begins there, so that none counts twice.\n",
+                "friction_prior",
+                &self.friction_prior,
+            )?;
         }
         if !self.held_out.is_empty() {
-            text.push_str("\n# What the model leaves of torques that it did not see, blocks of its logs set aside one after the other:\n# for prediction bands and alarms.\n");
-            let held = BTreeMap::from([("held_out", &self.held_out)]);
-            text.push_str(&toml::to_string(&held).map_err(unwritable)?);
+            put_table(
+                &mut text,
+                "\n# What the model leaves of torques that it did not see, blocks of its logs set aside one after the other:\n# for prediction bands and alarms.\n",
+                "held_out",
+                &self.held_out,
+            )?;
         }
         if let Some(excesses) = &self.excesses {
-            let excesses = BTreeMap::from([("excesses", excesses)]);
-            text.push('\n');
-            text.push_str(&toml::to_string(&excesses).map_err(unwritable)?);
+            put_table(&mut text, "\n", "excesses", excesses)?;
         }
         if !self.candidates.is_empty() {
-            text.push_str("\n# Formulas of effects that are the user's own.\n");
-            let own = BTreeMap::from([("candidate", &self.candidates)]);
-            text.push_str(&toml::to_string(&own).map_err(unwritable)?);
+            put_table(
+                &mut text,
+                "\n# Formulas of effects that are the user's own.\n",
+                "candidate",
+                &self.candidates,
+            )?;
         }
         if !self.effects.is_empty() {
-            text.push_str("\n# Effects added to the declared model.\n");
-            let effects = BTreeMap::from([("effect", &self.effects)]);
-            text.push_str(&toml::to_string(&effects).map_err(unwritable)?);
+            let head = "\n# Effects added to the declared model.\n";
+            put_table(&mut text, head, "effect", &self.effects)?;
         }
         if !self.estimates.is_empty() {
-            text.push_str("\n# Estimates: the physical numbers. The parameters and effects above predict with a part of some effects, and are none.\n");
-            let estimates = BTreeMap::from([("estimate", &self.estimates)]);
-            text.push_str(&toml::to_string(&estimates).map_err(unwritable)?);
+            put_table(
+                &mut text,
+                "\n# Estimates: the physical numbers. The parameters and effects above predict with a part of some effects, and are none.\n",
+                "estimate",
+                &self.estimates,
+            )?;
         }
         if let Some(covariance) = &self.estimate_covariance {
             text.push_str(
@@ -250,38 +281,33 @@ impl ModelFile {
             text.push_str("\n# Links that can exist and give the consistent parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");
         }
         for link in &self.links {
-            text.push_str("\n[[link]]\n");
-            text.push_str(&toml::to_string(link).map_err(unwritable)?);
+            put(&mut text, "\n[[link]]\n", toml::to_string(link))?;
         }
         if !self.drive_inertia.is_empty() {
-            text.push_str("\n# Inertias of the drives beside them.\n[drive_inertia]\n");
-            text.push_str(&toml::to_string(&self.drive_inertia).map_err(unwritable)?);
+            put_table(
+                &mut text,
+                "\n# Inertias of the drives beside them.\n",
+                "drive_inertia",
+                &self.drive_inertia,
+            )?;
         }
-        text.push('\n');
-        let provenance = BTreeMap::from([("provenance", &self.provenance)]);
-        text.push_str(&toml::to_string(&provenance).map_err(unwritable)?);
+        put_table(&mut text, "\n", "provenance", &self.provenance)?;
         Ok(text)
     }
 
     fn check_parameters(&self, document: &Document) -> Result<(), ConfigError> {
         let joints = self.robot.joint_names();
-        let mut seen = BTreeMap::new();
+        let mut seen = BTreeSet::new();
         for (index, parameter) in self.parameters.iter().enumerate() {
             let index_text = index.to_string();
             let at = |key| ["parameter", index_text.as_str(), key];
             document.not_negative(&at("std"), parameter.std)?;
-            if let Some(joint) = &parameter.joint
-                && !joints.contains(joint)
-            {
-                let remedy = format!("this robot has {}", joints.join(", "));
-                return Err(document.value(&at("joint"), "is no joint of this robot", &remedy));
+            if let Some(joint) = &parameter.joint {
+                document.known_joint(&at("joint"), joint, &joints)?;
             }
-            if seen.insert(parameter.key(), index).is_some() {
-                return Err(document.value(
-                    &at("name"),
-                    "is there twice",
-                    "keep one table for each parameter",
-                ));
+            if !seen.insert(parameter.key()) {
+                let remedy = "keep one table for each parameter";
+                return Err(document.value(&at("name"), "is there twice", remedy));
             }
         }
         Ok(())
@@ -298,29 +324,20 @@ impl ModelFile {
         };
         let size = covariance.names.len();
         let known: Vec<String> = self.parameters.iter().map(Parameter::key).collect();
-        let at_names = [table, "names"];
         for (index, name) in covariance.names.iter().enumerate() {
             if !known.contains(name) || covariance.names[..index].contains(name) {
-                let problem = format!(
-                    "names `{}`, which is no parameter or there twice",
-                    cft_ident_logs::log::escape(name)
-                );
-                return Err(document.value(
-                    &at_names,
-                    &problem,
-                    "use each parameter once, as `name` or `name:joint`",
-                ));
+                let name = escape(name);
+                let problem = format!("names `{name}`, which is no parameter or there twice");
+                let remedy = "use each parameter once, as `name` or `name:joint`";
+                return Err(document.value(&[table, "names"], &problem, remedy));
             }
         }
         let square = covariance.matrix.len() == size
             && covariance.matrix.iter().all(|row| row.len() == size);
         if !square {
             let remedy = format!("give {size} rows of {size} numbers, or delete [{table}]");
-            return Err(document.value(
-                &[table, "matrix"],
-                "does not have the size of `names`",
-                &remedy,
-            ));
+            let problem = "does not have the size of `names`";
+            return Err(document.value(&[table, "matrix"], problem, &remedy));
         }
         Ok(())
     }
@@ -330,15 +347,10 @@ impl ModelFile {
         let refit = "fit the model again; what stands here is no number to choose";
         let mut there = self.held_out.iter().map(|held| &held.joint);
         if !self.held_out.is_empty() && !joints.iter().all(|joint| there.next() == Some(joint)) {
-            let remedy = format!(
-                "give one table for each of {}, in this order, or none",
-                joints.join(", ")
-            );
-            return Err(document.value(
-                &["held_out", "0", "joint"],
-                "is not in its place",
-                &remedy,
-            ));
+            let joints = joints.join(", ");
+            let remedy = format!("give one table for each of {joints}, in this order, or none");
+            let at = ["held_out", "0", "joint"];
+            return Err(document.value(&at, "is not in its place", &remedy));
         }
         for (index, held) in self.held_out.iter().enumerate() {
             if let Some((key, problem)) = held.fault() {
@@ -358,23 +370,12 @@ impl ModelFile {
     fn check_rest(&self, document: &Document) -> Result<(), ConfigError> {
         let joints = self.robot.joint_names();
         for (joint, std) in &self.residual_std {
-            if !joints.contains(joint) {
-                let remedy = format!("this robot has {}", joints.join(", "));
-                return Err(document.value(
-                    &["residual_std", joint],
-                    "is no joint of this robot",
-                    &remedy,
-                ));
-            }
+            document.known_joint(&["residual_std", joint], joint, &joints)?;
             document.not_negative(&["residual_std", joint], Some(*std))?;
         }
         for (index, prior) in self.friction_prior.iter().enumerate() {
-            let index_text = index.to_string();
-            let at = |key| ["friction_prior", index_text.as_str(), key];
-            if !joints.contains(&prior.joint) {
-                let remedy = format!("this robot has {}", joints.join(", "));
-                return Err(document.value(&at("joint"), "is no joint of this robot", &remedy));
-            }
+            let at = ["friction_prior", &index.to_string(), "joint"];
+            document.known_joint(&at, &prior.joint, &joints)?;
         }
         self.check_held_out(document)?;
         for (joint, inertia) in &self.drive_inertia {
@@ -382,30 +383,19 @@ impl ModelFile {
         }
         for (index, effect) in self.effects.iter().enumerate() {
             let index_text = index.to_string();
+            // the pantograph's references, where the CFT robot's screws are
+            let of_screw = |joint: &String| {
+                self.robot.robot.model == ModelKind::Cft && matches!(joint.as_str(), "x_r" | "y_r")
+            };
             if let Some(joint) = &effect.joint
                 && !self.robot.coordinate_names().contains(joint)
-                // the pantograph's references, where the CFT robot's screws are
-                && !(self.robot.robot.model == ModelKind::Cft
-                    && matches!(joint.as_str(), "x_r" | "y_r"))
+                && !of_screw(joint)
             {
-                let remedy = format!("this robot has {}", joints.join(", "));
-                return Err(document.value(
-                    &["effect", &index_text, "joint"],
-                    "is no joint of this robot",
-                    &remedy,
-                ));
+                document.known_joint(&["effect", &index_text, "joint"], joint, &joints)?;
             }
             for (key, parameter) in &effect.parameters {
-                let at = |what| {
-                    [
-                        "effect",
-                        index_text.as_str(),
-                        "parameters",
-                        key.as_str(),
-                        what,
-                    ]
-                };
-                document.not_negative(&at("std"), parameter.std)?;
+                let at = ["effect", &index_text, "parameters", key, "std"];
+                document.not_negative(&at, parameter.std)?;
             }
         }
         Ok(())

@@ -11,6 +11,7 @@ use super::limits::Limits;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
 use cft_ident_core::robot::cft::{self, Setup, Structure};
 use cft_ident_core::robot::drive::JointDrive;
+use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_logs::log::LogSection;
 
@@ -91,6 +92,16 @@ pub enum FrictionLawKind {
     DoubleTanh,
     /// `Fv v + Fc sgn(v)`.
     ViscousCoulomb,
+}
+
+impl FrictionLawKind {
+    /// Names of its parameters.
+    pub(super) fn names(self) -> &'static [&'static str] {
+        match self {
+            Self::DoubleTanh => &DoubleTanh::NAMES,
+            Self::ViscousCoulomb => &ViscousCoulomb::NAMES,
+        }
+    }
 }
 
 /// Starting values of one joint's friction; the keys are those of the law.
@@ -341,10 +352,12 @@ impl RobotFile {
                     _ => Structure::Printed12,
                 },
             ),
-            ModelKind::Serial => match self.friction.motors {
-                Some(true) => self.with_trains().checked_serial(),
-                _ => self.robot.checked_serial(),
-            },
+            ModelKind::Serial if self.friction.motors == Some(true) => {
+                let mut section = self.robot.clone();
+                section.coupling.extend(self.trains());
+                section.checked_serial()
+            }
+            ModelKind::Serial => self.robot.checked_serial(),
             ModelKind::SingleJoint => Robot::single_joint(
                 self.robot.joint.as_deref().unwrap_or("q1"),
                 self.robot.kind.unwrap_or(JointKind::Revolute),
@@ -363,13 +376,6 @@ impl RobotFile {
         }
     }
 
-    /// The section of a robot whose motors turn two joints each by `gears`, as couplings.
-    fn with_trains(&self) -> RobotSection {
-        let mut section = self.robot.clone();
-        section.coupling.extend(self.trains());
-        section
-    }
-
     /// Motors that turn two joints.
     fn trains(&self) -> Vec<CouplingSection> {
         let names = self.robot.chain_joints();
@@ -385,12 +391,8 @@ impl RobotFile {
                 ratio: ratios[other] / ratios[motor],
             })
         };
-        self.log
-            .gears
-            .iter()
-            .enumerate()
-            .filter_map(train)
-            .collect()
+        let rows = self.log.gears.iter().enumerate();
+        rows.filter_map(train).collect()
     }
 
     /// Joint names in the order of every vector.

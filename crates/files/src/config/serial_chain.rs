@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::ConfigError;
 use super::angles::Changes;
-use super::document::Document;
+use super::document::{Document, near_and_all};
 use super::robot_file::RobotSection;
 use super::serial_section::{
     BASE, CouplingSection, FollowsSection, LinkSection, MOST_LINKS, SineSection,
 };
 use cft_ident_core::explain::Explain;
-use cft_ident_core::robot::tree::space::{Rotation, Vector};
+use cft_ident_core::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
 use cft_ident_core::robot::tree::{
     Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError,
 };
@@ -41,7 +41,6 @@ impl RobotSection {
         kind.unwrap_or(JointKind::Revolute)
     }
 
-    /// Names of the links.
     fn link_names(&self) -> Vec<String> {
         let name = |(i, l): (usize, &LinkSection)| {
             l.name.clone().unwrap_or_else(|| format!("link_{}", i + 1))
@@ -80,20 +79,13 @@ impl RobotSection {
         let parent = names.parent(i, section)?;
         let coordinate = match (&section.joint, &section.follows) {
             (Some(joint), None) => {
-                let before = self.link[..i].iter();
-                if before
-                    .filter_map(|l| l.joint.as_ref())
-                    .any(|other| other == joint)
-                {
+                let mut before = self.link[..i].iter();
+                if before.any(|link| link.joint.as_ref() == Some(joint)) {
                     let remedy = format!(
                         "let this link follow it: `follows = {{ linear = {{ {joint} = 1.0 }} }}`"
                     );
-                    return Err(Misfit::of_link(
-                        i,
-                        "joint",
-                        "moves another link too",
-                        &remedy,
-                    ));
+                    let problem = "moves another link too";
+                    return Err(Misfit::of_link(i, "joint", problem, &remedy));
                 }
                 Coordinate::Joint(names.joint(joint).unwrap_or_default())
             }
@@ -146,11 +138,9 @@ fn placement(i: usize, section: &LinkSection) -> Result<((Rotation, Vector), Vec
         let remedy = "give three numbers that are not all 0";
         return Err(Misfit::of_link(i, "axis", "has no length", remedy));
     }
-    let placed = Link::of_origin(
-        section.xyz.unwrap_or_default(),
-        section.rpy.unwrap_or_default(),
-    );
-    Ok((placed, axis.map(|x| x / length)))
+    let rotation = of_roll_pitch_yaw(&section.rpy.unwrap_or_default());
+    let origin = section.xyz.unwrap_or_default();
+    Ok(((rotation, origin), axis.map(|x| x / length)))
 }
 
 /// Names that a section gives and refers to.
@@ -167,11 +157,8 @@ impl Names {
 
     /// What to do about a name that is no independent joint.
     fn instead_of(&self, joint: &str) -> String {
-        let all = || self.joints.iter().map(String::as_str);
-        let near = nearest(joint, all())
-            .map(|near| format!("did you mean `{near}`? "))
-            .unwrap_or_default();
-        format!("{near}the independent joints are {}", list(all()))
+        let all = self.joints.iter().map(String::as_str);
+        near_and_all(joint, all, "the independent joints are")
     }
 
     /// The link that link `i` hangs on; `None` for the base.
@@ -285,8 +272,7 @@ impl Misfit {
     }
 }
 
-/// Takes angles and axes of the links' rows for what they stand for, unless the file says otherwise;
-/// what was changed, in a sentence.
+/// Takes angles and axes for what they stand for, unless the file says otherwise; what was changed, in a sentence.
 pub(super) fn take_as_meant(
     section: &mut RobotSection,
     document: &Document,
@@ -324,16 +310,11 @@ pub(super) fn take_as_meant(
 /// Refuses rows that `new` wrote and nobody filled in.
 fn filled_in(section: &RobotSection, document: &Document) -> Result<(), ConfigError> {
     for (i, link) in section.link.iter().enumerate() {
-        let index = i.to_string();
-        for (key, value) in [
-            ("a", link.a),
-            ("alpha", link.alpha),
-            ("d", link.d),
-            ("theta", link.theta),
-        ] {
+        let row = [link.a, link.alpha, link.d, link.theta];
+        for (key, value) in ["a", "alpha", "d", "theta"].into_iter().zip(row) {
             if value.is_some_and(f64::is_nan) {
                 return Err(document.value(
-                    &["robot", "link", index.as_str(), key],
+                    &["robot", "link", &i.to_string(), key],
                     "is not filled in yet",
                     "write the row of the modified Denavit-Hartenberg table of each joint, 0.0 where it is zero, or give the arm's URDF: `urdf = \"FILE\"` in [robot] in place of the rows",
                 ));
@@ -341,11 +322,9 @@ fn filled_in(section: &RobotSection, document: &Document) -> Result<(), ConfigEr
         }
     }
     let still = |l: &LinkSection| {
-        let row = [l.a, l.alpha, l.d, l.theta];
-        let zero = |x: f64| x == 0.0;
-        row.into_iter().flatten().all(zero)
-            && l.xyz.into_iter().flatten().all(zero)
-            && l.rpy.into_iter().flatten().all(zero)
+        let row = [l.a, l.alpha, l.d, l.theta].into_iter().flatten();
+        let placed = l.xyz.into_iter().chain(l.rpy).flatten();
+        row.chain(placed).all(|x| x == 0.0)
             && l.parent.is_none()
             && l.kind.unwrap_or(JointKind::Revolute) == JointKind::Revolute
             && l.axis == section.link[0].axis
@@ -372,12 +351,10 @@ pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), C
         ));
     }
     if section.link.len() > MOST_LINKS {
-        let at = MOST_LINKS.to_string();
-        return Err(document.value(
-            &["robot", "link", at.as_str()],
-            &format!("is one of {} links", section.link.len()),
-            &format!("give at most {MOST_LINKS}: the chain that was measured"),
-        ));
+        let problem = format!("is one of {} links", section.link.len());
+        let remedy = format!("give at most {MOST_LINKS}: the chain that was measured");
+        let at = ["robot", "link", &MOST_LINKS.to_string()];
+        return Err(document.value(&at, &problem, &remedy));
     }
     filled_in(section, document)?;
     for name in section.chain_joints() {
@@ -405,27 +382,20 @@ fn frames(section: &RobotSection, document: &Document) -> Result<(), ConfigError
         let index = i.to_string();
         let at = |key| ["robot", "frame", index.as_str(), key];
         if !links.contains(&frame.link) {
-            let near = nearest(&frame.link, links.iter().map(String::as_str));
-            let remedy = match near {
+            let all = || links.iter().map(String::as_str);
+            let remedy = match nearest(&frame.link, all()) {
                 Some(near) => format!("did you mean `{near}`?"),
-                None => format!(
-                    "the links are {}",
-                    list(links.iter().map(String::as_str).take(20))
-                ),
+                None => format!("the links are {}", list(all().take(20))),
             };
             return Err(document.value(&at("link"), "is no moving link of this robot", &remedy));
         }
         if !taken.insert(&frame.name) {
+            let problem = "is the name of a link or frame before it";
             let remedy = "give each frame a name of its own";
-            return Err(document.value(
-                &at("name"),
-                "is the name of a link or frame before it",
-                remedy,
-            ));
+            return Err(document.value(&at("name"), problem, remedy));
         }
-        let finite = |x: &[f64; 3]| x.iter().all(|x| x.is_finite());
         for (key, numbers) in [("xyz", &frame.xyz), ("rpy", &frame.rpy)] {
-            if !finite(numbers) {
+            if !numbers.iter().all(|x| x.is_finite()) {
                 return Err(document.value(&at(key), "is not finite", "give three numbers"));
             }
         }

@@ -3,8 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-/// Largest file of text that is read whole: a model of 200 links with its covariance has less, and a URDF
-/// names its meshes and does not hold them.
+/// Largest file of text that is read whole: models of 200 links are smaller, and URDFs only name their meshes.
 const MOST_BYTES: u64 = 16 << 20;
 
 /// The text of a file that is not too large, whatever stands under its name.

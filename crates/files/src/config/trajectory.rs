@@ -1,10 +1,13 @@
 //! Trajectory files: a Fourier series (43), a single-joint ladder of speeds, or a list of points.
 
+use std::fmt::Write;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
 use super::document::Document;
+use cft_ident_logs::log::is_hidden;
 
 /// In which coordinates a trajectory is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -55,7 +58,6 @@ pub struct FourierSection {
 /// One joint (or actuator) runs back and forth over its range at a ladder of speeds, the others are held.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SingleJointMove {
-    /// The joint that moves.
     pub joint: String,
     /// Speeds of the ladder, each run in both directions [m/s or rad/s].
     pub speeds: Vec<f64>,
@@ -92,11 +94,8 @@ pub struct PointsSection {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Trajectory {
-    /// `kind = "fourier"`.
     Fourier(FourierSection),
-    /// `kind = "single-joint"`.
     SingleJoint(SingleJointMove),
-    /// `kind = "points"`.
     Points(PointsSection),
 }
 
@@ -145,6 +144,24 @@ impl Trajectory {
             Kind::Points => points(&document, raw).map(Self::Points),
         }
     }
+
+    /// The file's text, which [`Trajectory::parse`] reads back to the same numbers. `head` is put
+    /// before it as a comment, line by line.
+    pub fn to_toml(&self, head: &str) -> String {
+        let mut text = String::new();
+        for line in head.lines() {
+            let _ = writeln!(text, "# {}", printable(line));
+        }
+        if !head.is_empty() {
+            text.push('\n');
+        }
+        text + &toml::to_string(self).expect("names and numbers are TOML")
+    }
+}
+
+/// A comment must not contain control characters, and none that forges what it says.
+fn printable(line: &str) -> String {
+    line.chars().filter(|c| !is_hidden(*c)).collect()
 }
 
 /// Refuses a key of another kind of trajectory, which would silently do nothing.
@@ -164,17 +181,12 @@ fn foreign_keys(document: &Document, raw: &TrajectoryToml) -> Result<(), ConfigE
         ("turn_s", raw.turn_s.is_some(), &[SingleJoint]),
         ("point", !raw.point.is_empty(), &[Points]),
     ];
-    match keys
-        .iter()
-        .find(|(_, given, kinds)| *given && !kinds.contains(&raw.kind))
-    {
-        None => Ok(()),
-        Some((key, ..)) => Err(document.value(
-            &[key],
-            "does not belong to this kind of trajectory",
-            "delete it, or choose the right `kind`",
-        )),
-    }
+    let foreign = |(_, given, kinds): &&(&str, bool, &[Kind])| *given && !kinds.contains(&raw.kind);
+    let Some((key, ..)) = keys.iter().find(foreign) else {
+        return Ok(());
+    };
+    let problem = "does not belong to this kind of trajectory";
+    Err(document.value(&[key], problem, "delete it, or choose the right `kind`"))
 }
 
 fn coordinates(document: &Document, raw: &TrajectoryToml) -> Result<Coordinates, ConfigError> {
@@ -188,27 +200,20 @@ fn coordinates(document: &Document, raw: &TrajectoryToml) -> Result<Coordinates,
 
 fn fourier(document: &Document, raw: TrajectoryToml) -> Result<FourierSection, ConfigError> {
     let coordinates = coordinates(document, &raw)?;
-    let fundamental_hz = raw
-        .fundamental_hz
-        .ok_or_else(|| document.missing(&["fundamental_hz"], "the fundamental frequency in Hz"))?;
+    let Some(fundamental_hz) = raw.fundamental_hz else {
+        return Err(document.missing(&["fundamental_hz"], "the fundamental frequency in Hz"));
+    };
     document.positive(&["fundamental_hz"], fundamental_hz)?;
     document.not_negative(&["blend_s"], raw.blend_s)?;
     if raw.coordinate.is_empty() {
-        return Err(document.missing(
-            &["coordinate"],
-            "a `[[coordinate]]` table for each coordinate",
-        ));
+        let remedy = "a `[[coordinate]]` table for each coordinate";
+        return Err(document.missing(&["coordinate"], remedy));
     }
     for (index, coordinate) in raw.coordinate.iter().enumerate() {
         let index = index.to_string();
         let at = ["coordinate", index.as_str(), "name"];
-        if raw
-            .coordinate
-            .iter()
-            .filter(|c| c.name == coordinate.name)
-            .count()
-            > 1
-        {
+        let mut others = raw.coordinate.iter().filter(|c| c.name == coordinate.name);
+        if others.nth(1).is_some() {
             return Err(document.value(&at, "is named twice", "give each coordinate one table"));
         }
         if coordinates == Coordinates::Cartesian && !CARTESIAN.contains(&coordinate.name.as_str()) {
@@ -241,10 +246,8 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
         .joint
         .ok_or_else(|| document.missing(&["joint"], "the joint that moves"))?;
     if raw.speeds.is_empty() {
-        return Err(document.missing(
-            &["speeds"],
-            "the ladder of speeds, e.g. `speeds = [0.02, 0.1, 0.4]`",
-        ));
+        let remedy = "the ladder of speeds, e.g. `speeds = [0.02, 0.1, 0.4]`";
+        return Err(document.missing(&["speeds"], remedy));
     }
     for &speed in &raw.speeds {
         document.positive(&["speeds"], speed)?;
@@ -254,12 +257,8 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
     {
         return Err(document.value(&["range"], "is empty", "write the lower end first"));
     }
-    if let Some(acceleration) = raw.acceleration {
-        document.positive(&["acceleration"], acceleration)?;
-    }
-    if let Some(turn) = raw.turn_s {
-        document.positive(&["turn_s"], turn)?;
-    }
+    document.positive(&["acceleration"], raw.acceleration)?;
+    document.positive(&["turn_s"], raw.turn_s)?;
     Ok(SingleJointMove {
         joint,
         speeds: raw.speeds,
@@ -272,10 +271,8 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
 fn points(document: &Document, raw: TrajectoryToml) -> Result<PointsSection, ConfigError> {
     let coordinates = coordinates(document, &raw)?;
     if raw.point.len() < 2 {
-        return Err(document.missing(
-            &["point"],
-            "at least two `[[point]]` tables with `t` and `position`",
-        ));
+        let remedy = "at least two `[[point]]` tables with `t` and `position`";
+        return Err(document.missing(&["point"], remedy));
     }
     for (index, pair) in raw.point.windows(2).enumerate() {
         let index = (index + 1).to_string();
@@ -298,4 +295,50 @@ fn points(document: &Document, raw: TrajectoryToml) -> Result<PointsSection, Con
         coordinates,
         points: raw.point,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_reads_back_as_it_was() {
+        let all = [
+            Trajectory::Fourier(FourierSection {
+                coordinates: Coordinates::Cartesian,
+                fundamental_hz: 0.4,
+                start_s: Some(0.1 + 0.2),
+                blend_s: Some(2.0),
+                periods: Some(14),
+                series: vec![FourierCoordinate {
+                    name: "x_c1".into(),
+                    offset: -0.1343,
+                    a: vec![1e-9, -3.0],
+                    b: vec![0.1 / 3.0, 1e20],
+                }],
+            }),
+            Trajectory::SingleJoint(SingleJointMove {
+                joint: "q\"4\\".into(),
+                speeds: vec![0.005, 1.0],
+                range: Some([-0.5, 0.25]),
+                acceleration: Some(3.0),
+                turn_s: Some(0.7),
+            }),
+            Trajectory::Points(PointsSection {
+                coordinates: Coordinates::Joint,
+                points: (0..3)
+                    .map(|k| Point {
+                        t: f64::from(k),
+                        position: vec![0.1 * f64::from(k), -0.2],
+                    })
+                    .collect(),
+            }),
+        ];
+        for trajectory in all {
+            let text = trajectory.to_toml("a comment\nof two lines \u{7}");
+            assert!(text.starts_with("# a comment\n# of two lines \n\nkind"));
+            let back = Trajectory::parse("t.toml", &text).expect("readable");
+            assert_eq!(back, trajectory, "{text}");
+        }
+    }
 }

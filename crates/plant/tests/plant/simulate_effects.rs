@@ -352,7 +352,7 @@ fn effect_with_inertia_in_actuator_coordinates_adds_the_rotor_energy() {
     };
     let power = |k: usize| {
         let (q, v) = (recording.actual.q[k], recording.actual.v[k]);
-        let gravity = dynamics::gravity(&q, &truth.printed());
+        let gravity = dynamics::gravity_torque(&q, &Coefficients::from_theta12(&truth.printed()));
         -(0..4).map(|i| gravity[i] * v[i]).sum::<f64>()
     };
     let last = recording.rows() - 1;

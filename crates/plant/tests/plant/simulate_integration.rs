@@ -1,7 +1,7 @@
 //! The integration against the equations: reference states, energy, tolerance, a second integrator.
 
 use cft_ident_core::robot::cft::geometry::{GRAVITY, L4, L6, U};
-use cft_ident_core::robot::cft::{Setup, dynamics};
+use cft_ident_core::robot::cft::{Coefficients, Setup, dynamics};
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::integrate::{DormandPrince, System, Tolerance};
@@ -74,7 +74,7 @@ fn plant_accelerates_as_the_reference_states_say() {
 
 /// Kinetic plus potential energy of the frictionless robot; the potential's gradient is G of eq. (17).
 fn energy(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> f64 {
-    let mass = dynamics::mass_matrix(q, theta);
+    let mass = dynamics::inertia(q, &Coefficients::from_theta12(theta));
     let kinetic: f64 = (0..4)
         .flat_map(|i| (0..4).map(move |j| (i, j)))
         .map(|(i, j)| 0.5 * v[i] * mass[i][j] * v[j])

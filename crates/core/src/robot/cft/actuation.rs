@@ -134,27 +134,6 @@ pub fn torques_to_forces(q: &[f64; 4], tau: &[f64; 4]) -> Result<[f64; 4], Robot
     Ok([-f_yr, f_xr, tau[1], tau[0]])
 }
 
-/// The matrix of eq. (66), d tau(q1, q2, q4, q5) / d F(x_c1..x_c4).
-pub(crate) fn torque_per_force(q: &[f64; 4]) -> [[f64; 4]; 4] {
-    let mut matrix = [[0.0; 4]; 4];
-    for j in 0..4 {
-        let mut unit = [0.0; 4];
-        unit[j] = 1.0;
-        let column = forces_to_torques(q, &unit);
-        for i in 0..4 {
-            matrix[i][j] = column[i];
-        }
-    }
-    matrix
-}
-
-/// Covariance of the joint torques of independent noise on the motor forces with the variances
-/// given (N^2, N^2 m^2 for x_c3): tau4 and tau5 are correlated, and more so by the pose.
-pub fn torque_covariance(q: &[f64; 4], force_variance: &[f64; 4]) -> [[f64; 4]; 4] {
-    let b = torque_per_force(q);
-    congruence(&b, force_variance)
-}
-
 /// Covariance of (q1, q2, q4, q5) of independent errors of x_c1..x_c4 with the variances given
 /// (m^2, rad^2): the encoders sit on the motors, so q4 and q5 are correlated by the pose.
 ///
@@ -178,18 +157,6 @@ pub fn joint_covariance(
 /// Variance of x_c1..x_c4 that rounding to whole encoder counts adds: scale^2/12, in m^2 and rad^2.
 pub fn quantisation_variance() -> [f64; 4] {
     ENCODER_SCALE.map(|scale| scale * scale / 12.0)
-}
-
-/// Encoder counts of the coordinates x_c1..x_c4, rounded to whole counts (Table 5).
-#[inline]
-pub fn counts(x: &[f64; 4]) -> [i64; 4] {
-    std::array::from_fn(|i| (x[i] / ENCODER_SCALE[i]).round() as i64)
-}
-
-/// Coordinates x_c1..x_c4 in m and rad of encoder counts.
-#[inline]
-pub fn coordinates_of_counts(counts: &[i64; 4]) -> [f64; 4] {
-    std::array::from_fn(|i| counts[i] as f64 * ENCODER_SCALE[i])
 }
 
 /// A diag(d) A^T.

@@ -73,13 +73,9 @@ impl Coefficients {
 
     /// From the 22 base parameters: theta_1..theta_12, then BB, EE, CC, AC, BE, S, OC, OE, OA, OB.
     pub fn from_theta22(theta: &[f64; 22]) -> Self {
-        let mut printed = [0.0; 12];
-        printed.copy_from_slice(&theta[..12]);
-        let [bb, ee, cc, ac, be, s, oc, oe, oa, ob] = [
-            theta[12], theta[13], theta[14], theta[15], theta[16], theta[17], theta[18], theta[19],
-            theta[20], theta[21],
-        ];
-        let mut full = Self::from_theta12(&printed);
+        let printed = theta.first_chunk().expect("12 of 22");
+        let [bb, ee, cc, ac, be, s, oc, oe, oa, ob] = *theta.last_chunk().expect("10 of 22");
+        let mut full = Self::from_theta12(printed);
         full.squares[1] += bb;
         full.squares[2] += cc;
         full.squares[3] += ee;
@@ -94,49 +90,19 @@ impl Coefficients {
     }
 }
 
-/// Sines and cosines of one pose: everything below is a polynomial in them.
-#[derive(Debug, Clone, Copy)]
-struct Pose {
-    s2: f64,
-    c2: f64,
-    s4: f64,
-    c4: f64,
-    s: f64,
-    c: f64,
-    s5: f64,
-    c5: f64,
-}
+/// Sines and cosines of q2, q4, q4 + q5 and q5: everything below is a polynomial in them.
+type Pose = [f64; 8];
 
-impl Pose {
-    fn new(q: &[f64; 4]) -> Self {
-        let (s2, c2) = q[1].sin_cos();
-        let (s4, c4) = q[2].sin_cos();
-        let (s, c) = (q[2] + q[3]).sin_cos();
-        Self {
-            s2,
-            c2,
-            s4,
-            c4,
-            s,
-            c,
-            s5: s * c4 - c * s4,
-            c5: c * c4 + s * s4,
-        }
-    }
+fn pose(q: &[f64; 4]) -> Pose {
+    let (s2, c2) = q[1].sin_cos();
+    let (s4, c4) = q[2].sin_cos();
+    let (s, c) = (q[2] + q[3]).sin_cos();
+    [s2, c2, s4, c4, s, c, s * c4 - c * s4, c * c4 + s * s4]
 }
 
 /// M in the velocities (v1, v2, v4, w), upper part as [M12, M1phi, M1psi, M22, M2phi, M2psi, P, X, R] with M11 apart.
 fn inertia_in_angles(p: &Pose, k: &Coefficients) -> [f64; 9] {
-    let Pose {
-        s2,
-        c2,
-        s4,
-        c4,
-        s,
-        c,
-        s5,
-        c5,
-    } = *p;
+    let [s2, c2, s4, c4, s, c, s5, c5] = *p;
     let [a, b, cc, e] = k.h;
     let moving = a * s4 + b * s + cc * c4 + e * c;
     let radial = k.h0 + moving;
@@ -169,16 +135,7 @@ fn inertia_in_angles(p: &Pose, k: &Coefficients) -> [f64; 9] {
 
 /// Christoffel matrix in the velocities (v1, v2, v4, w), columns 2, phi, psi; the first is zero.
 fn christoffel_in_angles(p: &Pose, k: &Coefficients, v: &[f64; 4]) -> [[f64; 3]; 4] {
-    let Pose {
-        s2,
-        c2,
-        s4,
-        c4,
-        s,
-        c,
-        s5,
-        c5,
-    } = *p;
+    let [s2, c2, s4, c4, s, c, s5, c5] = *p;
     let (v2, v4, w) = (v[1], v[2], v[2] + v[3]);
     let [a, b, cc, e] = k.h;
     let radial = k.h0 + a * s4 + b * s + cc * c4 + e * c;
@@ -219,11 +176,12 @@ fn christoffel_in_angles(p: &Pose, k: &Coefficients, v: &[f64; 4]) -> [[f64; 3];
 }
 
 fn gravity_in_angles(p: &Pose, k: &Coefficients) -> [f64; 2] {
+    let [_, _, s4, c4, s, c, ..] = *p;
     let [a, b, cc, e] = k.h;
     let m = L4 * k.mr;
     [
-        GRAVITY * ((a - m) * p.s4 + cc * p.c4),
-        GRAVITY * ((b - m) * p.s + e * p.c),
+        GRAVITY * ((a - m) * s4 + cc * c4),
+        GRAVITY * ((b - m) * s + e * c),
     ]
 }
 
@@ -240,12 +198,12 @@ fn inertia_in_joints(k: &Coefficients, m: [f64; 9]) -> [[f64; 4]; 4] {
 
 /// Inertia matrix M(q) of eq. (60), symmetric, joint order (q1, q2, q4, q5); kg, kg m, kg m^2.
 pub fn inertia(q: &[f64; 4], k: &Coefficients) -> [[f64; 4]; 4] {
-    inertia_in_joints(k, inertia_in_angles(&Pose::new(q), k))
+    inertia_in_joints(k, inertia_in_angles(&pose(q), k))
 }
 
 /// Coriolis matrix C(q, v) in the Christoffel form of eq. (16), so that dM/dt - 2 C is skew (19).
 pub fn coriolis(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> [[f64; 4]; 4] {
-    let [r1, r2, phi, psi] = christoffel_in_angles(&Pose::new(q), k, v);
+    let [r1, r2, phi, psi] = christoffel_in_angles(&pose(q), k, v);
     let row = |r: [f64; 3]| [0.0, r[0], r[1] + r[2], r[2]];
     [
         row(r1),
@@ -257,16 +215,16 @@ pub fn coriolis(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> [[f64; 4]; 4] {
 
 /// Gravity torque G(q) of eq. (60), (17), in N and N m; zero on q1 and q2.
 pub fn gravity_torque(q: &[f64; 4], k: &Coefficients) -> [f64; 4] {
-    let [phi, psi] = gravity_in_angles(&Pose::new(q), k);
+    let [phi, psi] = gravity_in_angles(&pose(q), k);
     [0.0, 0.0, phi + psi, psi]
 }
 
 /// M(q) and C(q, v) v + G(q) from one set of sines and cosines: what an integrator needs.
 pub fn inertia_and_bias(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> ([[f64; 4]; 4], [f64; 4]) {
-    let pose = Pose::new(q);
-    let m = inertia_in_joints(k, inertia_in_angles(&pose, k));
-    let c = christoffel_in_angles(&pose, k, v);
-    let [g_phi, g_psi] = gravity_in_angles(&pose, k);
+    let p = pose(q);
+    let m = inertia_in_joints(k, inertia_in_angles(&p, k));
+    let c = christoffel_in_angles(&p, k, v);
+    let [g_phi, g_psi] = gravity_in_angles(&p, k);
     let w = v[2] + v[3];
     let row = |r: [f64; 3]| r[0] * v[1] + r[1] * v[2] + r[2] * w;
     let psi = row(c[3]) + g_psi;
@@ -281,21 +239,7 @@ pub fn inverse_dynamics(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4], k: &Coefficien
     })
 }
 
-/// Acceleration M^-1 (torque - C v - G) for a torque from which friction is already taken off.
-///
-/// `None` where M is not positive definite, which no physical theta gives.
-pub fn forward_dynamics(
-    q: &[f64; 4],
-    v: &[f64; 4],
-    torque: &[f64; 4],
-    k: &Coefficients,
-) -> Option<[f64; 4]> {
-    let (m, bias) = inertia_and_bias(q, v, k);
-    solve_positive(&m, &std::array::from_fn(|i| torque[i] - bias[i]))
-}
-
-/// x with M x = b for a symmetric positive definite M, by L D L^T written out (no square roots,
-/// four divisions); `None` when M is not.
+/// x with M x = b by L D L^T written out, without roots; `None` where the symmetric M is not positive definite.
 #[inline]
 pub(crate) fn solve_positive(m: &[[f64; 4]; 4], b: &[f64; 4]) -> Option<[f64; 4]> {
     let d0 = m[0][0];
@@ -321,19 +265,4 @@ pub(crate) fn solve_positive(m: &[[f64; 4]; 4], b: &[f64; 4]) -> Option<[f64; 4]
     let x2 = y2 * i2 - l23 * x3;
     let x1 = y1 * i1 - l12 * x2 - l13 * x3;
     Some([y0 * i0 - l1 * x1 - l2 * x2 - l3 * x3, x1, x2, x3])
-}
-
-/// [`inertia`] from theta_1..theta_12.
-pub fn mass_matrix(q: &[f64; 4], theta: &[f64; 12]) -> [[f64; 4]; 4] {
-    inertia(q, &Coefficients::from_theta12(theta))
-}
-
-/// [`coriolis`] from theta_1..theta_12.
-pub fn coriolis_matrix(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> [[f64; 4]; 4] {
-    coriolis(q, v, &Coefficients::from_theta12(theta))
-}
-
-/// [`gravity_torque`] from theta_1..theta_12.
-pub fn gravity(q: &[f64; 4], theta: &[f64; 12]) -> [f64; 4] {
-    gravity_torque(q, &Coefficients::from_theta12(theta))
 }

@@ -23,6 +23,6 @@ pub const U: f64 = L5 - L4;
 /// Encoder alignment of the base rotation: x_c3 at which the arm lies along x0, in rad.
 pub(crate) const BASE_ANGLE: f64 = 0.8292;
 /// x_c1 at which the wrist is level with frame 0', in m (the 0.25 of eq. (44)).
-pub const LEVEL: f64 = 0.25;
+pub(crate) const LEVEL: f64 = 0.25;
 /// Acceleration of gravity g, in m/s^2.
 pub const GRAVITY: f64 = 9.81;

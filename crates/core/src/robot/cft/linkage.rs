@@ -4,7 +4,9 @@
 use super::geometry::{D, D6, GRAVITY, L2, L4, L5, L6, L7};
 use super::links::PseudoInertia;
 use crate::robot::joint::JointKind;
+use crate::robot::standard::standard_of;
 use crate::robot::tree::{Coordinate, DependentCoordinate, Link, Sine, Tree, TreeError};
+use nalgebra::Matrix4;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Moving links 1..8; link 8 is at rest on link 7 and a frame of its own in Table 2.
@@ -35,6 +37,7 @@ pub fn chain() -> Result<Tree, TreeError> {
     );
     let q6 = follows(0.0, vec![(3, -1.0)], Vec::new());
     let q7 = follows(PI, vec![(2, -1.0)], Vec::new());
+    let at_rest = follows(0.0, Vec::new(), Vec::new());
     let rows: [(f64, f64, f64, f64, JointKind, Coordinate); LINKS] = [
         (0.0, -FRAC_PI_2, 0.0, 0.0, Prismatic, Coordinate::Joint(0)),
         (0.0, FRAC_PI_2, L2, 0.0, Revolute, Coordinate::Joint(1)),
@@ -43,14 +46,7 @@ pub fn chain() -> Result<Tree, TreeError> {
         (L4, 0.0, 0.0, 0.0, Revolute, Coordinate::Joint(3)),
         (L5, 0.0, D6, 0.0, Revolute, q6),
         (L6, 0.0, -D6, 0.0, Revolute, q7),
-        (
-            L7,
-            0.0,
-            0.0,
-            FRAC_PI_2,
-            Revolute,
-            follows(0.0, Vec::new(), Vec::new()),
-        ),
+        (L7, 0.0, 0.0, FRAC_PI_2, Revolute, at_rest),
     ];
     let links = rows
         .into_iter()
@@ -71,34 +67,10 @@ pub fn chain() -> Result<Tree, TreeError> {
     Tree::new(links, super::JOINTS.len(), [0.0, 0.0, -GRAVITY])
 }
 
-/// Links with the 22 base parameters given (order of [`super::EXTENDED`]): of the many the one with
-/// delta = 0 and no masses but m1, m6 and m7. They move the joints as the robot does and are no
-/// picture of its links.
+/// Of the many links with these base parameters those with delta = 0 and only the masses m1, m6 and m7: no picture.
 pub(crate) fn links_of(theta: &[f64; 22]) -> [PseudoInertia; LINKS] {
-    let [
-        t1,
-        t2,
-        t3,
-        t4,
-        t5,
-        t6,
-        t7,
-        t8,
-        t9,
-        t10,
-        t11,
-        t12,
-        bb,
-        ee,
-        cc,
-        ac,
-        be,
-        s,
-        oc,
-        oe,
-        oa,
-        ob,
-    ] = *theta;
+    let t = |number: usize| theta[number - 1];
+    let [bb, ee, cc, ac, be, s, oc, oe, oa, ob] = *theta.last_chunk().expect("10 of 22");
     let mut links = [[[0.0; 4]; 4]; LINKS];
     let mut set = |link: usize, r: usize, c: usize, x: f64| {
         links[link - 1][r][c] = x;
@@ -110,19 +82,19 @@ pub(crate) fn links_of(theta: &[f64; 22]) -> [PseudoInertia; LINKS] {
     const ONE: usize = 3;
     // S = L4 m3 lz3 - L6 (m7 ly7 + m8 lx8), all of it in link 7
     let radial = -s / L6;
-    set(1, ONE, ONE, t1);
-    set(2, X, ONE, t2);
-    set(2, Y, ONE, t3 - radial);
-    set(2, X, X, t4 - 2.0 * D * radial);
+    set(1, ONE, ONE, t(1));
+    set(2, X, ONE, t(2));
+    set(2, Y, ONE, t(3) - radial);
+    set(2, X, X, t(4) - 2.0 * D * radial);
     set(7, Y, ONE, radial);
-    set(4, X, ONE, t5);
-    set(4, Y, ONE, t6);
-    set(6, X, ONE, t7);
-    set(6, Y, ONE, t8);
-    set(5, X, ONE, t9);
-    set(5, Y, ONE, t10);
-    set(6, ONE, ONE, t11);
-    set(7, ONE, ONE, t12);
+    set(4, X, ONE, t(5));
+    set(4, Y, ONE, t(6));
+    set(6, X, ONE, t(7));
+    set(6, Y, ONE, t(8));
+    set(5, X, ONE, t(9));
+    set(5, Y, ONE, t(10));
+    set(6, ONE, ONE, t(11));
+    set(7, ONE, ONE, t(12));
     set(5, X, X, bb);
     set(5, Y, Y, ee);
     set(4, Y, Y, cc);
@@ -139,20 +111,7 @@ impl PseudoInertia {
     /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of the frame [kg m^2], first moments [kg m] and
     /// mass [kg]: I = trace(J) 1 - J.
     pub fn standard(&self) -> [f64; 10] {
-        let j = &self.0;
-        let [xx, yy, zz] = [j[0][0], j[1][1], j[2][2]];
-        [
-            yy + zz,
-            -j[0][1],
-            -j[0][2],
-            xx + zz,
-            -j[1][2],
-            xx + yy,
-            j[0][3],
-            j[1][3],
-            j[2][3],
-            j[3][3],
-        ]
+        standard_of(&Matrix4::from(self.0))
     }
 }
 

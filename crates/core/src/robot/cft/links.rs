@@ -5,56 +5,10 @@
 //! 22 combinations can be distinguished from the outside, the base parameters.
 
 use super::geometry::{D, D6, L4, L5, L6};
-use nalgebra::Matrix4;
-
-/// Mass, centre of gravity and moments of inertia of one link.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MassProperties {
-    /// m in kg.
-    pub mass: f64,
-    /// Centre of gravity l in the link's frame, in m.
-    pub centre: [f64; 3],
-    /// Moments of inertia (I*xx, I*yy, I*zz) about the centre, axes parallel to the link's, kg m^2.
-    pub moments: [f64; 3],
-    /// Integrals of xy, xz and yz dm about the centre, kg m^2 (the report's I_xy, I_xz, I_yz).
-    pub products: [f64; 3],
-}
 
 /// Pseudo-inertia of a link about the origin of its frame: symmetric, last row m (lx, ly, lz, 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PseudoInertia(pub [[f64; 4]; 4]);
-
-impl From<&MassProperties> for PseudoInertia {
-    /// Eq. (8) about the centre of gravity, moved to the origin of the link's frame.
-    fn from(link: &MassProperties) -> Self {
-        let [ixx, iyy, izz] = link.moments;
-        let [xy, xz, yz] = link.products;
-        let trace = 0.5 * (ixx + iyy + izz);
-        let centred = [
-            [trace - ixx, xy, xz],
-            [xy, trace - iyy, yz],
-            [xz, yz, trace - izz],
-        ];
-        let (m, l) = (link.mass, link.centre);
-        let mut j = [[0.0; 4]; 4];
-        for r in 0..3 {
-            for c in 0..3 {
-                j[r][c] = centred[r][c] + m * l[r] * l[c];
-            }
-            j[r][3] = m * l[r];
-            j[3][r] = m * l[r];
-        }
-        j[3][3] = m;
-        Self(j)
-    }
-}
-
-impl PseudoInertia {
-    /// Smallest eigenvalue: a body of positive mass density has none that is negative.
-    pub fn smallest_eigenvalue(&self) -> f64 {
-        Matrix4::from(self.0).symmetric_eigenvalues().min()
-    }
-}
 
 /// The 22 base parameters of links 1..8, in the order of [`super::EXTENDED`].
 pub fn base_parameters(links: &[PseudoInertia; 8]) -> [f64; 22] {
@@ -111,10 +65,4 @@ pub fn base_parameters(links: &[PseudoInertia; 8]) -> [f64; 22] {
         L4 * (my(3) + mz(4) + mz(5)) - xz(5) - L6 * (mz(6) + mz(7) + mz(8))
             + D6 * L6 * (m(3) + m(4) + m(5) - delta),
     ]
-}
-
-/// theta_1..theta_12 of links 1..8 (Table 4): the first twelve of [`base_parameters`].
-pub fn printed_parameters(links: &[PseudoInertia; 8]) -> [f64; 12] {
-    let base = base_parameters(links);
-    std::array::from_fn(|i| base[i])
 }

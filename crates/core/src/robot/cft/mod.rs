@@ -4,21 +4,15 @@
 //! | file | what | source |
 //! |---|---|---|
 //! | [`geometry`] | dimensions | Table 1 |
-//! | [`chain`] | frames, tool position and orientation | Table 2, (1), (2), (44), (54), (58), (59) |
 //! | [`pantograph`] | x_c1..x_c4 to q1, q2, q4, q5 and back | (45)-(57), (62) |
 //! | [`dynamics`] | M, C, G | Appendix B |
 //! | [`regressor`] | Y, 12 or 22 parameters | (26), (39) |
-//! | [`cartesian`] | M_x, V_x, G_x, F_x | after (61) |
-//! | [`bounds`] | bounds of M, C, G, F | (22)-(25) |
 //! | [`links`] | link masses to theta | Table 4, (5)-(9) |
 //! | [`linkage`] | the arm as a chain of general links | Table 2, (54), (56) |
 //! | [`actuation`] | volts, motor forces, counts, limits | (63)-(66), Tables 5 and 6 |
 //! | [`practice`] | how it is run, numbers of a synthetic one | Table 3 |
 
 pub mod actuation;
-pub mod bounds;
-pub mod cartesian;
-pub mod chain;
 pub mod dynamics;
 pub mod geometry;
 pub mod linkage;
@@ -31,7 +25,7 @@ mod parameters;
 
 pub use actuation::{ActuationLimits, Setup};
 pub use dynamics::Coefficients;
-pub use parameters::{EXTENDED, FRICTION, PRINTED, UNPRINTED};
+pub use parameters::{EXTENDED, PRINTED, UNPRINTED};
 
 /// Joint names in the order of all vectors.
 pub const JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];

@@ -65,15 +65,6 @@ pub fn link_angles(x_r: f64, y_r: f64) -> Result<(f64, f64), RobotError> {
     Ok((gamma - theta, gamma + theta))
 }
 
-/// alpha as eq. (53) prints it, by arcsine where x_r < 0 and by arccosine elsewhere.
-pub fn alpha_by_branch(x_r: f64, y_r: f64, beta: f64) -> f64 {
-    if x_r < 0.0 {
-        (y_r / L4 - beta.sin()).asin()
-    } else {
-        (-x_r / L4 - beta.cos()).acos()
-    }
-}
-
 /// Joints (q1, q2, q4, q5) of the coordinates (x_c1..x_c4) (eq. (57)).
 ///
 /// # Errors
@@ -115,17 +106,6 @@ pub fn reference_jacobian_rate(q: &[f64; 4], v: &[f64; 4]) -> [[f64; 2]; 2] {
     [
         [L4 * (s * w + s4 * v4), L4 * s * w],
         [-L4 * (c * w + c4 * v4), -L4 * c * w],
-    ]
-}
-
-/// Jacobian d(x_c1..x_c4)/d(q1, q2, q4, q5), rows x_c1..x_c4.
-pub fn cartesian_jacobian(q: &[f64; 4]) -> [[f64; 4]; 4] {
-    let [x, y] = reference_jacobian(q);
-    [
-        [0.0, 0.0, -DOWNWARD_RATIO * y[0], -DOWNWARD_RATIO * y[1]],
-        [0.0, 0.0, OUTWARD_RATIO * x[0], OUTWARD_RATIO * x[1]],
-        [0.0, 1.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0, 0.0],
     ]
 }
 

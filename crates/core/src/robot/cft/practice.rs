@@ -21,8 +21,7 @@ pub const FRICTION: [f64; 20] = [
     20.0, 6.0, 6.0, 6.0,
 ];
 
-/// Slowest plateau of q1 \[m/s\] and of q2, q4, q5 \[rad/s\] in a one-joint experiment: a third of the speed
-/// at which friction with a slope of 200 s/m or 60 s/rad bends.
+/// Slowest plateaus \[m/s, rad/s\]: a third of the speed at which friction of slope 200 s/m or 60 s/rad bends.
 const SLOWEST: [f64; 4] = [0.0015, 0.005, 0.005, 0.005];
 /// Largest voltage of the amplifiers \[V\].
 const AMPLIFIER: f64 = 10.0;
@@ -39,9 +38,8 @@ const CONVERSION: [f64; 4] = [
     0.06 / (6.0 * std::f64::consts::TAU),
 ];
 
-/// The report's excitation trajectory in (x_c1, x_c2, x_c3, x_c4): Table 3, N = 4, with the printed offsets,
-/// then a_l and b_l. It lies inside Table 5 on TUeDACS; on dSPACE x_c4 needs another offset.
-pub(crate) const TABLE_3: ([f64; 4], [[f64; 4]; 4], [[f64; 4]; 4]) = (
+/// Table 3 of the report, of 0.4 Hz: offsets of x_c1..x_c4, then a_l and b_l for l = 1..4; inside Table 5 on TUeDACS.
+const TABLE_3: ([f64; 4], [[f64; 4]; 4], [[f64; 4]; 4]) = (
     [-0.1343, 0.2766, 2.4, 0.0869],
     [
         [-0.1102, 0.1629, 1.9698, 0.0002],
@@ -56,9 +54,6 @@ pub(crate) const TABLE_3: ([f64; 4], [[f64; 4]; 4], [[f64; 4]; 4]) = (
         [-0.0168, -0.0277, 0.0024, 0.0447],
     ],
 );
-/// Its fundamental \[Hz\].
-pub(crate) const TABLE_3_HZ: f64 = 0.4;
-
 /// Top speeds of the motor coordinates (x_c1, x_c2, x_c3, x_c4) at 4000 revolutions per minute:
 /// 0.167 m/s on y_r and x_r (seven and six times that on x_c1 and x_c2), 2.26 rad/s, 0.667 m/s.
 pub fn coordinate_speeds() -> [f64; 4] {
@@ -66,7 +61,6 @@ pub fn coordinate_speeds() -> [f64; 4] {
     std::array::from_fn(|i| ratio[i] * CONVERSION[i] * MOTOR_SPEED)
 }
 
-/// Practice on a set-up.
 pub fn of(setup: Setup) -> Practice {
     // Volts per newton differ by a factor of four between the set-ups.
     let scale = Setup::Tuedacs.gains()[0] / setup.gains()[0];
@@ -109,6 +103,6 @@ fn excitation(setup: Setup) -> Excitation {
         offset: offset.to_vec(),
         a: rows(a),
         b: rows(b),
-        fundamental_hz: TABLE_3_HZ,
+        fundamental_hz: 0.4,
     }
 }

@@ -8,34 +8,9 @@ use super::geometry::{D, D6, GRAVITY, L4, L6, U};
 
 type Column = [f64; 4];
 
-/// Columns of the lumped coefficients; joint rows q1, q2, then angle rows phi and psi.
-struct Columns {
-    t1: Column,
-    mr: Column,
-    o: Column,
-    h0: Column,
-    k: Column,
-    a: Column,
-    b: Column,
-    cc: Column,
-    e: Column,
-    aa: Column,
-    bb: Column,
-    ab: Column,
-    bc: Column,
-    ac: Column,
-    be: Column,
-    oa: Column,
-    ob: Column,
-    oc: Column,
-    oe: Column,
-    c4c4: Column,
-    ee: Column,
-    s: Column,
-}
-
+/// Columns of the 22 base parameters in their order; joint rows q1, q2, then angle rows phi and psi.
 #[inline(always)]
-fn columns(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4]) -> Columns {
+fn columns(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4]) -> [Column; 22] {
     let (s2, c2) = q[1].sin_cos();
     let (s4, c4) = q[2].sin_cos();
     let (s, c) = (q[2] + q[3]).sin_cos();
@@ -59,70 +34,109 @@ fn columns(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4]) -> Columns {
     let row2 = |f: f64, df: f64| f * (2.0 * D * a2 - a1 * s2) + df * 2.0 * D * v2;
     // Row q2 of a part n of N.
     let axis = |n: f64, dn: f64| n * a2 + dn * v2;
-    Columns {
-        t1: [a1, 0.0, 0.0, 0.0],
-        mr: [a1, 0.0, lift * lift_phi, lift * lift_psi],
-        o: [c2 * a2 - s2 * v2v2, a1 * c2, 0.0, 0.0],
-        h0: [-turn, -a1 * s2, 0.0, 0.0],
-        k: [0.0, a2, 0.0, 0.0],
-        a: [
-            row1(s4, ds4, dds4),
-            row2(s4, ds4),
-            pull * c4 - ddc4 * lift_phi + lift * s4,
-            -ddc4 * lift_psi,
-        ],
-        b: [
-            row1(s, ds, dds),
-            row2(s, ds),
-            -ddc * lift_phi,
-            pull * c - ddc * lift_psi + lift * s,
-        ],
-        cc: [
-            row1(c4, dc4, ddc4),
-            row2(c4, dc4),
-            -pull * s4 + dds4 * lift_phi + lift * c4,
-            dds4 * lift_psi,
-        ],
-        e: [
-            row1(c, dc, ddc),
-            row2(c, dc),
-            dds * lift_phi,
-            -pull * s + dds * lift_psi + lift * c,
-        ],
-        aa: [0.0, axis(s4 * s4, 2.0 * s4 * ds4), a4 - v2v2 * s4 * c4, 0.0],
-        bb: [0.0, axis(s * s, 2.0 * s * ds), 0.0, aw - v2v2 * s * c],
-        ab: [
-            0.0,
-            2.0 * axis(s4 * s, ds4 * s + s4 * ds),
-            c5 * aw - s5 * ww - v2v2 * c4 * s,
-            c5 * a4 + s5 * v4v4 - v2v2 * s4 * c,
-        ],
-        bc: [
-            0.0,
-            2.0 * axis(s * c4, ds * c4 + s * dc4),
-            s5 * aw + c5 * ww + v2v2 * s * s4,
-            s5 * a4 - c5 * v4v4 - v2v2 * c * c4,
-        ],
-        ac: [
-            0.0,
-            2.0 * axis(s4 * c4, ds4 * c4 + s4 * dc4),
-            v2v2 * (s4 * s4 - c4 * c4),
-            0.0,
-        ],
-        be: [
-            0.0,
-            2.0 * axis(s * c, ds * c + s * dc),
-            0.0,
-            v2v2 * (s * s - c * c),
-        ],
-        oa: [0.0, dds4, a2 * c4, 0.0],
-        ob: [0.0, dds, 0.0, a2 * c],
-        oc: [0.0, ddc4, -a2 * s4, 0.0],
-        oe: [0.0, ddc, 0.0, -a2 * s],
-        c4c4: [0.0, axis(c4 * c4, 2.0 * c4 * dc4), a4 + v2v2 * s4 * c4, 0.0],
-        ee: [0.0, axis(c * c, 2.0 * c * dc), 0.0, aw + v2v2 * s * c],
-        s: [0.0, 2.0 * axis(s4 + s, ds4 + ds), -v2v2 * c4, -v2v2 * c],
-    }
+    let t1 = [a1, 0.0, 0.0, 0.0];
+    let mr = [a1, 0.0, lift * lift_phi, lift * lift_psi];
+    let o = [c2 * a2 - s2 * v2v2, a1 * c2, 0.0, 0.0];
+    let h0 = [-turn, -a1 * s2, 0.0, 0.0];
+    let k = [0.0, a2, 0.0, 0.0];
+    let ha = [
+        row1(s4, ds4, dds4),
+        row2(s4, ds4),
+        pull * c4 - ddc4 * lift_phi + lift * s4,
+        -ddc4 * lift_psi,
+    ];
+    let hb = [
+        row1(s, ds, dds),
+        row2(s, ds),
+        -ddc * lift_phi,
+        pull * c - ddc * lift_psi + lift * s,
+    ];
+    let hc = [
+        row1(c4, dc4, ddc4),
+        row2(c4, dc4),
+        -pull * s4 + dds4 * lift_phi + lift * c4,
+        dds4 * lift_psi,
+    ];
+    let he = [
+        row1(c, dc, ddc),
+        row2(c, dc),
+        dds * lift_phi,
+        -pull * s + dds * lift_psi + lift * c,
+    ];
+    let aa = [0.0, axis(s4 * s4, 2.0 * s4 * ds4), a4 - v2v2 * s4 * c4, 0.0];
+    let bb = [0.0, axis(s * s, 2.0 * s * ds), 0.0, aw - v2v2 * s * c];
+    let ab = [
+        0.0,
+        2.0 * axis(s4 * s, ds4 * s + s4 * ds),
+        c5 * aw - s5 * ww - v2v2 * c4 * s,
+        c5 * a4 + s5 * v4v4 - v2v2 * s4 * c,
+    ];
+    let bc = [
+        0.0,
+        2.0 * axis(s * c4, ds * c4 + s * dc4),
+        s5 * aw + c5 * ww + v2v2 * s * s4,
+        s5 * a4 - c5 * v4v4 - v2v2 * c * c4,
+    ];
+    let ac = [
+        0.0,
+        2.0 * axis(s4 * c4, ds4 * c4 + s4 * dc4),
+        v2v2 * (s4 * s4 - c4 * c4),
+        0.0,
+    ];
+    let be = [
+        0.0,
+        2.0 * axis(s * c, ds * c + s * dc),
+        0.0,
+        v2v2 * (s * s - c * c),
+    ];
+    let oa = [0.0, dds4, a2 * c4, 0.0];
+    let ob = [0.0, dds, 0.0, a2 * c];
+    let oc = [0.0, ddc4, -a2 * s4, 0.0];
+    let oe = [0.0, ddc, 0.0, -a2 * s];
+    let c4c4 = [0.0, axis(c4 * c4, 2.0 * c4 * dc4), a4 + v2v2 * s4 * c4, 0.0];
+    let ee = [0.0, axis(c * c, 2.0 * c * dc), 0.0, aw + v2v2 * s * c];
+    let rs = [0.0, 2.0 * axis(s4 + s, ds4 + ds), -v2v2 * c4, -v2v2 * c];
+    [
+        t1,
+        o,
+        h0,
+        k,
+        sum([(-1.0, &ha), (-2.0 * L4, &aa), (-L4, &ab)]),
+        sum([(-1.0, &hc), (-L4, &ac), (-L4, &bc)]),
+        sum([(-1.0, &ha), (U, &ab), (-D6, &oa)]),
+        sum([(-1.0, &hc), (U, &bc), (-D6, &oc)]),
+        sum([(-1.0, &hb), (-2.0 * L4, &bb)]),
+        sum([(-1.0, &he), (-L4, &be)]),
+        sum([
+            (1.0, &mr),
+            (D6, &o),
+            (D, &h0),
+            (D * D + D6 * D6, &k),
+            (-U, &hb),
+            (U * U, &bb),
+            (-D6 * U, &ob),
+        ]),
+        sum([
+            (1.0, &mr),
+            (D, &h0),
+            (D * D, &k),
+            (-L6, &ha),
+            (-U, &hb),
+            (L6 * L6, &aa),
+            (U * L6, &ab),
+            (U * U, &bb),
+        ]),
+        bb,
+        ee,
+        c4c4,
+        ac,
+        be,
+        rs,
+        oc,
+        oe,
+        oa,
+        ob,
+    ]
 }
 
 /// Sum of columns with constant weights.
@@ -135,41 +149,6 @@ fn sum<const N: usize>(terms: [(f64, &Column); N]) -> Column {
         }
     }
     out
-}
-
-#[inline(always)]
-fn printed(k: &Columns) -> [Column; 12] {
-    [
-        k.t1,
-        k.o,
-        k.h0,
-        k.k,
-        sum([(-1.0, &k.a), (-2.0 * L4, &k.aa), (-L4, &k.ab)]),
-        sum([(-1.0, &k.cc), (-L4, &k.ac), (-L4, &k.bc)]),
-        sum([(-1.0, &k.a), (U, &k.ab), (-D6, &k.oa)]),
-        sum([(-1.0, &k.cc), (U, &k.bc), (-D6, &k.oc)]),
-        sum([(-1.0, &k.b), (-2.0 * L4, &k.bb)]),
-        sum([(-1.0, &k.e), (-L4, &k.be)]),
-        sum([
-            (1.0, &k.mr),
-            (D6, &k.o),
-            (D, &k.h0),
-            (D * D + D6 * D6, &k.k),
-            (-U, &k.b),
-            (U * U, &k.bb),
-            (-D6 * U, &k.ob),
-        ]),
-        sum([
-            (1.0, &k.mr),
-            (D, &k.h0),
-            (D * D, &k.k),
-            (-L6, &k.a),
-            (-U, &k.b),
-            (L6 * L6, &k.aa),
-            (U * L6, &k.ab),
-            (U * U, &k.bb),
-        ]),
-    ]
 }
 
 /// Writes a column of generalised forces; a turn of q4 turns both phi and psi.
@@ -185,8 +164,7 @@ fn place<const P: usize>(y: &mut [[f64; P]; 4], j: usize, column: &Column) {
 /// (q1, q2, q4, q5) per unit of theta_(j+1).
 #[inline]
 pub fn regressor12(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4], y: &mut [[f64; 12]; 4]) {
-    let k = columns(q, v, a);
-    for (j, column) in printed(&k).iter().enumerate() {
+    for (j, column) in columns(q, v, a)[..12].iter().enumerate() {
         place(y, j, column);
     }
 }
@@ -195,14 +173,7 @@ pub fn regressor12(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4], y: &mut [[f64; 12];
 /// S, OC, OE, OA, OB.
 #[inline]
 pub fn regressor22(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4], y: &mut [[f64; 22]; 4]) {
-    let k = columns(q, v, a);
-    for (j, column) in printed(&k).iter().enumerate() {
+    for (j, column) in columns(q, v, a).iter().enumerate() {
         place(y, j, column);
-    }
-    let rest = [
-        &k.bb, &k.ee, &k.c4c4, &k.ac, &k.be, &k.s, &k.oc, &k.oe, &k.oa, &k.ob,
-    ];
-    for (j, column) in rest.into_iter().enumerate() {
-        place(y, 12 + j, column);
     }
 }

@@ -77,9 +77,7 @@ pub fn groupings(tree: &Tree, drive_inertia: bool) -> Vec<Grouping> {
     group(&columns, &moved_by)
 }
 
-/// Orthogonalises columns in their order (twice, so that rounding does not add up). Bit j of `moved_by`
-/// says that a column can differ from zero in the rows of joint j: columns without a common joint, as
-/// of two arms, are orthogonal as they are.
+/// Orthogonalises columns in their order; those that no joint moves both (by the bits of `moved_by`) are so already.
 fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let largest = columns.iter().map(|c| norm(c)).fold(0.0, f64::max);
@@ -96,6 +94,7 @@ fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
         let mut along = vec![0.0; basis.len()];
         // what is taken off has rows of its own
         let mut joints = moved_by[index];
+        // twice, so that rounding does not add up
         for _ in 0..2 {
             for ((b, of), total) in basis.iter().zip(&mut along) {
                 if of & joints == 0 {

@@ -87,9 +87,7 @@ const ROUNDS: usize = 40;
 /// Steps by which the middle of few circles is found: the radius is right to about one in so many.
 const STEPS: usize = 1000;
 
-/// About the smallest circle that holds all others: that of a few, to which the farthest of all is added until none
-/// is outside; each by steps towards the farthest (Badoiu, Clarkson 2003, Smaller core-sets for balls). What it holds
-/// is looked at, not inferred.
+/// About the smallest circle around all others (Badoiu, Clarkson 2003, Smaller core-sets for balls).
 fn smallest_circle(circles: &[Circle]) -> Option<Circle> {
     let farthest = |among: &[Circle], middle: [f64; 2]| -> Option<(Circle, f64)> {
         let reach = |c: &Circle| (*c, (c.0[0] - middle[0]).hypot(c.0[1] - middle[1]) + c.1);

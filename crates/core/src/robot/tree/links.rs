@@ -5,7 +5,7 @@
 //! along) the joint's axis, and its own frame is the joint's frame after that motion. A modified
 //! Denavit-Hartenberg row (Craig 1986) and a URDF joint are both of this form.
 
-use super::space::{Rotation, Vector, about, of_roll_pitch_yaw, product};
+use super::space::{Rotation, Vector, about, product};
 use crate::explain::Explain;
 use crate::robot::joint::JointKind;
 
@@ -59,9 +59,7 @@ pub struct Link {
     pub origin: Vector,
     /// The joint's axis in its own frame, a unit vector.
     pub axis: Vector,
-    /// Turns or slides.
     pub kind: JointKind,
-    /// What moves it.
     pub coordinate: Coordinate,
 }
 
@@ -72,11 +70,6 @@ impl Link {
         let tilt = about(&[1.0, 0.0, 0.0], alpha);
         let rotation = product(&tilt, &about(&[0.0, 0.0, 1.0], theta));
         (rotation, [a, -d * alpha.sin(), d * alpha.cos()])
-    }
-
-    /// Placement of a URDF origin: position [m], roll, pitch and yaw [rad].
-    pub fn of_origin(xyz: Vector, rpy: Vector) -> (Rotation, Vector) {
-        (of_roll_pitch_yaw(&rpy), xyz)
     }
 }
 
@@ -207,7 +200,6 @@ impl Tree {
         })
     }
 
-    /// Moving links, from the base outward.
     pub fn links(&self) -> &[Link] {
         &self.links
     }
@@ -281,8 +273,7 @@ fn check(link: &Link, i: usize, joints: usize, gravity: &Vector) -> Result<(), T
     }
 }
 
-/// Where each link's state is kept: a place is free again behind the last link that hangs on it. A chain needs
-/// two places, however long it is.
+/// Where each link's state is kept: a place is free again behind the last link that hangs on it; a chain needs two.
 fn slots(links: &[Link]) -> Vec<usize> {
     let mut last: Vec<usize> = (0..links.len()).collect();
     for (i, link) in links.iter().enumerate() {

@@ -1,15 +1,4 @@
 //! Links as a tree (a chain is one), the regressor of their parameters, and its base parameters.
-//!
-//! | file | what |
-//! |---|---|
-//! | [`space`] | vectors and rotations |
-//! | [`links`] | links, joints, dependent coordinates |
-//! | [`newton_euler`] | the regressor of the standard parameters, one recursion |
-//! | [`base`] | which combinations of them torques can determine |
-//! | [`pose`] | where the links are |
-//! | [`capsule`] | how far their shapes are from each other |
-//! | [`enclosing`] | a capsule about points |
-//! | [`parameters`] | these, drive inertias and couplings as parameters with names |
 
 pub mod base;
 pub mod capsule;

@@ -57,8 +57,7 @@ pub fn walk(
     walk_with(tree, [q, v, a], Rows(visit));
 }
 
-/// Adds to `tau` what links whose standard parameters `body` gives ask of every independent joint: their forces and
-/// moments once a link, in place of ten columns for each joint that moves it.
+/// Adds to `tau` what links of these standard parameters ask of every independent joint, by forces once a link.
 #[inline]
 pub(crate) fn torques(
     tree: &Tree,

@@ -27,8 +27,7 @@ pub struct Coupling {
     pub ratio: f64,
 }
 
-/// Parameters of a coupling; of a second one of the same two joints the last alone, for what the others do is in those
-/// of the first.
+/// Parameters of a coupling; a second one of the same two joints shares all but the last with the first.
 const OF_COUPLING: [&str; 3] = ["inertia", "viscous", "coulomb"];
 
 /// A coupling, where its parameters begin, and which of [`OF_COUPLING`] is the first of them.

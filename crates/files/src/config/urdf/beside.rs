@@ -9,8 +9,7 @@ use cft_ident_core::robot::standard::STANDARD;
 /// Name of the parameter that gives a joint's drive inertia in such a file.
 pub const DRIVE_INERTIA: &str = "drive_inertia";
 
-/// Puts the base parameters that the URDF's inertials and the drive inertias make in the place of
-/// the drive inertias, where the file does not give them itself.
+/// Puts base parameters by the URDF's inertials in the place of the drive inertias, where the file does not give them.
 pub(in crate::config) fn base_parameters(
     robot: &RobotFile,
     parameters: &mut Vec<Parameter>,
@@ -30,10 +29,8 @@ pub(in crate::config) fn base_parameters(
             continue;
         }
         let joint = parameter.joint.as_deref().unwrap_or_default();
-        let place = described
-            .joint_names()
-            .iter()
-            .position(|name| name == joint);
+        let mut names = described.joint_names().iter();
+        let place = names.position(|name| name == joint);
         match place.and_then(|j| standard.get_mut(drives + j)) {
             Some(value) => *value = parameter.value,
             None => {

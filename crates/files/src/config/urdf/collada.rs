@@ -16,8 +16,7 @@ const MOST_NUMBERS: usize = 1 << 24;
 /// A x + b; A need not be a rotation.
 type Affine = (Rotation, Vector);
 
-/// The vertices of the scene \[m\]. The unit of the file counts; `up_axis` does not, for RViz and MoveIt pass over it, and
-/// URDFs are written to look right there.
+/// The vertices of the scene \[m\], `up_axis` aside: RViz and MoveIt pass over it, and URDFs look right there.
 pub(super) fn vertices(text: &str) -> Result<Vec<Vector>, String> {
     let text = xml::without_comments(text);
     let tree = xml::Tree::parse(&text).map_err(|e| format!("line {}: {}", e.line, e.problem))?;

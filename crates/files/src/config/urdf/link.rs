@@ -1,7 +1,10 @@
 //! A link as a URDF has it.
 
+use super::Place;
 use super::shapes::Shape;
+use crate::config::ConfigError;
 use cft_ident_core::robot::tree::space::{Rotation, Vector};
+use cft_ident_logs::log::escape;
 
 /// A mass with its centre and inertia, in the frame of the link that carries it.
 #[derive(Debug, Clone, Copy)]
@@ -20,4 +23,11 @@ pub(super) struct Link {
     pub line: usize,
     pub body: Option<Body>,
     pub shapes: Vec<Option<Shape>>,
+}
+
+impl Link {
+    pub(super) fn wrong(&self, place: &Place, problem: &str, remedy: &str) -> ConfigError {
+        let what = format!("link {}", escape(&self.name));
+        place.wrong(self.line, &what, problem, remedy)
+    }
 }

@@ -49,8 +49,7 @@ pub(super) fn read(named: &str, folder: &Path, left: &mut u64) -> Result<Vec<Vec
     vertices(&format, &bytes).map_err(|problem| of_file(&problem))
 }
 
-/// Where the file of a mesh may be: from the URDF's folder on, or in a folder of the package, which has its name or a
-/// package.xml that says it, beside the URDF or above it.
+/// Where a mesh may be: from the URDF's folder on, or in its package (by name or package.xml) beside or above that.
 fn places(named: &str, folder: &Path) -> Vec<PathBuf> {
     if let Some(path) = named.strip_prefix("file://") {
         return vec![folder.join(path)];

@@ -1,17 +1,5 @@
 //! A URDF file read into the `[[robot.link]]` tables of a robot file.
 //!
-//! | file | what |
-//! |---|---|
-//! | `xml` | the text as elements with lines; the door to the XML reader |
-//! | `parts` | elements as links and joints |
-//! | `shapes` | collision shapes |
-//! | [`mesh`] | files of meshes: where they are, and their vertices; COLLADA in `collada` |
-//! | [`capsules`] | capsules that hold the shapes |
-//! | `possible` | inertials that no body has, and the nearest that one has |
-//! | [`source`] | a URDF with other inertials and friction |
-//! | `beside` | model files that leave links and inertials to a URDF |
-//! | `tree` | links and joints as a tree of moving links, fixed ones lumped |
-//!
 //! Only what torques depend on is read: placements, axes, kinds, mimic joints, inertials (as a
 //! prior), limits, and collision shapes for the capsules of `new`. The crate urdf-rs was tried and not taken: its errors
 //! name no line, and a file of some thousand nested elements ends the process. Nor was stl_io: it takes a binary file
@@ -71,7 +59,6 @@ struct Collision {
 pub(super) enum Angles {
     /// 1.5708 as pi/2.
     Meant,
-    /// As they are written.
     Written,
 }
 
@@ -99,6 +86,15 @@ fn turned(r: &Rotation, a: &Rotation) -> Rotation {
     product(&product(r, a), &transposed)
 }
 
+/// The error for a text that is no XML.
+fn no_xml(file: &str, wrong: xml::Malformed) -> ConfigError {
+    ConfigError::Syntax {
+        file: file.to_owned(),
+        line: wrong.line,
+        problem: wrong.problem,
+    }
+}
+
 impl UrdfChain {
     /// Reads a URDF from text, up to the link `tip` where one is named; `file` names it in errors.
     /// Angles and axes that are rounded multiples of 15 degrees are taken as those.
@@ -117,11 +113,7 @@ impl UrdfChain {
         angles: Angles,
     ) -> Result<Self, ConfigError> {
         let text = xml::without_comments(text);
-        let tree = xml::Tree::parse(&text).map_err(|wrong| ConfigError::Syntax {
-            file: file.to_owned(),
-            line: wrong.line,
-            problem: wrong.problem,
-        })?;
+        let tree = xml::Tree::parse(&text).map_err(|wrong| no_xml(file, wrong))?;
         let place = Place { file, angles };
         tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)
     }
@@ -163,21 +155,15 @@ pub(super) fn resolve(
         return Ok(());
     }
     let Some(urdf) = &robot.urdf else {
+        let remedy = "delete it, or name the URDF file";
         return match robot.tip {
             None => Ok(()),
-            Some(_) => Err(document.value(
-                &["robot", "tip"],
-                "stands without a `urdf`",
-                "delete it, or name the URDF file",
-            )),
+            Some(_) => Err(document.value(&["robot", "tip"], "stands without a `urdf`", remedy)),
         };
     };
     if !robot.link.is_empty() {
-        return Err(document.value(
-            &["robot", "urdf"],
-            "stands beside [[robot.link]] tables",
-            "keep one of the two",
-        ));
+        let problem = "stands beside [[robot.link]] tables";
+        return Err(document.value(&["robot", "urdf"], problem, "keep one of the two"));
     }
     let Some(folder) = folder else {
         return Err(document.value(

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::link::{Body, Link};
 use super::possible;
-use super::shapes::of_link;
+use super::shapes::{numbers, of_link};
 use super::xml::{EXPAND, Element, MACRO};
 use super::{Angles, Place};
 use crate::config::ConfigError;
@@ -57,8 +57,15 @@ pub(super) struct Joint {
     pub mimic: Option<Mimic>,
 }
 
+impl Joint {
+    pub(super) fn wrong(&self, place: &Place, problem: &str, remedy: &str) -> ConfigError {
+        let what = format!("joint {}", escape(&self.name));
+        place.wrong(self.line, &what, problem, remedy)
+    }
+}
+
 /// A robot as its URDF lists it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Parts {
     pub links: Vec<Link>,
     pub joints: Vec<Joint>,
@@ -80,13 +87,7 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
             "give a URDF file; an SDF or a xacro file is to be converted first",
         ));
     }
-    let mut parts = Parts {
-        links: Vec::new(),
-        joints: Vec::new(),
-        changes: Changes::default(),
-        impossible: None,
-        renamed: Vec::new(),
-    };
+    let mut parts = Parts::default();
     let mut links: BTreeMap<&str, usize> = BTreeMap::new();
     let mut joints: BTreeMap<&str, usize> = BTreeMap::new();
     for child in root.children() {
@@ -94,32 +95,21 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
             "link" => &mut links,
             "joint" => &mut joints,
             name if name.starts_with("xacro:") => {
-                return Err(place.wrong(
-                    child.line(),
-                    &format!("<{}>", escape(name)),
-                    MACRO,
-                    EXPAND,
-                ));
+                let what = format!("<{}>", escape(name));
+                return Err(place.wrong(child.line(), &what, MACRO, EXPAND));
             }
             // materials, transmissions, sensors, gazebo
             _ => continue,
         };
         let name = child.attribute("name").unwrap_or_default();
         if name.trim().is_empty() {
-            return Err(place.wrong(
-                child.line(),
-                &format!("<{}>", child.name()),
-                "has no name",
-                "give it one: name=\"...\"",
-            ));
+            let (what, remedy) = (format!("<{}>", child.name()), "give it one: name=\"...\"");
+            return Err(place.wrong(child.line(), &what, "has no name", remedy));
         }
+        let what = format!("{} {}", child.name(), escape(name));
         if let Some(line) = known.insert(name, child.line()) {
-            return Err(place.wrong(
-                child.line(),
-                &format!("{} {}", child.name(), escape(name)),
-                &format!("has the name of that of line {line}"),
-                "give each its own name",
-            ));
+            let problem = format!("has the name of that of line {line}");
+            return Err(place.wrong(child.line(), &what, &problem, "give each its own name"));
         }
         if child.name() == "link" {
             parts.links.push(link(child, name, place)?);
@@ -128,7 +118,7 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
             if let Some(other) = parts.joints.iter().find(|joint| joint.name == *clean) {
                 return Err(place.wrong(
                     child.line(),
-                    &format!("joint {}", escape(name)),
+                    &what,
                     &format!("is written {clean}, as that of line {}", other.line),
                     "give each joint a name of its own in letters, digits, `_`, `-` and `.`",
                 ));
@@ -155,15 +145,15 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
     for joint in &parts.joints {
         for (what, link) in [("parent", &joint.parent), ("child", &joint.child)] {
             if !parts.links.iter().any(|known| known.name == *link) {
-                return Err(no_link(joint, what, link, &parts.links, place));
+                let problem = format!("has the {what} `{}`, which is no link", escape(link));
+                return Err(joint.wrong(place, &problem, &instead_of(link, &parts.links)));
             }
         }
     }
     Ok(parts)
 }
 
-/// The link that the arm hangs on where no `<link>` declares it (`world`): the one undeclared parent,
-/// if every link that is declared hangs on something. Else it is a slip of the pen.
+/// The one undeclared parent (`world`) where every declared link hangs on something; else it is a slip of the pen.
 fn undeclared_root(parts: &Parts, declared: &BTreeMap<&str, usize>) -> Option<Link> {
     let mut undeclared = (parts.joints.iter()).filter(|j| !declared.contains_key(&*j.parent));
     let first = undeclared.next()?;
@@ -178,19 +168,13 @@ fn undeclared_root(parts: &Parts, declared: &BTreeMap<&str, usize>) -> Option<Li
     })
 }
 
-/// The error for a joint whose parent or child is no link.
-fn no_link(joint: &Joint, what: &str, link: &str, links: &[Link], place: &Place) -> ConfigError {
+/// What to do about a name that is no link.
+pub(super) fn instead_of(link: &str, links: &[Link]) -> String {
     let all = links.iter().map(|l| l.name.as_str());
-    let remedy = match nearest(link, all.clone()) {
+    match nearest(link, all.clone()) {
         Some(near) => format!("did you mean `{}`?", escape(near)),
         None => format!("the links are {}", list(all.take(20))),
-    };
-    place.wrong(
-        joint.line,
-        &format!("joint {}", escape(&joint.name)),
-        &format!("has the {what} `{}`, which is no link", escape(link)),
-        &remedy,
-    )
+    }
 }
 
 fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError> {
@@ -204,15 +188,14 @@ fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError
             let (xyz, rpy) = at.origin(inertial)?;
             let mass = at.number(at.part(inertial, "mass")?, "value", None)?;
             let tensor = at.part(inertial, "inertia")?;
-            let [xx, xy, xz, yy, yz, zz] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(|key| {
-                at.number(
-                    tensor,
-                    key,
-                    (key.as_bytes()[1] != key.as_bytes()[2]).then_some(0.0),
-                )
-            });
-            let (xy, xz, yz) = (xy?, xz?, yz?);
-            let tensor = [[xx?, xy, xz], [xy, yy?, yz], [xz, yz, zz?]];
+            let moment = |key| at.number(tensor, key, None);
+            let product = |key| at.number(tensor, key, Some(0.0));
+            let (xy, xz, yz) = (product("ixy")?, product("ixz")?, product("iyz")?);
+            let tensor = [
+                [moment("ixx")?, xy, xz],
+                [xy, moment("iyy")?, yz],
+                [xz, yz, moment("izz")?],
+            ];
             Some(Body {
                 mass,
                 centre: xyz,
@@ -240,9 +223,8 @@ fn joint(
     };
     let kind = element.attribute("type").unwrap_or_default();
     let Some((_, kind)) = KINDS.iter().find(|(known, _)| *known == kind) else {
-        return Err(place.wrong(
-            element.line(),
-            &at.what,
+        return Err(at.wrong(
+            element,
             &format!("has the type `{}`", escape(kind)),
             "give revolute, continuous, prismatic or fixed",
         ));
@@ -271,12 +253,8 @@ fn joint(
     }
     let moving = !matches!(kind, Kind::Fixed | Kind::Floating);
     if moving && axis.iter().all(|x| x.abs() < 1e-6) {
-        return Err(place.wrong(
-            element.line(),
-            &at.what,
-            "has an axis without length",
-            "give an axis, e.g. xyz=\"0 0 1\"",
-        ));
+        let remedy = "give an axis, e.g. xyz=\"0 0 1\"";
+        return Err(at.wrong(element, "has an axis without length", remedy));
     }
     let limits = at.limits(element, *kind)?;
     Ok(Joint {
@@ -316,28 +294,31 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
+    fn wrong(&self, element: Element, problem: &str, remedy: &str) -> ConfigError {
+        self.place
+            .wrong(element.line(), &self.what, problem, remedy)
+    }
+
     fn part<'a, 't>(
         &self,
         element: Element<'a, 't>,
         name: &str,
     ) -> Result<Element<'a, 't>, ConfigError> {
         element.child(name).ok_or_else(|| {
-            self.place.wrong(
-                element.line(),
-                &self.what,
-                &format!("has no <{name}>"),
-                &format!("add <{name} .../> to it"),
-            )
+            let remedy = format!("add <{name} .../> to it");
+            self.wrong(element, &format!("has no <{name}>"), &remedy)
         })
     }
 
     fn lacks(&self, element: Element, key: &str) -> ConfigError {
-        self.place.wrong(
-            element.line(),
-            &self.what,
-            &format!("has a <{}> without {key}", element.name()),
-            &format!("add {key}=\"...\""),
-        )
+        let problem = format!("has a <{}> without {key}", element.name());
+        self.wrong(element, &problem, &format!("add {key}=\"...\""))
+    }
+
+    fn unusable(&self, element: Element, key: &str, text: &str, remedy: &str) -> ConfigError {
+        let text = escape(text);
+        let problem = format!("has {key}=\"{text}\" in <{}>", element.name());
+        self.wrong(element, &problem, remedy)
     }
 
     fn number(&self, element: Element, key: &str, absent: Option<f64>) -> Result<f64, ConfigError> {
@@ -346,12 +327,8 @@ impl Reading<'_> {
         };
         let value = text.trim().parse::<f64>().ok().filter(|x| is_usable(*x));
         value.ok_or_else(|| {
-            self.place.wrong(
-                element.line(),
-                &self.what,
-                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name()),
-                "give a finite number with a decimal point",
-            )
+            let remedy = "give a finite number with a decimal point";
+            self.unusable(element, key, text, remedy)
         })
     }
 
@@ -359,19 +336,10 @@ impl Reading<'_> {
         let Some(text) = element.attribute(key) else {
             return Ok(absent);
         };
-        let numbers: Vec<f64> = text
-            .split_whitespace()
-            .map_while(|word| word.parse().ok().filter(|x| is_usable(*x)))
-            .collect();
-        match numbers[..] {
-            [x, y, z] if text.split_whitespace().count() == 3 => Ok([x, y, z]),
-            _ => Err(self.place.wrong(
-                element.line(),
-                &self.what,
-                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name()),
-                "give three finite numbers with spaces between",
-            )),
-        }
+        numbers(text).ok_or_else(|| {
+            let remedy = "give three finite numbers with spaces between";
+            self.unusable(element, key, text, remedy)
+        })
     }
 
     /// Position [m] and roll, pitch, yaw [rad] of the `<origin>` inside.
@@ -382,6 +350,7 @@ impl Reading<'_> {
         let at = |key| self.vector(origin, key, [0.0; 3]);
         Ok((at("xyz")?, at("rpy")?))
     }
+
     /// The limits of a joint, where they are given; 0 stands in many files for one that nobody knows.
     fn limits(&self, joint: Element, kind: Kind) -> Result<CoordinateLimits, ConfigError> {
         let Some(limit) = joint.child("limit") else {
@@ -391,12 +360,8 @@ impl Reading<'_> {
         let (speed, effort) = (value("velocity")?, value("effort")?);
         let (low, high) = (value("lower")?, value("upper")?);
         if low > high {
-            return Err(self.place.wrong(
-                limit.line(),
-                &self.what,
-                &format!("has the lower limit {low} above the upper {high}"),
-                "exchange the two",
-            ));
+            let problem = format!("has the lower limit {low} above the upper {high}");
+            return Err(self.wrong(limit, &problem, "exchange the two"));
         }
         Ok(CoordinateLimits {
             position: (low < high && kind != Kind::Continuous).then_some([low, high]),

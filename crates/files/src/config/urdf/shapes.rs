@@ -37,8 +37,7 @@ impl Shape {
     }
 }
 
-/// The shapes of a `<link>`; `None` stands for what cannot be read: collision shapes decide no torque, and spoil no
-/// file.
+/// The shapes of a `<link>`; `None` for one that cannot be read: collision shapes decide no torque, and spoil no file.
 pub(super) fn of_link(link: Element) -> Vec<Option<Shape>> {
     let collisions = link.children().filter(|c| c.name() == "collision");
     collisions.map(shape).collect()
@@ -87,7 +86,8 @@ fn form(shape: Element) -> Option<Form> {
     Some(Form::Within(([end(-half), end(half)], radius)))
 }
 
-fn numbers(text: &str) -> Option<Vector> {
+/// The three numbers of a text.
+pub(super) fn numbers(text: &str) -> Option<Vector> {
     let numbers: Option<Vec<f64>> = text
         .split_whitespace()
         .map(|word| word.parse().ok().filter(|x| is_usable(*x)))

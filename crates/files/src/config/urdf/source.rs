@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::parts::clean_name;
-use super::xml;
+use super::{no_xml, xml};
 use crate::config::ConfigError;
 
 /// What is to stand in a URDF.
@@ -27,11 +27,7 @@ pub struct Replacement {
 pub fn replaced(file: &str, text: &str, with: &Replacement) -> Result<String, ConfigError> {
     // comments become as many spaces, so that places are those of the text
     let plain = xml::without_comments(text);
-    let tree = xml::Tree::parse(&plain).map_err(|wrong| ConfigError::Syntax {
-        file: file.to_owned(),
-        line: wrong.line,
-        problem: wrong.problem,
-    })?;
+    let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
     let root = tree.root();
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
     for element in root.children() {

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::link::Body;
-use super::parts::{Joint, Kind, Parts};
+use super::link::{Body, Link};
+use super::parts::{Joint, Kind, Parts, instead_of};
 use super::{Collision, Place, UrdfChain, turned};
 use crate::config::ConfigError;
 use crate::config::document::is_plain_name;
@@ -15,7 +15,7 @@ use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::{
     Rotation, UNTURNED, Vector, add, of_roll_pitch_yaw, product, roll_pitch_yaw, turn,
 };
-use cft_ident_logs::log::{escape, list, nearest};
+use cft_ident_logs::log::{escape, list};
 
 /// Where a link of the URDF is: in which moving link, and how it lies there.
 #[derive(Clone, Copy)]
@@ -26,6 +26,18 @@ struct Seat {
     origin: Vector,
     /// The rotation in the words of the file, where one joint alone says it.
     rpy: Option<Vector>,
+}
+
+impl Seat {
+    /// In the frame of a moving link, or of the base.
+    fn at(on: Option<usize>) -> Self {
+        Self {
+            on,
+            rotation: UNTURNED,
+            origin: [0.0; 3],
+            rpy: None,
+        }
+    }
 }
 
 /// A moving link that is being gathered.
@@ -41,12 +53,8 @@ pub(super) fn chain(
     tip: Option<&str>,
     place: &Place,
 ) -> Result<UrdfChain, ConfigError> {
-    let index: BTreeMap<&str, usize> = parts
-        .links
-        .iter()
-        .enumerate()
-        .map(|(i, link)| (link.name.as_str(), i))
-        .collect();
+    let named = parts.links.iter().enumerate();
+    let index: BTreeMap<&str, usize> = named.map(|(i, link)| (link.name.as_str(), i)).collect();
     let (before, behind) = joints_of_links(parts, &index, place)?;
     let (wanted, root) = match tip {
         None => (vec![true; parts.joints.len()], root(parts, &before, place)?),
@@ -57,16 +65,7 @@ pub(super) fn chain(
     let mut fixed: Vec<(&str, Seat)> = Vec::new();
     let mut collisions = Vec::new();
     // links to visit, the next one last; a link stands here once, for it has one joint before it
-    let mut next: Vec<(Option<usize>, usize, Seat)> = vec![(
-        None,
-        root,
-        Seat {
-            on: None,
-            rotation: UNTURNED,
-            origin: [0.0; 3],
-            rpy: None,
-        },
-    )];
+    let mut next: Vec<(Option<usize>, usize, Seat)> = vec![(None, root, Seat::at(None))];
     while let Some((joint, link, parent)) = next.pop() {
         let seat = match joint.map(|j| &parts.joints[j]) {
             None => parent,
@@ -99,16 +98,11 @@ pub(super) fn chain(
     if tip.is_none()
         && let Some(lost) = reached.iter().position(|reached| !reached)
     {
-        return Err(circle(
-            &parts.links[lost].name,
-            parts.links[lost].line,
-            place,
-        ));
+        return Err(circle(&parts.links[lost], place));
     }
     if moving.is_empty() {
-        return Err(place.wrong(
-            parts.links[root].line,
-            &format!("link {}", escape(&parts.links[root].name)),
+        return Err(parts.links[root].wrong(
+            place,
             "has no moving joint behind it",
             "give at least one revolute, continuous or prismatic joint, or a `tip` behind one",
         ));
@@ -142,9 +136,8 @@ fn joints_of_links(
             continue;
         };
         if let Some(other) = before[child] {
-            return Err(place.wrong(
-                joint.line,
-                &format!("joint {}", escape(&joint.name)),
+            return Err(joint.wrong(
+                place,
                 &format!(
                     "moves the link `{}`, which hangs on joint `{}` already",
                     escape(&joint.child),
@@ -184,10 +177,9 @@ fn frames(fixed: &[(&str, Seat)], moving: &[Moving]) -> Vec<FrameSection> {
 }
 
 /// The error for links that hang on each other in a circle.
-fn circle(link: &str, line: usize, place: &Place) -> ConfigError {
-    place.wrong(
-        line,
-        &format!("link {}", escape(link)),
+fn circle(link: &Link, place: &Place) -> ConfigError {
+    link.wrong(
+        place,
         "hangs on itself through its joints",
         "cut the circle: one link must be the root, which is no joint's child",
     )
@@ -202,23 +194,15 @@ fn path_to(
     place: &Place,
 ) -> Result<(Vec<bool>, usize), ConfigError> {
     let Some(&end) = index.get(tip) else {
-        let all = parts.links.iter().map(|l| l.name.as_str());
-        let remedy = match nearest(tip, all.clone()) {
-            Some(near) => format!("did you mean `{}`?", escape(near)),
-            None => format!("the links are {}", list(all.take(20))),
-        };
-        return Err(place.wrong(
-            1,
-            &format!("tip {}", escape(tip)),
-            "is no link of this URDF",
-            &remedy,
-        ));
+        let remedy = instead_of(tip, &parts.links);
+        let what = format!("tip {}", escape(tip));
+        return Err(place.wrong(1, &what, "is no link of this URDF", &remedy));
     };
     let mut on_the_way = vec![false; parts.joints.len()];
     let mut at = end;
     while let Some(joint) = before[at] {
         if on_the_way[joint] {
-            return Err(circle(tip, parts.links[end].line, place));
+            return Err(circle(&parts.links[end], place));
         }
         on_the_way[joint] = true;
         match index.get(parts.joints[joint].parent.as_str()) {
@@ -234,10 +218,9 @@ fn root(parts: &Parts, before: &[Option<usize>], place: &Place) -> Result<usize,
     let roots: Vec<usize> = (0..before.len()).filter(|l| before[*l].is_none()).collect();
     match roots[..] {
         [root] => Ok(root),
-        [] => Err(circle(&parts.links[0].name, parts.links[0].line, place)),
-        [first, second, ..] => Err(place.wrong(
-            parts.links[second].line,
-            &format!("link {}", escape(&parts.links[second].name)),
+        [] => Err(circle(&parts.links[0], place)),
+        [first, second, ..] => Err(parts.links[second].wrong(
+            place,
             &format!(
                 "is a second root beside `{}`",
                 escape(&parts.links[first].name)
@@ -268,27 +251,24 @@ fn sit<'a>(
         Kind::Revolute | Kind::Continuous => JointKind::Revolute,
         Kind::Prismatic => JointKind::Prismatic,
         Kind::Floating | Kind::Planar => {
-            return Err(place.wrong(
-                joint.line,
-                &format!("joint {}", escape(&joint.name)),
+            return Err(joint.wrong(
+                place,
                 "is floating or planar, and its torques cannot be logged",
                 "make it fixed where the base stands still, or part it into revolute and prismatic joints",
             ));
         }
     };
     if !is_plain_name(&joint.name) {
-        return Err(place.wrong(
-            joint.line,
-            &format!("joint {}", escape(&joint.name)),
+        return Err(joint.wrong(
+            place,
             "is no name for a joint",
             "use letters, digits, `_`, `-` and `.`, at most 64",
         ));
     }
     let at = moving.len();
     if at >= MOST_LINKS {
-        return Err(place.wrong(
-            joint.line,
-            &format!("joint {}", escape(&joint.name)),
+        return Err(joint.wrong(
+            place,
             &format!("is one of more than {MOST_LINKS} that move"),
             "name the `tip` of the chain that was measured",
         ));
@@ -312,12 +292,7 @@ fn sit<'a>(
         section,
         bodies: Vec::new(),
     });
-    Ok(Seat {
-        on: Some(at),
-        rotation: UNTURNED,
-        origin: [0.0; 3],
-        rpy: None,
-    })
+    Ok(Seat::at(Some(at)))
 }
 
 /// The name of a moving link, or of the base.
@@ -330,12 +305,8 @@ fn hangs_on(moving: &[Moving], on: Option<usize>) -> String {
 
 /// The name of a link; `base` is taken by what stands still.
 fn unused(link: &str, moving: &[Moving]) -> String {
-    let taken = |name: &str| {
-        name == BASE
-            || moving
-                .iter()
-                .any(|m| m.section.name.as_deref() == Some(name))
-    };
+    let is = |name: &str, m: &Moving| m.section.name.as_deref() == Some(name);
+    let taken = |name: &str| name == BASE || moving.iter().any(|m| is(name, m));
     let mut name = link.to_owned();
     while taken(&name) {
         name.push_str("_link");
@@ -365,15 +336,13 @@ fn finish(
     frames: Vec<FrameSection>,
     place: &Place,
 ) -> Result<UrdfChain, ConfigError> {
-    let place_of: BTreeMap<&str, usize> = moving
-        .iter()
-        .enumerate()
-        .map(|(i, m)| (m.joint.name.as_str(), i))
+    let joints: BTreeMap<&str, &Joint> = (moving.iter())
+        .map(|m| (m.joint.name.as_str(), m.joint))
         .collect();
-    let mut follows = Vec::with_capacity(moving.len());
-    for m in &moving {
-        follows.push(followed(m.joint, &moving, &place_of, place)?);
-    }
+    let follows = moving
+        .iter()
+        .map(|m| followed(m.joint, &joints, &moving, place));
+    let follows = follows.collect::<Result<Vec<_>, _>>()?;
     let mut limits = Vec::new();
     for (m, follows) in moving.iter_mut().zip(follows) {
         m.section.inertial = lumped(&m.bodies, m.joint, place)?;
@@ -394,8 +363,8 @@ fn finish(
 /// The coordinate of a mimic joint as a function of an independent joint.
 fn followed(
     joint: &Joint,
+    joints: &BTreeMap<&str, &Joint>,
     moving: &[Moving],
-    place_of: &BTreeMap<&str, usize>,
     place: &Place,
 ) -> Result<Option<FollowsSection>, ConfigError> {
     let (mut at, mut factor, mut offset) = (joint, 1.0, 0.0);
@@ -411,11 +380,10 @@ fn followed(
         };
         offset += factor * mimic.offset;
         factor *= mimic.multiplier;
-        let Some(target) = place_of.get(mimic.joint.as_str()) else {
+        let Some(target) = joints.get(mimic.joint.as_str()) else {
             let names = moving.iter().filter(|m| m.joint.mimic.is_none());
-            return Err(place.wrong(
-                joint.line,
-                &format!("joint {}", escape(&joint.name)),
+            return Err(joint.wrong(
+                place,
                 &format!(
                     "mimics `{}`, which is no moving joint of this chain",
                     escape(&mimic.joint)
@@ -426,11 +394,10 @@ fn followed(
                 ),
             ));
         };
-        at = moving[*target].joint;
+        at = target;
     }
-    Err(place.wrong(
-        joint.line,
-        &format!("joint {}", escape(&joint.name)),
+    Err(joint.wrong(
+        place,
         "mimics itself through other joints",
         "let one joint of the circle be independent: delete its <mimic>",
     ))

@@ -25,9 +25,7 @@ const MOST_NAMESPACES: usize = 1000;
 pub(super) const MACRO: &str = "is a macro of xacro, not yet expanded";
 pub(super) const EXPAND: &str = "expand it first: `xacro robot.urdf.xacro > robot.urdf`";
 
-/// A text without its comments: spaces stand for them, and line ends where they had some.
-///
-/// The reader is strict with them (`--` may not stand in one), and they say nothing.
+/// A text with spaces in place of its comments, in which the reader is strict about `--`, and with all of its lines.
 pub(super) fn without_comments(text: &str) -> Cow<'_, str> {
     let (mut out, mut rest) = (String::new(), text);
     while let Some((before, comment)) = rest.split_once("<!--") {
@@ -161,12 +159,10 @@ impl<'a> Element<'a, '_> {
         elements.map(move |node| Self { node, ..self })
     }
 
-    /// Value of an attribute.
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
         self.node.attribute(name)
     }
 
-    /// The elements in it.
     pub(super) fn children(self) -> impl Iterator<Item = Self> {
         let elements = self.node.children().filter(Node::is_element);
         elements.map(move |node| Self { node, ..self })

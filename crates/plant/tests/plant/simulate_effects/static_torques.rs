@@ -2,9 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use cft_ident_core::robot::cft::links::{MassProperties, PseudoInertia, base_parameters};
+use cft_ident_core::robot::cft::links::{PseudoInertia, base_parameters};
 use cft_ident_core::robot::cft::pantograph::references_of_joints;
-use cft_ident_core::robot::cft::{Setup, chain, regressor};
+use cft_ident_core::robot::cft::{Setup, linkage, regressor};
+use cft_ident_core::robot::standard::{Body, pseudo_inertia};
+use cft_ident_core::robot::tree::pose::{self, Frame};
+use cft_ident_core::robot::tree::space::{add, turn};
 use cft_ident_plant::simulate::CftTruth;
 use cft_ident_plant::simulate::cft::effects;
 use cft_ident_plant::simulate::effects::Effects;
@@ -213,16 +216,19 @@ fn rigid_body_terms_are_the_columns_that_the_printed_structure_drops() {
     );
 }
 
+fn of_body(body: &Body) -> PseudoInertia {
+    PseudoInertia(pseudo_inertia(&body.standard()).into())
+}
+
 #[test]
 fn a_payload_is_a_point_mass_on_the_last_link() {
     let (mass, [mx, my, mz]) = (1.5, [0.6, -0.2, 0.15]);
     let nothing = PseudoInertia([[0.0; 4]; 4]);
     let mut links = [nothing; 8];
-    links[7] = PseudoInertia::from(&MassProperties {
+    links[7] = of_body(&Body {
         mass,
         centre: [mx / mass, my / mass, mz / mass],
-        moments: [0.0; 3],
-        products: [0.0; 3],
+        inertia: [0.0; 6],
     });
     let theta = base_parameters(&links);
     assert_missing(
@@ -266,22 +272,21 @@ fn rotor_inertia_is_felt_along_the_motor_motion() {
 #[test]
 fn tilted_gravity_pulls_at_every_link_of_the_chain() {
     // Eight links with known masses; the potential by their frames, its slope by differences.
-    let link = |number: usize| MassProperties {
+    let link = |number: usize| Body {
         mass: 0.8 + 0.3 * number as f64,
         centre: [0.03 * number as f64, 0.05 - 0.01 * number as f64, 0.02],
-        moments: [0.05, 0.06, 0.07],
-        products: [0.0; 3],
+        inertia: [0.05, 0.0, 0.0, 0.06, 0.0, 0.07],
     };
-    let links: [MassProperties; 8] = std::array::from_fn(link);
+    let links: [Body; 8] = std::array::from_fn(link);
     let truth = CftTruth {
-        theta: base_parameters(&links.map(|link| PseudoInertia::from(&link))),
+        theta: base_parameters(&links.map(|link| of_body(&link))),
         ..CftTruth::synthetic(Setup::Tuedacs)
     };
     let (gx, gy) = (0.7, -0.4);
     let potential = |q: &[f64; 4]| -> f64 {
-        let frames = chain::frames(q);
-        let pull = |(link, frame): (&MassProperties, &chain::RigidTransform)| {
-            let p = frame.point(&link.centre);
+        let frames = pose::frames(&linkage::chain().expect("a chain"), q);
+        let pull = |(link, (rotation, origin)): (&Body, &Frame)| {
+            let p = add(origin, &turn(rotation, &link.centre));
             -link.mass * (gx * p[0] + gy * p[1])
         };
         links.iter().zip(&frames).map(pull).sum()
