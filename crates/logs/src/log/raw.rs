@@ -87,8 +87,6 @@ impl RawBlock {
 #[derive(Debug)]
 pub struct RawReader {
     pass: LogPass,
-    /// Fields that are neither empty nor a number, per column.
-    words: Vec<u64>,
 }
 
 impl RawReader {
@@ -116,8 +114,7 @@ impl RawReader {
 
     fn of_layout(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
         let pass = LogPass::open(spec, layout, Strictness::Record)?;
-        let words = vec![0; pass.rows.names().len()];
-        Ok(Self { pass, words })
+        Ok(Self { pass })
     }
 
     /// Name of the log, for messages.
@@ -131,7 +128,7 @@ impl RawReader {
     }
 
     /// What a column is called by the names in the messages of a recording, where its own name is a path.
-    pub fn label(&self, column: usize) -> Option<&str> {
+    pub(crate) fn label(&self, column: usize) -> Option<&str> {
         self.pass.rows.label(column)
     }
 
@@ -202,9 +199,9 @@ impl RawReader {
     /// # Errors
     /// A file that can no longer be read, or a line without an end.
     pub fn read(&mut self, block: &mut RawBlock) -> Result<bool, LogError> {
-        block.clear(self.words.len());
-        let wide = RawBlock::NUMBERS / self.words.len().max(1);
-        let most = wide.clamp(16, RawBlock::ROWS);
+        let width = self.names().len();
+        block.clear(width);
+        let most = (RawBlock::NUMBERS / width.max(1)).clamp(16, RawBlock::ROWS);
         while block.rows() < most
             && let Some(t) = self.pass.next()?
         {
@@ -223,7 +220,6 @@ impl RawReader {
                 if number.is_none() {
                     // else most of the numbers, or all rows, would be lost in silence
                     self.pass.rows.refuse_comma(index)?;
-                    self.words[index] += 1;
                 }
                 column.push(number.unwrap_or(f64::NAN));
             }
@@ -237,7 +233,7 @@ impl RawReader {
     }
 
     /// Rows with more or fewer fields than the header, so far; they are passed over.
-    pub fn malformed(&self) -> u64 {
+    pub(crate) fn malformed(&self) -> u64 {
         self.pass.rows.malformed()
     }
 
@@ -246,25 +242,17 @@ impl RawReader {
         self.pass.warnings()
     }
 
-    /// Where files break off; call it after the last block.
-    pub fn breaks(&self) -> Vec<String> {
+    pub(crate) fn breaks(&self) -> Vec<String> {
         self.pass.rows.breaks()
     }
 
-    /// Messages that contradict the others of their topic and are left out, with how many they are; call it after
-    /// the last block.
-    pub fn contradictions(&self) -> Vec<(u64, String)> {
+    /// Messages that contradict the others of their topic and are left out, with how many they are.
+    pub(crate) fn contradictions(&self) -> Vec<(u64, String)> {
         self.pass.rows.contradictions()
     }
 
-    /// Arrays of messages that cannot be given to joints, with how many; call it after the last block.
-    pub fn uneven(&self) -> Vec<(u64, String)> {
+    pub(crate) fn uneven(&self) -> Vec<(u64, String)> {
         self.pass.rows.uneven()
-    }
-
-    /// Fields of a column that hold words, so far.
-    pub fn words(&self, column: usize) -> u64 {
-        self.words.get(column).copied().unwrap_or(0)
     }
 
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.
@@ -307,18 +295,16 @@ mod tests {
         assert_eq!(block.columns[0], [0.0, 1.0, 0.5, 3.0, 3.0]);
         let finite: Vec<bool> = block.columns[1].iter().map(|x| x.is_finite()).collect();
         assert_eq!(finite, [true, false, false, false, true]);
-        assert_eq!((log.malformed(), log.words(1), log.words(2)), (1, 1, 4));
+        assert_eq!(log.malformed(), 1);
     }
 
     #[test]
     fn spans_are_those_of_the_strict_reader() {
         let rows: String = (0..10).map(|k| format!("{k},{k}\n")).collect();
         let text = format!("t,q\n{rows}");
-        assert_eq!(
-            read(&text, "@0..50%").1.columns[1],
-            [0.0, 1.0, 2.0, 3.0, 4.0]
-        );
-        assert_eq!(read(&text, "@7..s").1.columns[1], [7.0, 8.0, 9.0]);
+        let rows = |span| read(&text, span).1.columns[1].clone();
+        assert_eq!(rows("@0..50%"), [0.0, 1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(rows("@7..s"), [7.0, 8.0, 9.0]);
     }
 
     #[test]

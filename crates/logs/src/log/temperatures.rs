@@ -52,7 +52,6 @@ impl Temperatures {
         })
     }
 
-    /// Those of rows in memory, joint by joint.
     pub(super) fn of_columns<'a>(
         t: &[f64],
         columns: impl Iterator<Item = (usize, &'a [f64])>,

@@ -19,17 +19,15 @@ const COLUMNS: usize = 7;
 const PASSIVE_COLUMNS: usize = 4;
 /// Share of the torque that the motion must explain.
 const MIN_EXPLAINED_SHARE: f64 = 0.5;
-/// Least share of each direction in the squared speed: one way at one speed, a torque that depends
-/// on position cannot be distinguished from any delay.
+/// Least share of each direction in the squared speed: one way at one speed, cogging looks like any delay.
 const MIN_SHARE_EACH_WAY: f64 = 0.1;
 /// Share of the gain over no delay that another minimum may reach.
 const MAX_GAIN_OF_SECOND_BEST: f64 = 0.5;
 /// Stretches of the jackknife: the most, and the least that give a deviation.
 const JACKKNIFE_STRETCHES: std::ops::RangeInclusive<usize> = 3..=8;
 
-/// Rows from which a delay is estimated.
 #[derive(Debug, Default)]
-pub struct DelayEstimator {
+pub(crate) struct DelayEstimator {
     joints: usize,
     t: Vec<f64>,
     q: Vec<f64>,
@@ -38,13 +36,11 @@ pub struct DelayEstimator {
     begins: Vec<usize>,
 }
 
-/// An estimated delay of the torques behind the positions.
+/// An estimated delay of the torques behind the positions, and its standard deviation [s].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DelayEstimate {
-    /// Delay [s], positive where torques lag.
-    pub delay_s: f64,
-    /// Its standard deviation [s].
-    pub std_s: f64,
+pub(crate) struct DelayEstimate {
+    pub(crate) delay_s: f64,
+    pub(crate) std_s: f64,
 }
 
 /// Sums of one joint over one stretch.
@@ -63,7 +59,7 @@ struct Sums {
 
 impl DelayEstimator {
     /// Adds a row; those beyond the first some thousands are not needed.
-    pub fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
+    pub(crate) fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
         if self.t.len() == MAX_ROWS || q.len() != tau.len() || q.is_empty() {
             return;
         }
@@ -78,7 +74,7 @@ impl DelayEstimator {
     }
 
     /// The next row does not follow the last one.
-    pub fn begin_stretch(&mut self) {
+    pub(crate) fn begin_stretch(&mut self) {
         self.begins.push(self.t.len());
     }
 
@@ -100,9 +96,8 @@ impl DelayEstimator {
         }
     }
 
-    /// Estimates the delay; `None` where the motion explains too little of the torques, or some
-    /// stretches alone decide it.
-    pub fn estimate(&self) -> Option<DelayEstimate> {
+    /// The delay; `None` where the motion explains too little of the torques, or some stretches alone decide it.
+    pub(crate) fn estimate(&self) -> Option<DelayEstimate> {
         let mut steps: Vec<f64> = self.t.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
         let dt = *steps.get(steps.len() / 2)?;
@@ -115,10 +110,8 @@ impl DelayEstimator {
             .filter_map(|joint| self.sums(joint, &stretches, dt, half))
             .collect();
         let delay = best_delay(&sums, None)? * dt;
-        let without: Option<Vec<f64>> = (0..stretches.len())
-            .map(|left_out| Some(best_delay(&sums, Some(left_out))? * dt))
-            .collect();
-        let without = without?;
+        let without = |left_out| Some(best_delay(&sums, Some(left_out))? * dt);
+        let without: Vec<f64> = (0..stretches.len()).map(without).collect::<Option<_>>()?;
         let count = without.len() as f64;
         let mean = without.iter().sum::<f64>() / count;
         let scatter: f64 = without.iter().map(|delay| (delay - mean).powi(2)).sum();

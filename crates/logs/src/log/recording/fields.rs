@@ -4,9 +4,8 @@ use std::ops::Range;
 
 use super::message::MessageHead;
 use super::path::FieldPath;
-use super::value::Value;
+use super::value::{Value, stamp_ns};
 use crate::log::layout::{Channel, Layout, column_number};
-use crate::log::section::Stamp;
 use crate::log::time::{FAR_S, Instant, Stamped};
 use cft_ident_core::number::is_usable;
 
@@ -97,16 +96,13 @@ impl RobotFields {
         !range.is_empty() && !values[range.clone()].contains(&Value::Absent)
     }
 
-    /// Whether a message holds the time that the robot file names.
     pub(super) fn has_time(&self, values: &[Value]) -> bool {
         values[self.time] != Value::Absent
     }
 
     /// The stamp of a message's header \[ns\].
     pub(super) fn header_ns(&self, values: &[Value]) -> Option<i128> {
-        let part = |index: usize| values[index].integer();
-        let (s, ns) = (part(self.header[0])?, part(self.header[1])?);
-        s.checked_mul(1_000_000_000)?.checked_add(ns)
+        stamp_ns(values[self.header[0]], values[self.header[1]])
     }
 
     /// Whether a message has a header with a stamp other than 0.
@@ -114,8 +110,7 @@ impl RobotFields {
         self.header_ns(values).is_some_and(|ns| ns != 0)
     }
 
-    /// Whether a message that is one with others of its instant lacks some of their fields: positions, torques
-    /// and velocities of other joints.
+    /// Positions, torques and velocities of all joints.
     pub(super) fn channels(&self) -> Range<usize> {
         0..self.time
     }
@@ -139,10 +134,7 @@ impl RobotFields {
                 Value::Absent => None,
                 Value::Float(value) => {
                     let seconds = value * self.time_factor;
-                    if !is_usable(seconds) {
-                        return None;
-                    }
-                    Some(match seconds.abs() < FAR_S {
+                    is_usable(seconds).then(|| match seconds.abs() < FAR_S {
                         true => Stamped::Seconds(seconds),
                         false => Stamped::Exact(Instant::default().plus(seconds)),
                     })
@@ -154,16 +146,6 @@ impl RobotFields {
                     Some(Stamped::Exact(Instant::from_ns(value.checked_mul(ns)?)))
                 }
             },
-        }
-    }
-
-    /// The time source that the robot file asks for; `None` where it is found in the messages.
-    pub(super) fn asked(stamp: Stamp) -> Option<TimeSource> {
-        match stamp {
-            Stamp::Auto => None,
-            Stamp::Header => Some(TimeSource::Header),
-            Stamp::Log => Some(TimeSource::Log),
-            Stamp::Publish => Some(TimeSource::Publish),
         }
     }
 }

@@ -30,8 +30,8 @@ pub(super) use rows::MessageRows;
 pub(super) use split_joints::of_joints;
 pub(super) use state_topics::state_groups;
 
-pub use delay::{DelayEstimate, DelayEstimator};
-pub use encoding::{CdrReader, DefinitionError, MalformedMessage};
+pub(crate) use delay::{DelayEstimate, DelayEstimator};
+pub use encoding::CdrReader;
 pub use listing::TopicFacts;
 pub use state_topics::StateGroup;
 pub use value::Value;

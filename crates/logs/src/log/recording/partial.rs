@@ -10,7 +10,6 @@ pub(super) struct Parts {
     /// Its instant \[ns\]; none where nothing waits.
     instant: Option<i128>,
     values: Vec<Value>,
-    /// Messages that wait.
     waiting: u64,
 }
 

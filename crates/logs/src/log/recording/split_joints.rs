@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::joined::JoinedTopics;
 use super::state_topics::{ARRAYS, FoundTopic, survey};
 use crate::log::LogError;
-use crate::log::layout::{Channel, Layout};
+use crate::log::layout::Layout;
 
 /// The rows of a robot each of whose joints is found on one topic alone; `None` where one is not.
 pub(in crate::log) fn of_joints(
@@ -18,12 +18,10 @@ pub(in crate::log) fn of_joints(
     let topic_of = |joint: usize| -> Option<&FoundTopic> {
         let name = layout.name_in_messages(joint)?;
         let holds = |one: &&FoundTopic| {
+            let mut filled = needed.iter().zip(one.arrays);
             one.topic.starts_with('/')
                 && one.names.iter().any(|own| own == name)
-                && needed
-                    .iter()
-                    .zip(one.arrays)
-                    .all(|(needed, filled)| filled || !needed)
+                && filled.all(|(needed, filled)| filled || !needed)
         };
         let mut all = found.iter().filter(holds);
         all.next().filter(|_| all.next().is_none())
@@ -46,19 +44,14 @@ pub(in crate::log) fn of_joints(
         &mut split.velocities,
     ];
     for (channels, (array, _)) in kinds.into_iter().zip(ARRAYS) {
-        rename(channels, array, layout, &topics);
+        for (joint, (channel, one)) in channels.iter_mut().zip(&topics).enumerate() {
+            let name = layout.name_in_messages(joint).unwrap_or_default();
+            channel.column = format!("{}:{array}[name={name}]", one.topic);
+        }
     }
     if !topics.iter().all(|one| one.arrays[2]) {
         split.velocities.clear();
     }
-    let rows = JoinedTopics::of_parts(paths, &split)?;
+    let rows = JoinedTopics::of_robot(paths, &split, true)?;
     Ok(Some((rows, split)))
-}
-
-/// Names channels by their topics and the places of their joints.
-fn rename(channels: &mut [Channel], array: &str, layout: &Layout, topics: &[&FoundTopic]) {
-    for (joint, (channel, one)) in channels.iter_mut().zip(topics).enumerate() {
-        let name = layout.name_in_messages(joint).unwrap_or_default();
-        channel.column = format!("{}:{array}[name={name}]", one.topic);
-    }
 }

@@ -34,3 +34,8 @@ impl Value {
         }
     }
 }
+
+/// Seconds and nanoseconds as one number \[ns\]; `None` where one of them is no whole number.
+pub(super) fn stamp_ns(seconds: Value, nanoseconds: Value) -> Option<i128> {
+    Some(seconds.integer()? * 1_000_000_000 + nanoseconds.integer()?)
+}

@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use crate::log::content::HEAD;
 use crate::log::section::Delimiter;
 
-/// What the robot file says of the table.
 pub(super) struct Wanted {
     pub(super) delimiter: Delimiter,
     /// Line of the header, from 1.
@@ -14,7 +13,6 @@ pub(super) struct Wanted {
     pub(super) by_number: bool,
 }
 
-/// A line of the head.
 pub(super) struct Line<'h> {
     pub(super) text: Cow<'h, str>,
     /// Its number, from 1, and the byte of the file at which it begins.

@@ -5,7 +5,6 @@ use super::number;
 use crate::log::columns;
 use crate::log::time::Instant;
 
-/// Where the table begins.
 pub(super) struct Found {
     /// Index of the line that names the columns.
     pub(super) at: usize,
@@ -13,9 +12,7 @@ pub(super) struct Found {
     pub(super) parting: (u8, bool),
     /// Whether the row after it holds no numbers.
     pub(super) second_row: bool,
-    /// Units in that row.
     pub(super) units: Vec<String>,
-    /// What was taken for what.
     pub(super) notes: Vec<String>,
 }
 
@@ -30,10 +27,8 @@ pub(super) fn are_units(fields: &[&str]) -> bool {
     let fields: Vec<String> = fields.iter().map(bare).collect();
     let nothing = |field: &String| matches!(field.as_str(), "" | "-" | "1" | "[]");
     let bracket = |field: &String| {
-        let pairs = [('[', ']'), ('(', ')'), ('<', '>')];
-        pairs
-            .iter()
-            .any(|(open, close)| field.starts_with(*open) && field.ends_with(*close))
+        let mut pairs = ["[]", "()", "<>"].into_iter().map(|pair| pair.split_at(1));
+        pairs.any(|(open, close)| field.starts_with(open) && field.ends_with(close))
     };
     let unit = |field: &String| nothing(field) || bracket(field) || columns::is_unit(field);
     fields.iter().all(unit) && !fields.iter().all(nothing)
@@ -54,19 +49,17 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     let mut parting = None;
     let mut from = 0;
     let separator = lines[first].text.trim().trim_matches('"');
-    if let Some(sign) = separator
-        .strip_prefix("sep=")
-        .or(separator.strip_prefix("SEP="))
-        && let Some(sign) = sign.bytes().next().filter(u8::is_ascii)
+    let separator = ["sep=", "SEP="]
+        .iter()
+        .find_map(|key| separator.strip_prefix(key));
+    if let Some(sign) = separator.and_then(|sign| sign.bytes().next())
+        && sign.is_ascii()
     {
         parting = Some((sign, sign == b' '));
         from = 1;
     }
-    let asked = wanted.header_line.and_then(|number| {
-        rows.iter()
-            .position(|k| lines[*k].number == number)
-            .or_else(|| rows.iter().position(|k| lines[*k].number > number))
-    });
+    let asked = wanted.header_line;
+    let asked = asked.and_then(|number| rows.iter().position(|k| lines[*k].number >= number));
     // a name in quotes that goes on in the next line: its lines are no rows
     let goes_on = |line: usize| lines[line].text.matches('"').count() % 2 == 1;
     let table = |row: usize| Table::at(lines, &rows[row..], parting, wanted);
@@ -123,15 +116,13 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     if let Some(second) = second {
         let (sign, spaces) = found.parting;
         let below = &lines[rows[row + 1]];
-        let fields = split(&below.text, sign, spaces);
+        let (fields, line) = (split(&below.text, sign, spaces), below.number);
+        notes.push(match second {
+            Second::Units => format!("units are those of line {line}"),
+            Second::Words => format!("line {line} holds words and is passed over"),
+        });
         if second == Second::Units {
             units = fields.iter().map(|unit| (*unit).to_owned()).collect();
-            notes.push(format!("units are those of line {}", below.number));
-        } else {
-            notes.push(format!(
-                "line {} holds words and is passed over",
-                below.number
-            ));
         }
     }
     Found {
@@ -155,7 +146,6 @@ enum Second {
     Words,
 }
 
-/// A table that begins with a line of names.
 struct Table {
     parting: (u8, bool),
     second: Option<Second>,
@@ -195,11 +185,10 @@ impl Table {
             let numbers = fields.iter().filter(|field| is_number(field)).count();
             as_wide(&fields) && numbers > 0 && 2 * numbers >= fields.len()
         };
+        let parting = (sign, spaces);
         if data(1) {
-            return Some(Self {
-                parting: (sign, spaces),
-                second: None,
-            });
+            let second = None;
+            return Some(Self { parting, second });
         }
         let below = fields(1)?;
         if !data(2) || !as_wide(&below) || below.iter().any(is_number) {
@@ -217,9 +206,7 @@ impl Table {
             false if distinct(&below) > distinct(&names) => return None,
             false => Second::Words,
         };
-        Some(Self {
-            parting: (sign, spaces),
-            second: Some(second),
-        })
+        let second = Some(second);
+        Some(Self { parting, second })
     }
 }

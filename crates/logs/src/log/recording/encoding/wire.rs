@@ -4,7 +4,6 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Broken;
 
-/// What a field holds on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Item<'m> {
     Varint(u64),
@@ -71,6 +70,13 @@ impl<'m> Iterator for Fields<'m> {
         }
         read
     }
+}
+
+pub(super) fn elements(data: &[u8], number: u32) -> impl Iterator<Item = Result<Item<'_>, Broken>> {
+    Fields::new(data).filter_map(move |field| match field {
+        Ok((found, item)) => (found == number).then_some(Ok(item)),
+        Err(broken) => Some(Err(broken)),
+    })
 }
 
 /// Takes a number of changing length off the bytes: seven bits a byte, lowest first.

@@ -24,12 +24,10 @@ const PAGE_BYTES: usize = 4 << 20;
 const LARGEST_MESSAGE: i32 = 64 << 20;
 /// Why a database with a journal ends early.
 const UNCLOSED: &str = "the recorder did not close it: what it had not committed is lost";
-/// Name of a copy in its folder.
 const COPY: &str = "copy.db3";
 /// Bytes that a database may take once it is decompressed, per byte that it takes compressed.
 const LARGEST_RATIO: u64 = 256;
 
-/// A rosbag2 database that is being read.
 struct BagFile {
     connection: Connection,
     /// Folder of the copy that is read instead of the file, removed when reading ends.
@@ -54,87 +52,76 @@ struct Stored {
     data: Vec<u8>,
 }
 
-/// Opens a database, to read the wanted topics.
 pub(super) fn open(
     path: &Path,
     content: Content,
     wanted: &Wanted,
 ) -> Result<Box<dyn MessageFile>, LogError> {
-    Ok(Box::new(BagFile::open(path, content, wanted)?))
+    let refuse = |reason: String| LogError::Database {
+        file: source::shown(path),
+        reason: escape_whole(&reason.replace('\n', " ")),
+    };
+    let journal = match content.compression {
+        Compression::None => journal_of(path),
+        _ => None,
+    };
+    let copy = match (&journal, content.compression) {
+        (None, Compression::None) => None,
+        _ => Some(copy_of(path, content, journal.as_ref())?),
+    };
+    let place = match &copy {
+        None => path.to_owned(),
+        Some(folder) => folder.path().join(COPY),
+    };
+    let failed = |error: rusqlite::Error| refuse(error.to_string());
+    let thread = OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let (place, how) = match &journal {
+        None => (
+            unwritten(&place).into(),
+            OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI,
+        ),
+        Some(_) => (place, OpenFlags::SQLITE_OPEN_READ_WRITE),
+    };
+    let connection = Connection::open_with_flags(place, thread | how).map_err(failed)?;
+    connection
+        .set_limit(Limit::SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
+        .map_err(failed)?;
+    // A database from elsewhere: its views and functions are not trusted.
+    connection
+        .execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON;")
+        .map_err(failed)?;
+    let sql = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?1";
+    for table in ["topics", "messages"] {
+        let exists = connection
+            .prepare(sql)
+            .and_then(|mut sql| sql.exists([table]));
+        if !exists.map_err(failed)? {
+            return Err(refuse(format!("it has no table `{table}`")));
+        }
+    }
+    let (topics, numbers) = read_topics(&connection).map_err(failed)?;
+    let listed = numbers
+        .iter()
+        .filter(|(_, topic)| wanted.includes(&topics[**topic].name));
+    let filter: Vec<String> = listed.map(|(number, _)| number.to_string()).collect();
+    Ok(Box::new(BagFile {
+        connection,
+        _copy: copy,
+        topics,
+        numbers,
+        filter: filter.join(","),
+        page: Vec::new(),
+        last: (i64::MIN, i64::MIN),
+        ended: false,
+        broken: journal.map(|_| Break {
+            reason: UNCLOSED.to_owned(),
+            place: "after its last commit".to_owned(),
+        }),
+        messages: 0,
+    }))
 }
 
 impl BagFile {
-    fn open(path: &Path, content: Content, wanted: &Wanted) -> Result<Self, LogError> {
-        let refuse = |reason: String| LogError::Database {
-            file: source::shown(path),
-            reason: escape_whole(&reason.replace('\n', " ")),
-        };
-        let journal = match content.compression {
-            Compression::None => journal_of(path),
-            _ => None,
-        };
-        let copy = match (&journal, content.compression) {
-            (None, Compression::None) => None,
-            _ => Some(copy_of(path, content, journal.as_ref())?),
-        };
-        let place = match &copy {
-            None => path.to_owned(),
-            Some(folder) => folder.path().join(COPY),
-        };
-        let failed = |error: rusqlite::Error| refuse(error.to_string());
-        let thread = OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection = match &journal {
-            None => Connection::open_with_flags(
-                unwritten(&place),
-                thread | OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI,
-            ),
-            Some(_) => {
-                Connection::open_with_flags(&place, thread | OpenFlags::SQLITE_OPEN_READ_WRITE)
-            }
-        };
-        let connection = connection.map_err(failed)?;
-        connection
-            .set_limit(Limit::SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
-            .map_err(failed)?;
-        // A database from elsewhere: its views and functions are not trusted.
-        connection
-            .execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON;")
-            .map_err(failed)?;
-        for table in ["topics", "messages"] {
-            let count: i64 = connection
-                .query_row(
-                    "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?1",
-                    params![table],
-                    |row| row.get(0),
-                )
-                .map_err(failed)?;
-            if count == 0 {
-                return Err(refuse(format!("it has no table `{table}`")));
-            }
-        }
-        let (topics, numbers) = read_topics(&connection).map_err(failed)?;
-        let listed = numbers
-            .iter()
-            .filter(|(_, topic)| wanted.includes(&topics[**topic].name));
-        let filter: Vec<String> = listed.map(|(number, _)| number.to_string()).collect();
-        Ok(Self {
-            connection,
-            _copy: copy,
-            topics,
-            numbers,
-            filter: filter.join(","),
-            page: Vec::new(),
-            last: (i64::MIN, i64::MIN),
-            ended: false,
-            broken: journal.map(|_| Break {
-                reason: UNCLOSED.to_owned(),
-                place: "after its last commit".to_owned(),
-            }),
-            messages: 0,
-        })
-    }
-
-    /// Reads the next page.
     fn turn(&mut self) -> Result<(), rusqlite::Error> {
         let sql = format!(
             "SELECT topic_id, timestamp, data, rowid FROM messages \

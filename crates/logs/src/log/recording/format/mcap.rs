@@ -25,10 +25,8 @@ const LARGEST_RECORD: u64 = 256 << 20;
 /// Bytes of definitions that are kept.
 const LARGEST_SCHEMAS: usize = 64 << 20;
 
-/// Why a file ends before its end.
 const UNCLOSED: &str = "the recorder did not close it, or the copy was cut off";
 
-/// An MCAP file that is being read.
 struct McapFile {
     path: PathBuf,
     input: Bytes,
@@ -41,7 +39,6 @@ struct McapFile {
     broken: Option<Break>,
 }
 
-/// What the records of the file said so far.
 struct Contents {
     wanted: Wanted,
     topics: Vec<Topic>,
@@ -49,12 +46,10 @@ struct Contents {
     channels: BTreeMap<u16, (usize, bool)>,
     /// Definition by its number in the file, its encoding not known yet.
     schemas: BTreeMap<u16, Schema>,
-    /// Bytes of all definitions.
     bytes: usize,
     messages: u64,
 }
 
-/// Opens a file, to read the wanted topics.
 pub(super) fn open(
     path: &Path,
     content: Content,
