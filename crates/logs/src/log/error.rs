@@ -102,15 +102,10 @@ pub enum LogError {
     /// Arrays whose sizes do not belong together.
     #[explain("{log}: {channel} holds {values} values for {rows} rows", remedy)]
     Shape {
-        /// Name of the log.
         log: String,
-        /// What the values are.
         channel: &'static str,
-        /// Number of values.
         values: usize,
-        /// Number of times.
         rows: usize,
-        /// What to do.
         remedy: &'static str,
     },
     /// A column that the robot needs.

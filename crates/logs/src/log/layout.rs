@@ -71,9 +71,7 @@ pub enum DeclaredChannels {
     Actuator,
 }
 
-/// Turns the positions, torques and velocities of one row into those of the joints, in place.
-///
-/// Returns false, and leaves both as they are, where the position belongs to no pose of the robot.
+/// Turns a row into that of the joints, in place; false, and as it was, where it belongs to no pose of the robot.
 type RowMap = dyn Fn(&mut [f64], &mut [f64], &mut [f64]) -> bool + Send + Sync;
 
 /// A conversion that the reader applies to every row, so that its blocks are joint-side.

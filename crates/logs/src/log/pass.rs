@@ -8,7 +8,7 @@ use super::columns::{time_of, unit_of};
 use super::content::Content;
 use super::layout::Layout;
 use super::open::open;
-use super::rows::{LogRows, Strictness};
+use super::rows::{LogRows, Strictness, counted};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
 use super::stream::Hashed;
@@ -138,12 +138,10 @@ impl LogPass {
     /// What was chosen on the way, one sentence each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut shown = self.rows.warnings();
-        if self.unstamped > 0 {
-            shown.push(format!(
-                "{} rows at the beginning are stamped 0, before the clock was set, and are left out",
-                self.unstamped
-            ));
-        }
+        shown.extend(counted(
+            self.unstamped,
+            "rows at the beginning are stamped 0, before the clock was set, and are left out",
+        ));
         if let Some((unit, column)) = &self.recognised {
             let unit = unit.in_seconds().0;
             shown.push(format!(

@@ -17,34 +17,30 @@ use cft_ident_core::number::is_usable;
 
 /// The machines whose joint states a recording holds, by their topics; none of a text log.
 pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
-    let files = spec.files()?;
-    match is_recording(&files)? {
-        true => state_groups(&files),
-        false => Ok(Vec::new()),
-    }
+    of_recording(spec, state_groups)
 }
 
 /// The topics of a recording, with the numbers in their messages; none of a text log.
 pub fn listing(spec: &LogSpec) -> Result<Vec<TopicFacts>, LogError> {
-    let files = spec.files()?;
-    match is_recording(&files)? {
-        true => recording::listing(&files),
-        false => Ok(Vec::new()),
-    }
+    of_recording(spec, recording::listing)
 }
 
-/// Whether files are a recording; an empty part of one that is split is of no format.
-fn is_recording(files: &[PathBuf]) -> Result<bool, LogError> {
-    for file in files {
+/// Looks at a recording, of which an empty part is of no format; nothing of any other log.
+fn of_recording<T>(
+    spec: &LogSpec,
+    look: impl Fn(&[PathBuf]) -> Result<Vec<T>, LogError>,
+) -> Result<Vec<T>, LogError> {
+    let files = spec.files()?;
+    for file in &files {
         let content = Content::open(file)?;
-        if content.table {
-            return Ok(false);
+        if format_of(content.head()).is_some() && !content.table {
+            return look(&files);
         }
-        if format_of(content.head()).is_some() {
-            return Ok(true);
+        if content.table {
+            break;
         }
     }
-    Ok(false)
+    Ok(Vec::new())
 }
 
 /// Consecutive rows of all columns.

@@ -6,7 +6,7 @@ use super::arrays::{ArrayRows, Arrays};
 use super::layout::{Channel, Layout};
 use super::mend::{Bridging, Failed, Held, Mending, Unwrap};
 use super::pass::LogPass;
-use super::rows::Strictness;
+use super::rows::{Strictness, counted};
 use super::source::{self, Provenance};
 use super::stale::Stale;
 use super::time::Instant;
@@ -207,12 +207,10 @@ impl Reader {
     pub fn warnings(&self) -> Vec<String> {
         let name = super::escape(&self.pass.spec.name());
         let mut found = self.pass.warnings();
-        if self.duplicates > 0 {
-            found.push(format!(
-                "{} messages repeat the message before, time included, and are left out",
-                self.duplicates
-            ));
-        }
+        found.extend(counted(
+            self.duplicates,
+            "messages repeat the message before, time included, and are left out",
+        ));
         if self.held.dropped > 0 {
             let rows = self.pass.samples + self.held.dropped;
             found.push(format!(

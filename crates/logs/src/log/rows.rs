@@ -3,6 +3,11 @@
 use super::time::Stamped;
 use super::{Block, LogError};
 
+/// A sentence that begins with a number, where that is not 0.
+pub(super) fn counted(count: u64, text: &str) -> Option<String> {
+    (count > 0).then(|| format!("{count} {text}"))
+}
+
 /// What becomes of a row, a field or a channel that cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Strictness {

@@ -95,8 +95,7 @@ pub(super) struct Tape {
     /// The layout that the log turned out to have.
     pub(super) found: Layout,
     names: Vec<String>,
-    recording: bool,
-    velocities: bool,
+    /// Numbers of positions, torques and velocities in a row.
     widths: [usize; 3],
     /// The column of times, where its numbers are taken as seconds.
     time_column: Option<usize>,
@@ -134,17 +133,14 @@ impl Tape {
             bytes,
             ..
         } = open(files, layout, Strictness::Refuse)?;
-        let velocities = rows.has_velocities();
         let plain = found.time.factor == 1.0 && found.section.rate_hz.is_none();
         let time = || position_of(rows.names(), &found.time);
-        let dq = usize::from(velocities) * found.velocities.len();
+        let dq = usize::from(rows.has_velocities()) * found.velocities.len();
         Ok(Self {
             files: files.to_vec(),
             layout: layout.clone(),
             state,
             names: rows.names().to_vec(),
-            recording: rows.is_recording(),
-            velocities,
             widths: [found.positions.len(), found.torques.len(), dq],
             time_column: plain.then(time).flatten(),
             found,
@@ -420,7 +416,7 @@ impl LogRows for TapeRows {
     }
 
     fn has_velocities(&self) -> bool {
-        self.tape.velocities
+        self.tape.widths[2] > 0
     }
 
     fn set_time(&mut self, column: usize, seconds: f64) {
@@ -428,7 +424,7 @@ impl LogRows for TapeRows {
     }
 
     fn is_recording(&self) -> bool {
-        self.tape.recording
+        lock(&self.tape.inner).source.is_recording()
     }
 
     fn repeats(&self) -> bool {

@@ -10,18 +10,7 @@ use cft_ident_logs::output::LogWriter;
 use proptest::prelude::*;
 
 fn read(path: &Path, layout: &Layout) -> (Block, Reader) {
-    let mut reader = Reader::open(&LogSpec::whole(path), layout).unwrap();
-    let (mut block, mut all) = (Block::default(), Block::default());
-    while reader.read(&mut block).unwrap() {
-        if all.is_empty() {
-            all.line0 = block.line0;
-        }
-        all.t.extend(&block.t);
-        all.q.extend(&block.q);
-        all.tau.extend(&block.tau);
-        all.dq.extend(&block.dq);
-    }
-    (all, reader)
+    crate::log_support::read(&path.to_string_lossy(), layout)
 }
 
 fn read_text(text: &str, layout: &Layout) -> Block {

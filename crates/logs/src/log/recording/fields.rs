@@ -110,11 +110,6 @@ impl RobotFields {
         self.header_ns(values).is_some_and(|ns| ns != 0)
     }
 
-    /// Positions, torques and velocities of all joints.
-    pub(super) fn channels(&self) -> Range<usize> {
-        0..self.time
-    }
-
     /// Time of a message; `None` where it has none of this kind.
     pub(super) fn stamp(
         &self,
@@ -146,6 +141,50 @@ impl RobotFields {
                     Some(Stamped::Exact(Instant::from_ns(value.checked_mul(ns)?)))
                 }
             },
+        }
+    }
+}
+
+/// Fields of the last message that lacked some.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Parts {
+    /// Its instant \[ns\]; none where nothing waits.
+    instant: Option<i128>,
+    values: Vec<Value>,
+    waiting: u64,
+}
+
+impl Parts {
+    /// Fills in what messages of the same instant held; how many of those this one makes whole.
+    pub(super) fn join(
+        &mut self,
+        fields: &RobotFields,
+        head: &MessageHead,
+        values: &mut [Value],
+    ) -> u64 {
+        let channels = 0..fields.time;
+        let absent = |values: &[Value]| values[channels.clone()].contains(&Value::Absent);
+        if !absent(values) {
+            self.instant = None;
+            return 0;
+        }
+        let stamped = fields.header_ns(values).filter(|ns| *ns != 0);
+        let instant = stamped.unwrap_or(i128::from(head.log_ns));
+        if self.instant.replace(instant) == Some(instant) {
+            for (value, known) in values[channels.clone()].iter_mut().zip(&self.values) {
+                if *value == Value::Absent {
+                    *value = *known;
+                }
+            }
+        } else {
+            self.waiting = 0;
+        }
+        self.values.clear();
+        self.values.extend(&values[channels.clone()]);
+        self.waiting += 1;
+        match absent(values) {
+            true => 0,
+            false => std::mem::take(&mut self.waiting) - 1,
         }
     }
 }

@@ -6,12 +6,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Wanted, refused};
+use super::message::{MessageHead, MessageReader, Schema, refused};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
+use super::state_topics::{ARRAYS, FoundTopic, survey};
 use super::value::{Value, stamp_ns};
 use crate::log::layout::{Channel, Layout};
-use crate::log::rows::LogRows;
+use crate::log::rows::{LogRows, counted};
 use crate::log::time::{Instant, Stamped};
 use crate::log::{Block, LogError, escape, list, source};
 use cft_ident_core::number::{beyond, is_usable};
@@ -118,7 +119,7 @@ impl JoinedTopics {
 
     /// Every number of a topic: of the one that is named, of the first that holds a whole state, else of all.
     pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
-        let mut recording = MessageFiles::open(paths, Wanted::default())?;
+        let mut recording = MessageFiles::open(paths, Vec::new())?;
         let mut found = Fields::new();
         let (mut looked, mut unread) = (0, None);
         while looked < SEARCHED_MESSAGES
@@ -182,8 +183,7 @@ impl JoinedTopics {
     fn open(paths: &[PathBuf], fields: Fields, layout: Layout) -> Result<Self, LogError> {
         let topics: Vec<String> = fields.iter().map(|(topic, _)| topic.clone()).collect();
         let mut schemas: Vec<Option<Arc<Schema>>> = vec![None; topics.len()];
-        let names = topics.clone();
-        let mut recording = MessageFiles::open(paths, Wanted { names })?;
+        let mut recording = MessageFiles::open(paths, topics.clone())?;
         while schemas.contains(&None)
             && let Some(message) = recording.next()?
         {
@@ -219,9 +219,8 @@ impl JoinedTopics {
                 steps: (0.0, 0),
             });
         }
-        let names = topics;
         Ok(Self {
-            recording: MessageFiles::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, topics)?,
             sources,
             row: vec![f64::NAN; columns.len() - 1],
             names: columns,
@@ -415,12 +414,58 @@ impl LogRows for JoinedTopics {
                 "rows are those of {topics}, interpolated linearly at the times of the first"
             ));
         }
-        if self.lost > 0 {
-            out.push(format!(
-                "{} messages of {topics} are left out: no message of another topic is near, or they cannot be read",
-                self.lost
-            ));
-        }
+        let lost = format!(
+            "messages of {topics} are left out: no message of another topic is near, or they cannot be read"
+        );
+        out.extend(counted(self.lost, &lost));
         out
     }
+}
+
+/// The rows of a robot each of whose joints is found on one topic alone; `None` where one is not.
+pub(in crate::log) fn of_joints(
+    paths: &[PathBuf],
+    layout: &Layout,
+) -> Result<Option<(JoinedTopics, Layout)>, LogError> {
+    let found = survey(paths)?.found;
+    let needed = [!layout.positions.is_empty(), !layout.torques.is_empty()];
+    let topic_of = |joint: usize| -> Option<&FoundTopic> {
+        let name = layout.name_in_messages(joint)?;
+        let holds = |one: &&FoundTopic| {
+            let mut filled = needed.iter().zip(one.arrays);
+            one.topic.starts_with('/')
+                && one.names.iter().any(|own| own == name)
+                && filled.all(|(needed, filled)| filled || !needed)
+        };
+        let mut all = found.iter().filter(holds);
+        all.next().filter(|_| all.next().is_none())
+    };
+    let topics: Option<Vec<&FoundTopic>> = (0..layout.joints.len()).map(topic_of).collect();
+    // one message of one topic that holds them all is refused for another reason
+    let several = |topics: &Vec<&FoundTopic>| {
+        let [first, others @ ..] = &topics[..] else {
+            return false;
+        };
+        first.most < first.names.len() || others.iter().any(|one| one.topic != first.topic)
+    };
+    let Some(topics) = topics.filter(several) else {
+        return Ok(None);
+    };
+    let mut split = layout.clone();
+    let kinds = [
+        &mut split.positions,
+        &mut split.torques,
+        &mut split.velocities,
+    ];
+    for (channels, (array, _)) in kinds.into_iter().zip(ARRAYS) {
+        for (joint, (channel, one)) in channels.iter_mut().zip(&topics).enumerate() {
+            let name = layout.name_in_messages(joint).unwrap_or_default();
+            channel.column = format!("{}:{array}[name={name}]", one.topic);
+        }
+    }
+    if !topics.iter().all(|one| one.arrays[2]) {
+        split.velocities.clear();
+    }
+    let rows = JoinedTopics::of_robot(paths, &split, true)?;
+    Ok(Some((rows, split)))
 }

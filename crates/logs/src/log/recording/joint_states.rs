@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Uneven, Wanted, refused};
+use super::message::{MessageHead, MessageReader, Schema, Uneven, refused};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
 use super::sources::{Publisher, Publishers};
@@ -16,7 +16,7 @@ use super::state_topics::{
 use super::value::{Value, stamp_ns};
 use crate::log::LogError;
 use crate::log::names::{escape, list, suggestion};
-use crate::log::rows::LogRows;
+use crate::log::rows::{LogRows, counted};
 use crate::log::time::{Instant, Stamped};
 
 /// What is wrong with a recording without joint states.
@@ -172,7 +172,7 @@ impl JointStates {
             names.push(TIMES.to_owned());
         }
         let mut states = Self {
-            recording: MessageFiles::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, names)?,
             paths: paths.to_vec(),
             unstamped: 0,
             begun: false,
@@ -299,25 +299,24 @@ impl LogRows for JointStates {
             let topics = list(self.other_topics.iter().map(String::as_str));
             out.push(format!("topics that are left out: {topics}"));
         }
-        if self.unreadable > 0 {
-            out.push(format!(
-                "{} messages cannot be decoded and are left out",
-                self.unreadable
-            ));
-        }
-        if self.unstamped > 0 {
-            out.push(format!(
-                "{} messages are stamped 0, before their clock was set, and are left out",
-                self.unstamped
-            ));
+        for (count, text) in [
+            (
+                self.unreadable,
+                "messages cannot be decoded and are left out",
+            ),
+            (
+                self.unstamped,
+                "messages are stamped 0, before their clock was set, and are left out",
+            ),
+        ] {
+            out.extend(counted(count, text));
         }
         out.extend(self.contradictions().into_iter().map(|(_, text)| text));
         out.extend(self.uneven().into_iter().map(|(_, text)| text));
-        if self.incomplete > 0 && self.sources.len() > 1 {
-            out.push(format!(
-                "{} rows have no message of one of the topics at their time, and no numbers there",
-                self.incomplete
-            ));
+        if self.sources.len() > 1 {
+            let lacking =
+                "rows have no message of one of the topics at their time, and no numbers there";
+            out.extend(counted(self.incomplete, lacking));
         }
         out
     }

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::encoding::reader_of;
-use super::message::{Leaf, Wanted};
+use super::message::Leaf;
 use super::parts::MessageFiles;
 use crate::log::{LogError, escape};
 
@@ -41,7 +41,7 @@ pub struct TopicFacts {
 
 /// The topics of a recording, those that are declared and have no message too.
 pub(in crate::log) fn listing(paths: &[PathBuf]) -> Result<Vec<TopicFacts>, LogError> {
-    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut recording = MessageFiles::open(paths, Vec::new())?;
     let mut found: Vec<TopicFacts> = Vec::new();
     while let Some(message) = recording.next()? {
         let (topic, head) = (message.topic, message.head);

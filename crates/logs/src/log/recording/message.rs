@@ -25,16 +25,9 @@ pub(super) struct Topic {
     pub(super) schema: Arc<Schema>,
 }
 
-#[derive(Debug, Clone, Default)]
-pub(super) struct Wanted {
-    /// Their names; empty for all.
-    pub(super) names: Vec<String>,
-}
-
-impl Wanted {
-    pub(super) fn includes(&self, topic: &str) -> bool {
-        self.names.is_empty() || self.names.iter().any(|name| name == topic)
-    }
+/// Whether a topic is among those that are read; none are named where all are.
+pub(super) fn is_wanted(topic: &str, names: &[String]) -> bool {
+    names.is_empty() || names.iter().any(|name| name == topic)
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -79,8 +72,7 @@ pub(super) trait MessageReader: Send {
         0
     }
 
-    /// An array of the message that was read last which holds another number of elements than the list
-    /// of names has, so that none can be given to a name.
+    /// An array of the message that was read last whose elements cannot be given to the names beside it.
     fn uneven(&self) -> Option<Uneven> {
         None
     }

@@ -12,22 +12,19 @@ mod joint_states;
 mod listing;
 mod message;
 mod pairing;
-mod partial;
 mod parts;
 mod path;
 mod rows;
 mod sources;
-mod split_joints;
 mod state_topics;
 mod survey;
 mod value;
 
 pub(super) use format::{FORMATS, format_of};
-pub(super) use joined::{JoinedTopics, of_topics};
+pub(super) use joined::{JoinedTopics, of_joints, of_topics};
 pub(super) use joint_states::{JointStates, has_none};
 pub(super) use listing::listing;
 pub(super) use rows::MessageRows;
-pub(super) use split_joints::of_joints;
 pub(super) use state_topics::state_groups;
 
 pub(crate) use delay::{DelayEstimate, DelayEstimator};

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 use super::delay::DelayEstimator;
 use crate::log::layout::Layout;
+use crate::log::rows::counted;
 use crate::log::time::{Instant, Stamped};
 
 /// Rows that wait for their torque at most.
@@ -175,23 +176,24 @@ impl Pairing {
         let mut out = vec![format!(
             "positions are those of {positions}, torques those of {torques}, {how} at the times of the positions"
         )];
-        let left = self.outside + self.waiting.len() as u64;
-        if left > 0 {
-            out.push(format!(
-                "{left} messages of {positions} lie before the first or after the last torque and are left out"
-            ));
-        }
-        if self.dropouts > 0 {
-            out.push(format!(
-                "{} messages of {positions} lie in dropouts of {torques} and are left out",
-                self.dropouts
-            ));
-        }
-        if self.disordered > 0 {
-            out.push(format!(
-                "{} messages of {torques} are left out: their time does not increase",
-                self.disordered
-            ));
+        let outside = self.outside + self.waiting.len() as u64;
+        for (count, text) in [
+            (
+                outside,
+                format!(
+                    "{positions} lie before the first or after the last torque and are left out"
+                ),
+            ),
+            (
+                self.dropouts,
+                format!("{positions} lie in dropouts of {torques} and are left out"),
+            ),
+            (
+                self.disordered,
+                format!("{torques} are left out: their time does not increase"),
+            ),
+        ] {
+            out.extend(counted(count, &format!("messages of {text}")));
         }
         out.push(self.delay.describe(positions, torques, self.delay_s));
         out

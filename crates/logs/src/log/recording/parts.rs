@@ -4,14 +4,13 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use super::format::format_of;
-use super::message::{Break, MessageFile, MessageHead, Topic, Wanted};
+use super::message::{Break, MessageFile, MessageHead, Topic};
 use crate::log::content::{Content, Unpacker};
 use crate::log::{LogError, escape, list, source};
 
 /// Files of one recording that are open at a time.
 const OPEN: usize = 16;
-/// Messages of one file that are held back until none of an earlier time can come, and their bytes: some
-/// chunks of the usual size, whose messages may lie there in any order.
+/// Messages of one file that are held back until none of an earlier time can come, and their bytes: some chunks.
 const MAX_HELD_MESSAGES: usize = 4096;
 const HELD_BYTES: usize = 4 << 20;
 
@@ -33,7 +32,7 @@ struct OpenFile {
 
 impl OpenFile {
     /// Opens a file; `None` for one of no bytes, which a recorder that lost its power leaves behind.
-    fn open(path: &Path, wanted: &Wanted) -> Result<Option<Self>, LogError> {
+    fn open(path: &Path, wanted: &[String]) -> Result<Option<Self>, LogError> {
         let content = Content::open(path)?;
         if content.head().is_empty() {
             return Ok(None);
@@ -101,7 +100,7 @@ pub(super) struct MessageFiles {
     parts: Vec<OpenFile>,
     /// Files that are not open yet, the next one last.
     waiting: Vec<PathBuf>,
-    wanted: Wanted,
+    wanted: Vec<String>,
     /// The part whose message was handed out last.
     current: Option<usize>,
     /// What was said of files that broke off.
@@ -121,7 +120,7 @@ pub(super) struct Message<'r> {
 
 impl MessageFiles {
     /// Opens files as one recording; later ones are opened when earlier ones are read.
-    pub(super) fn open(paths: &[PathBuf], wanted: Wanted) -> Result<Self, LogError> {
+    pub(super) fn open(paths: &[PathBuf], wanted: Vec<String>) -> Result<Self, LogError> {
         let mut recording = Self {
             parts: Vec::new(),
             waiting: paths.iter().rev().cloned().collect(),
@@ -194,8 +193,7 @@ impl MessageFiles {
         }))
     }
 
-    /// Where files break off, and parts that are not there, once the last message is read; `of` says how much
-    /// is used of what breaks off.
+    /// Where files break off, `of` saying how much is used of them, and parts that are not there.
     pub(super) fn breaks(&self, of: &str) -> Vec<String> {
         let broken = self.broken.iter().map(|(path, broken)| {
             format!(

@@ -6,10 +6,7 @@ pub(crate) enum PathStep {
     Field(String),
     /// An element of an array, counted from 0.
     Index(usize),
-    /// The element of an array whose index is that of `value` in the list of strings `list`.
-    ///
-    /// The list is looked for beside the array, then further out. Where an array holds messages,
-    /// the element whose own field `list` is `value`.
+    /// The element at the place of `value` in `list`, beside the array or further out, or whose own field `list` it is.
     Named { list: String, value: String },
 }
 
@@ -20,10 +17,7 @@ pub(crate) struct FieldPath {
 }
 
 impl FieldPath {
-    /// Reads a JSON pointer (RFC 6901) or a dotted path.
-    ///
-    /// Text that is neither is the name of a field, spaces and brackets included: any column name
-    /// of a text log is a path too.
+    /// Reads a JSON pointer (RFC 6901) or a dotted path; text that is neither is the name of a field.
     pub(crate) fn parse(text: &str) -> Self {
         let steps = match text.strip_prefix('/') {
             Some(pointer) => pointer

@@ -3,16 +3,15 @@
 use std::path::PathBuf;
 
 use super::encoding::Readers;
-use super::fields::{RobotFields, TimeSource};
-use super::message::{Wanted, refused};
+use super::fields::{Parts, RobotFields, TimeSource};
+use super::message::refused;
 use super::pairing::{Pairing, Sample};
-use super::partial::Parts;
 use super::parts::{Message, MessageFiles};
 use super::sources::{Publisher, Publishers};
 use super::survey::{self, Choice};
 use super::value::Value;
 use crate::log::layout::{Channel, Layout};
-use crate::log::rows::LogRows;
+use crate::log::rows::{LogRows, counted};
 use crate::log::time::Stamped;
 use crate::log::{Block, LogError, escape, source};
 use cft_ident_core::number::{beyond, is_usable};
@@ -91,7 +90,7 @@ impl MessageRows {
         let channels = channels.map(|channel| channel.column.clone());
         let rows = Self {
             names: std::iter::once("t".to_owned()).chain(channels).collect(),
-            recording: MessageFiles::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, names)?,
             pairing,
             row: Sample::default(),
             previous: Sample::default(),
@@ -258,24 +257,19 @@ impl LogRows for MessageRows {
         let reading = &self.reading;
         out.extend(self.breaks());
         let topic = escape(&reading.choice.topic);
-        if reading.incomplete.count > 0 {
-            out.push(format!(
-                "{} of {} messages are left out: they lack a channel of the robot (the first: {})",
-                reading.incomplete.count, self.messages, reading.incomplete.first
-            ));
+        for (LeftOut { count, first }, why) in [
+            (&reading.incomplete, "lack a channel of the robot"),
+            (&reading.unreadable, "cannot be decoded"),
+        ] {
+            let messages = self.messages;
+            let text =
+                format!("of {messages} messages are left out: they {why} (the first: {first})");
+            out.extend(counted(*count, &text));
         }
-        if reading.unreadable.count > 0 {
-            out.push(format!(
-                "{} of {} messages are left out: they cannot be decoded (the first: {})",
-                reading.unreadable.count, self.messages, reading.unreadable.first
-            ));
-        }
-        if reading.unstamped > 0 {
-            out.push(format!(
-                "{} messages of {topic} are stamped 0, before their clock was set, and are left out",
-                reading.unstamped
-            ));
-        }
+        let unset = format!(
+            "messages of {topic} are stamped 0, before their clock was set, and are left out"
+        );
+        out.extend(counted(reading.unstamped, &unset));
         out.extend(self.contradictions().into_iter().map(|(_, text)| text));
         if let (Some(pairing), Some(torques)) = (&self.pairing, &reading.choice.torque_topic) {
             out.extend(pairing.warnings(&topic, &escape(torques)));

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::encoding::Readers;
-use super::message::{MessageHead, MessageReader, Wanted};
+use super::message::{MessageHead, MessageReader};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
 use super::value::Value;
@@ -188,8 +188,7 @@ fn through(
     fields: &[Vec<FieldPath>],
     take: &mut dyn FnMut(Publisher, &[f64]),
 ) -> Result<(), LogError> {
-    let names = vec![topic.to_owned()];
-    let mut recording = MessageFiles::open(paths, Wanted { names })?;
+    let mut recording = MessageFiles::open(paths, vec![topic.to_owned()])?;
     let mut readers = Readers::default();
     let mut values = vec![Value::Absent; fields.len()];
     let mut numbers = Vec::new();
@@ -205,8 +204,7 @@ fn through(
     Ok(())
 }
 
-/// Whether a header's stamp of 0 is a time: the clock of a simulation begins there, while a driver that has no
-/// clock yet stamps several messages with 0, or goes on far from it.
+/// Stamps of headers, of which 0 is a time where a simulation begins there, and none of a driver without a clock yet.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct ZeroStamps {
     zeros: u32,

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Wanted};
+use super::message::{MessageHead, MessageReader, Schema};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
 use super::sources::ZeroStamps;
@@ -62,7 +62,7 @@ pub(super) struct Survey {
 }
 
 pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
-    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut recording = MessageFiles::open(paths, Vec::new())?;
     let mut found: Vec<FoundTopic> = Vec::new();
     let mut times = None;
     let mut messages = 0;
@@ -252,8 +252,7 @@ fn main_topic(found: &[FoundTopic]) -> usize {
     named.or_else(|| found.iter().position(both)).unwrap_or(0)
 }
 
-/// Indices of topics that are of one machine, the main one of each first, and the recording's main
-/// topic in the first group.
+/// Topics that are of one machine, the main one of each first, and the recording's main topic in the first group.
 pub(super) fn groups(found: &[FoundTopic]) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..found.len()).collect();
     let main = main_topic(found);

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::fields::{RobotFields, TimeSource};
-use super::message::{MessageHead, OpenedReader, Uneven, Wanted, refused};
-use super::partial::Parts;
+use super::fields::{Parts, RobotFields, TimeSource};
+use super::message::{MessageHead, OpenedReader, Uneven, refused};
 use super::parts::MessageFiles;
 use super::sources::ZeroStamps;
 use super::value::Value;
@@ -141,7 +140,7 @@ fn survey(
     layout: &Layout,
     fields: &RobotFields,
 ) -> Result<Vec<TopicCandidate>, LogError> {
-    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut recording = MessageFiles::open(paths, Vec::new())?;
     let mut found: Vec<TopicCandidate> = Vec::new();
     let mut values = vec![Value::Absent; fields.paths.len()];
     let (mut complete, mut further) = (false, 0);
@@ -263,8 +262,7 @@ fn pick(
     })
 }
 
-/// Which time of the messages of one or two topics counts, and what the user should know of it; else
-/// what is wrong and what to do.
+/// Which time of the messages counts, and a note on it; else what is wrong and what to do.
 fn time_source(
     first: &TopicCandidate,
     second: Option<&TopicCandidate>,
@@ -324,22 +322,18 @@ fn missing(
         None => (&fields.positions, &layout.positions, layout.what()),
     };
     let count = |c: &TopicCandidate| c.missing[range.clone()].iter().filter(|m| !**m).count();
-    let best = found
-        .iter()
-        .filter(|c| wanted.as_ref().is_none_or(|name| *name == c.name))
-        .max_by_key(|c| (c.reader.is_ok(), count(c), c.kind.contains("JointState")));
-    let Some(best) = best else {
-        return (
-            "no topic holds the robot's channels".to_owned(),
-            String::new(),
-        );
+    let meant = |c: &&TopicCandidate| wanted.as_ref().is_none_or(|name| *name == c.name);
+    let nearness =
+        |c: &&TopicCandidate| (c.reader.is_ok(), count(c), c.kind.contains("JointState"));
+    let Some(best) = found.iter().filter(meant).max_by_key(nearness) else {
+        let problem = "no topic holds the robot's channels";
+        return (problem.to_owned(), String::new());
     };
+    let (topic, kind) = (escape(&best.name), escape(&best.kind));
     if let Err(reason) = &best.reader {
         return (
             format!(
-                "messages of {} ({}) cannot be read: {}",
-                escape(&best.name),
-                escape(&best.kind),
+                "messages of {topic} ({kind}) cannot be read: {}",
                 escape(reason)
             ),
             format!("the topics are {}", list(topics())),
@@ -349,7 +343,7 @@ fn missing(
         && range.clone().any(|index| best.missing[index])
     {
         return (
-            format!("in messages of {}, {uneven}", escape(&best.name)),
+            format!("in messages of {topic}, {uneven}"),
             format!(
                 "where it is known whose they are, say so by their places, `{what} = \"{}[0]\"`, .. in [log.joint] of the robot file; else record again with one number for each name",
                 escape(&uneven.array)
@@ -362,12 +356,9 @@ fn missing(
     let column = channels.get(index).map_or("", |c| c.column.as_str());
     // the names of a message of temperatures may be those of the joints too
     if !layout.temperatures && lacking.is_some() && best.names.iter().any(|name| name == joint) {
+        let joint = escape(joint);
         return (
-            format!(
-                "messages of {} name {}, and hold no number as its {what}",
-                escape(&best.name),
-                escape(joint)
-            ),
+            format!("messages of {topic} name {joint}, and hold no number as its {what}"),
             "see what publishes them: NaN and null are no numbers; record again".to_owned(),
         );
     }
@@ -380,16 +371,11 @@ fn missing(
             escape(column),
             escape(joint)
         ),
-        None => format!(
-            "no message of {} holds the {what}s of all joints at once",
-            escape(&best.name)
-        ),
+        None => format!("no message of {topic} holds the {what}s of all joints at once"),
     };
     let remedy = format!(
-        "{}{} ({}) holds {}: name the joint as `name`, or the field as `{what}`, in [log.joint] of the robot file",
+        "{}{topic} ({kind}) holds {}: name the joint as `name`, or the field as `{what}`, in [log.joint] of the robot file",
         near.unwrap_or_default(),
-        escape(&best.name),
-        escape(&best.kind),
         list(best.names.iter().map(String::as_str)),
     );
     (problem, remedy)

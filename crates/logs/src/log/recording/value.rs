@@ -16,7 +16,7 @@ pub enum Value {
 
 impl Value {
     /// The number; `None` where it is absent.
-    pub fn number(self) -> Option<f64> {
+    pub(crate) fn number(self) -> Option<f64> {
         match self {
             Self::Absent => None,
             Self::Int(value) => Some(value as f64),
@@ -26,7 +26,7 @@ impl Value {
     }
 
     /// The number, where it is whole and stored as such.
-    pub fn integer(self) -> Option<i128> {
+    pub(crate) fn integer(self) -> Option<i128> {
         match self {
             Self::Int(value) => Some(i128::from(value)),
             Self::Unsigned(value) => Some(i128::from(value)),

@@ -4,10 +4,11 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::records::{BUFFER, LONGEST_ROW, Record, Records};
-use super::{head, line, number};
+use super::table::Found;
+use super::{head, number};
 use crate::log::content::Content;
 use crate::log::layout::Layout;
-use crate::log::rows::Strictness;
+use crate::log::rows::{Strictness, counted};
 use crate::log::stream::Hashed;
 use crate::log::time::Instant;
 use crate::log::{LogError, escape, source};
@@ -47,12 +48,8 @@ impl TextFile {
     ) -> Result<Self, LogError> {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
-        let wanted = line::Wanted {
-            delimiter: layout.section.delimiter,
-            header_line: layout.section.header_line,
-            by_number: layout.by_number(),
-        };
-        let found = head::look_at(path, begin, &wanted)?;
+        let found = head::look_at(path, begin, layout)?;
+        let Found { parting, units, .. } = found.table;
         let watch = content.watch.clone();
         let (table, notes) = (content.table, content.notes.clone());
         let mut inner = content.into_bytes();
@@ -61,26 +58,26 @@ impl TextFile {
         passed.map_err(|error| source::failed(path, error))?;
         let mut rows = Self {
             path: path.to_owned(),
-            reader: Records::new(inner, found.delimiter, found.comment),
+            reader: Records::new(inner, parting.sign, found.comment),
             record: Record::default(),
             previous: Record::default(),
             header: Vec::new(),
             header_line: found.header_line,
-            runs: found.spaces.then(Vec::new),
-            decimal_comma: found.delimiter != b',',
+            runs: parting.runs.then(Vec::new),
+            decimal_comma: parting.sign != b',',
             ahead: found.headerless,
             strictness,
             malformed: 0,
             blank: 0,
             before: found.before,
-            notes: [notes, found.notes].concat(),
+            notes: [notes, found.table.notes].concat(),
             table,
             watch,
         };
         if let Some(names) = found.header_in_comment {
-            let parts = line::split(&names, found.delimiter, found.spaces);
-            rows.header = parts.into_iter().map(str::to_owned).collect();
-            rows.add_units(&found.units);
+            let parts = parting.split(&names).into_iter();
+            rows.header = parts.map(str::to_owned).collect();
+            rows.add_units(&units);
             return Ok(rows);
         }
         while rows.advance()? && rows.is_blank() {}
@@ -96,10 +93,10 @@ impl TextFile {
         if rows.header.last().is_some_and(String::is_empty) {
             rows.header.pop();
         }
-        if found.second_row {
+        if found.table.second_row {
             while rows.advance()? && rows.is_blank() {}
         }
-        rows.add_units(&found.units);
+        rows.add_units(&units);
         Ok(rows)
     }
 
@@ -116,8 +113,7 @@ impl TextFile {
     /// What was taken for what, and what was passed over, one sentence each.
     pub(super) fn in_words(&self) -> Vec<String> {
         let notes = (!self.notes.is_empty()).then(|| self.notes.join("; "));
-        let blank = self.blank;
-        let blank = (blank > 0).then(|| format!("{blank} rows without any value are passed over"));
+        let blank = counted(self.blank, "rows without any value are passed over");
         notes.into_iter().chain(blank).collect()
     }
 

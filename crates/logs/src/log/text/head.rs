@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use super::line::{Wanted, lines_of, split};
+use super::line::{Line, lines_of};
 use super::table::{self, Found};
 use crate::log::content::HEAD;
+use crate::log::layout::Layout;
 use crate::log::{LogError, source};
 
 pub(super) struct Head {
     pub(super) comment: u8,
-    pub(super) delimiter: u8,
-    pub(super) spaces: bool,
+    pub(super) table: Found,
     /// Column names that stand in a comment line, as numpy writes them.
     pub(super) header_in_comment: Option<String>,
     pub(super) header_line: u64,
@@ -18,12 +18,6 @@ pub(super) struct Head {
     pub(super) headerless: bool,
     /// Bytes and lines before the table.
     pub(super) before: (u64, u64),
-    /// Units that a row of their own states.
-    pub(super) units: Vec<String>,
-    /// Whether the row after the header holds no numbers.
-    pub(super) second_row: bool,
-    /// What was taken for what, where a log is not the table alone.
-    pub(super) notes: Vec<String>,
 }
 
 /// The way out of an HDF5 file or of one of numpy's kinds: every array, by its name.
@@ -118,25 +112,19 @@ pub(super) fn refuse_other_formats(path: &Path, head: &[u8]) -> Result<(), LogEr
     })
 }
 
-pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head, LogError> {
+pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head, LogError> {
     let file = || source::shown(path);
     let lines = lines_of(head);
     let (mut comment, mut comments) = (None, Vec::new());
-    let mut first = None;
-    for (at, line) in lines.iter().enumerate() {
-        match line.text.bytes().next() {
-            Some(sign @ (b'#' | b'%')) if comment.is_none_or(|known| known == sign) => {
-                comment = Some(sign);
-                comments.push(at);
-            }
-            _ if line.text.trim().is_empty() => {}
-            _ => {
-                first = Some(at);
-                break;
-            }
+    let mut begins = |(at, line): (usize, &Line<'_>)| match line.text.bytes().next() {
+        Some(sign @ (b'#' | b'%')) if comment.is_none_or(|known| known == sign) => {
+            comment = Some(sign);
+            comments.push(at);
+            None
         }
-    }
-    let Some(first) = first else {
+        _ => (!line.text.trim().is_empty()).then_some(at),
+    };
+    let Some(first) = lines.iter().enumerate().find_map(&mut begins) else {
         return Err(match comments.last() {
             Some(_) => LogError::TooFewRows {
                 file: file(),
@@ -150,35 +138,25 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head,
         });
     };
     let comment = comment.unwrap_or(b'#');
-    let Found {
-        at,
-        parting: (delimiter, spaces),
-        second_row,
-        units,
-        notes,
-    } = table::find(&lines, (first, comment), wanted);
+    let table = table::find(&lines, (first, comment), &layout.section);
+    let (at, parting) = (table.at, table.parting);
     let (line, number) = (&lines[at].text, lines[at].number);
-    let fields = split(line, delimiter, spaces);
+    let fields = parting.split(line);
     let mut out = Head {
         comment,
-        delimiter,
-        spaces,
+        table,
         header_in_comment: None,
         header_line: number,
         headerless: false,
-        before: match at > first || wanted.header_line.is_some() {
+        before: match at > first || layout.section.header_line.is_some() {
             true => (lines[at].begins, number - 1),
             false => (0, 0),
         },
-        units,
-        second_row,
-        notes,
     };
     if fields.iter().all(|field| table::is_datum(field)) {
         // numpy.savetxt puts the names into a comment.
         let of = |k: &usize| {
-            let names = &lines[*k].text[1..];
-            let names = split(names, delimiter, spaces);
+            let names = parting.split(&lines[*k].text[1..]);
             (names.len() == fields.len()).then_some((*k, names))
         };
         let all: Vec<(usize, Vec<&str>)> = comments.iter().filter_map(of).collect();
@@ -190,12 +168,12 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head,
                 out.header_line = lines[*k].number;
                 let below = all.iter().find(|one| one.0 > *k && is_units(one));
                 if let Some((k, found)) = below {
-                    out.units = found.iter().map(|unit| (*unit).to_owned()).collect();
-                    out.notes
-                        .push(format!("units are those of line {}", lines[*k].number));
+                    out.table.units = found.iter().map(|unit| (*unit).to_owned()).collect();
+                    let note = format!("units are those of line {}", lines[*k].number);
+                    out.table.notes.push(note);
                 }
             }
-            None if wanted.by_number => out.headerless = true,
+            None if layout.by_number() => out.headerless = true,
             None => {
                 let at = format!("{}:{number}", file());
                 return Err(LogError::NoHeader { at });

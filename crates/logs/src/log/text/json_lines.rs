@@ -37,8 +37,6 @@ struct Slots {
     lists: [(&'static str, usize, usize); 3],
     /// SI = factor x + offset, of each place.
     scales: Vec<[f64; 2]>,
-    joints: usize,
-    torques: usize,
 }
 
 impl Slots {
@@ -57,8 +55,6 @@ impl Slots {
                 ("dq", 1 + n + k, layout.velocities.len()),
             ],
             scales,
-            joints: n,
-            torques: k,
         }
     }
 }
@@ -156,7 +152,7 @@ impl LogRows for JsonRows {
     }
 
     fn append(&self, block: &mut Block) -> Result<(), LogError> {
-        let (n, k) = (self.slots.joints, self.slots.torques);
+        let [(_, _, n), (_, _, k), _] = self.slots.lists;
         if let Some(place) = (1..1 + n + k).find(|i| !is_usable(self.values[*i])) {
             let key = escape(&self.slots.keys[place].0);
             return Err(self.wrong(format!("has no number `{key}`")));

@@ -28,8 +28,7 @@ struct TimeColumn {
     seconds: f64,
     /// Column of what is beyond whole seconds, and the power of ten of a second that it counts.
     rest: Option<(usize, i32)>,
-    /// Read exactly, in units of 10^power s: dates, and numbers far from zero. Known from the first
-    /// row that has a time.
+    /// Dates, and numbers far from zero, are read exactly, in units of 10^power s; known from the first time.
     exact: Option<Option<i32>>,
 }
 
@@ -43,8 +42,7 @@ pub(super) struct TextRows {
 }
 
 impl TextRows {
-    /// Reads the header and finds the columns; the layout that the log turns out to have, and what
-    /// keeps a strict reader from it.
+    /// Finds the columns; the layout that the log turns out to have, and what keeps a strict reader from it.
     pub(super) fn open(
         path: &Path,
         content: Content,

@@ -218,12 +218,7 @@ impl Records {
 
     /// Takes more bytes behind those that are there; how many they are.
     fn fill(&mut self) -> io::Result<usize> {
-        let count = loop {
-            match self.inner.read(&mut self.buffer[self.filled..]) {
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                other => break other?,
-            }
-        };
+        let count = self.inner.read(&mut self.buffer[self.filled..])?;
         self.ended |= count == 0;
         self.filled += count;
         if let Some(last) = self.filled.checked_sub(1).filter(|_| count > 0) {

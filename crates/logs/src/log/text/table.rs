@@ -1,15 +1,15 @@
 //! Where the table begins in a text: after a preamble, with a row of units, or right away.
 
-use super::line::{Line, Wanted, delimiter_of, split};
+use super::line::{Line, Parting};
 use super::number;
 use crate::log::columns;
+use crate::log::section::{Delimiter, LogSection};
 use crate::log::time::Instant;
 
 pub(super) struct Found {
     /// Index of the line that names the columns.
     pub(super) at: usize,
-    /// What parts its fields, and whether runs of it count as one.
-    pub(super) parting: (u8, bool),
+    pub(super) parting: Parting,
     /// Whether the row after it holds no numbers.
     pub(super) second_row: bool,
     pub(super) units: Vec<String>,
@@ -34,9 +34,12 @@ pub(super) fn are_units(fields: &[&str]) -> bool {
     fields.iter().all(unit) && !fields.iter().all(nothing)
 }
 
-/// Finds the line that names the columns: the first one that rows of as many numbers follow, at once or after one
-/// row of units; the first line where there is none.
-pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &Wanted) -> Found {
+/// Finds the line that names the columns: the first one that rows of as many numbers follow, or a row of units and they.
+pub(super) fn find(
+    lines: &[Line<'_>],
+    (first, comment): (usize, u8),
+    wanted: &LogSection,
+) -> Found {
     let sign = char::from(comment);
     let is_row = |line: &Line<'_>| {
         let text = line.text.trim();
@@ -55,18 +58,19 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     if let Some(sign) = separator.and_then(|sign| sign.bytes().next())
         && sign.is_ascii()
     {
-        parting = Some((sign, sign == b' '));
+        let runs = sign == b' ';
+        parting = Some(Parting { sign, runs });
         from = 1;
     }
     let asked = wanted.header_line;
     let asked = asked.and_then(|number| rows.iter().position(|k| lines[*k].number >= number));
     // a name in quotes that goes on in the next line: its lines are no rows
     let goes_on = |line: usize| lines[line].text.matches('"').count() % 2 == 1;
-    let table = |row: usize| Table::at(lines, &rows[row..], parting, wanted);
+    let table = |row: usize| Table::at(lines, &rows[row..], parting, wanted.delimiter);
     let plain = |row: usize| {
         let line = rows.get(row).map_or("", |k| &lines[*k].text);
         Table {
-            parting: parting.unwrap_or_else(|| delimiter_of(line, wanted.delimiter)),
+            parting: parting.unwrap_or_else(|| Parting::of(line, wanted.delimiter)),
             second: None,
         }
     };
@@ -74,28 +78,25 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
         Some(row) => (row, table(row).unwrap_or_else(|| plain(row))),
         None => {
             let headless = |row: usize| {
-                let (sign, spaces) = plain(row).parting;
-                let fields = split(&lines[rows[row]].text, sign, spaces);
+                let fields = plain(row).parting.split(&lines[rows[row]].text);
                 row == from && fields.iter().all(|field| is_datum(field))
             };
             // a row of a preamble has others of its kind below it, and most rows are of another
             let lasts = |row: usize| {
-                let (sign, spaces) = table(row).map_or(plain(row).parting, |found| found.parting);
-                let width = |k: &usize| width(&split(&lines[*k].text, sign, spaces));
+                let parting = table(row).unwrap_or_else(|| plain(row)).parting;
+                let width = |k: &usize| width(&parting.split(&lines[*k].text));
                 let below = &rows[row..];
                 let alike = below.iter().filter(|k| width(k) == width(&rows[row]));
                 2 * alike.count() > below.len()
             };
             let begins = |row: &usize| headless(*row) || table(*row).is_some();
             let fits = |row: &usize| begins(row) && lasts(*row);
+            let mut all = from..rows.len();
             let row = match rows.get(from).is_some_and(|k| goes_on(*k)) {
-                true => from,
-                false => (from..rows.len())
-                    .find(fits)
-                    .or_else(|| (from..rows.len()).find(begins))
-                    .unwrap_or(from),
+                true => None,
+                false => all.clone().find(fits).or_else(|| all.find(begins)),
             };
-            let row = row.min(rows.len().saturating_sub(1));
+            let row = row.unwrap_or(from).min(rows.len().saturating_sub(1));
             (row, table(row).unwrap_or_else(|| plain(row)))
         }
     };
@@ -114,9 +115,8 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     }
     let mut units = Vec::new();
     if let Some(second) = second {
-        let (sign, spaces) = found.parting;
         let below = &lines[rows[row + 1]];
-        let (fields, line) = (split(&below.text, sign, spaces), below.number);
+        let (fields, line) = (found.parting.split(&below.text), below.number);
         notes.push(match second {
             Second::Units => format!("units are those of line {line}"),
             Second::Words => format!("line {line} holds words and is passed over"),
@@ -147,7 +147,7 @@ enum Second {
 }
 
 struct Table {
-    parting: (u8, bool),
+    parting: Parting,
     second: Option<Second>,
 }
 
@@ -156,13 +156,12 @@ impl Table {
     fn at(
         lines: &[Line<'_>],
         rows: &[usize],
-        parting: Option<(u8, bool)>,
-        wanted: &Wanted,
+        parting: Option<Parting>,
+        asked: Delimiter,
     ) -> Option<Self> {
         let line = |row: usize| Some(&*lines[*rows.get(row)?].text);
-        let (sign, spaces) =
-            parting.unwrap_or_else(|| delimiter_of(line(0).unwrap_or_default(), wanted.delimiter));
-        let fields = |row: usize| Some(split(line(row)?, sign, spaces));
+        let parting = parting.unwrap_or_else(|| Parting::of(line(0).unwrap_or_default(), asked));
+        let fields = |row: usize| Some(parting.split(line(row)?));
         let names = fields(0)?;
         let n = width(&names);
         if names.iter().any(|name| is_datum(name)) {
@@ -176,7 +175,7 @@ impl Table {
         let is_number = |field: &&str| {
             // a decimal comma is reported later on, with the line
             let point = field.replace(',', ".");
-            is_datum(field) || (sign != b',' && number::parse(point.as_bytes()).is_some())
+            is_datum(field) || (parting.sign != b',' && number::parse(point.as_bytes()).is_some())
         };
         let data = |row: usize| {
             let Some(fields) = fields(row) else {
@@ -185,7 +184,6 @@ impl Table {
             let numbers = fields.iter().filter(|field| is_number(field)).count();
             as_wide(&fields) && numbers > 0 && 2 * numbers >= fields.len()
         };
-        let parting = (sign, spaces);
         if data(1) {
             let second = None;
             return Some(Self { parting, second });

@@ -19,8 +19,7 @@ use std::sync::Arc;
 use super::message::{OpenedReader, Schema};
 use super::path::FieldPath;
 
-/// Makes a reader of some fields, for each the paths that it may have; `None` for a schema of another
-/// encoding, else why its messages cannot be read.
+/// Makes a reader of some fields, for each the paths that it may have; `None` for a schema of another encoding.
 type Open = fn(&Schema, &[Vec<FieldPath>]) -> Option<OpenedReader>;
 
 const ENCODINGS: [Open; 3] = [cdr::open, json::open, proto::open];

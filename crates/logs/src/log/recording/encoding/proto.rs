@@ -285,8 +285,7 @@ impl ProtoReader {
     }
 }
 
-/// Where `value` stands in the list of texts `list` of a message, and how many texts that has; the outer
-/// option says whether there is such a list.
+/// Where `value` stands in the list of texts `list` of a message, and how many it has; `None` without such a list.
 fn named(
     place: &Place<'_>,
     list: &str,

@@ -13,9 +13,7 @@ pub(super) enum Item<'m> {
     Bytes(&'m [u8]),
 }
 
-/// The fields of a message: number and what it holds; groups are passed over.
-///
-/// Ends after the first broken field.
+/// The fields of a message, groups passed over, up to the first that is broken.
 #[derive(Debug, Clone)]
 pub(super) struct Fields<'m> {
     rest: &'m [u8],

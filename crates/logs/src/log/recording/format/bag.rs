@@ -14,7 +14,7 @@ use rusqlite::{Connection, OpenFlags, params};
 use tempfile::TempDir;
 
 use crate::log::content::{Compression, Content};
-use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, Wanted};
+use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, is_wanted};
 use crate::log::{LogError, escape_whole, source};
 
 /// Messages that are asked of the database at once, and their bytes at which a page ends earlier.
@@ -38,7 +38,7 @@ struct BagFile {
     /// The wanted ones, as SQL lists them.
     filter: String,
     /// Messages that were asked for, the next one last.
-    page: Vec<Stored>,
+    page: Vec<(MessageHead, Vec<u8>)>,
     /// Time and number of the last message of the page.
     last: (i64, i64),
     ended: bool,
@@ -46,16 +46,10 @@ struct BagFile {
     messages: u64,
 }
 
-struct Stored {
-    topic: usize,
-    ns: i64,
-    data: Vec<u8>,
-}
-
 pub(super) fn open(
     path: &Path,
     content: Content,
-    wanted: &Wanted,
+    wanted: &[String],
 ) -> Result<Box<dyn MessageFile>, LogError> {
     let refuse = |reason: String| LogError::Database {
         file: source::shown(path),
@@ -102,7 +96,7 @@ pub(super) fn open(
     let (topics, numbers) = read_topics(&connection).map_err(failed)?;
     let listed = numbers
         .iter()
-        .filter(|(_, topic)| wanted.includes(&topics[**topic].name));
+        .filter(|(_, topic)| is_wanted(&topics[**topic].name, wanted));
     let filter: Vec<String> = listed.map(|(number, _)| number.to_string()).collect();
     Ok(Box::new(BagFile {
         connection,
@@ -143,11 +137,15 @@ impl BagFile {
             if let Some(topic) = self.numbers.get(&number) {
                 let data = row.get_ref(2)?.as_bytes()?.to_vec();
                 bytes += data.len();
-                self.page.push(Stored {
-                    topic: *topic,
-                    ns,
-                    data,
-                });
+                let (topic, ns) = (*topic, u64::try_from(ns).unwrap_or_default());
+                let head = MessageHead {
+                    topic,
+                    channel: 0,
+                    log_ns: ns,
+                    publish_ns: ns,
+                    number: 0,
+                };
+                self.page.push((head, data));
             }
         }
         Ok(())
@@ -175,19 +173,13 @@ impl MessageFile for BagFile {
             }
             self.page.reverse();
         }
-        let Some(message) = self.page.pop() else {
+        let Some((head, stored)) = self.page.pop() else {
             return Ok(None);
         };
         self.messages += 1;
-        *data = message.data;
-        let ns = u64::try_from(message.ns).unwrap_or_default();
-        Ok(Some(MessageHead {
-            topic: message.topic,
-            channel: 0,
-            log_ns: ns,
-            publish_ns: ns,
-            number: self.messages,
-        }))
+        *data = stored;
+        let number = self.messages;
+        Ok(Some(MessageHead { number, ..head }))
     }
 }
 
@@ -226,18 +218,14 @@ fn read_topics(connection: &Connection) -> Result<Topics, rusqlite::Error> {
     Ok((topics, numbers))
 }
 
-/// What a recorder left beside a database that it did not close: the end of its name, and the bytes
-/// with which it begins where it holds anything.
+/// What a recorder leaves beside a database that it did not close: the end of its name, and its first bytes in use.
 const JOURNALS: [(&str, &[u8]); 2] = [
     ("-wal", b"\x37\x7f\x06"),
     ("-journal", b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"),
 ];
 
-/// A journal in use beside a database.
-struct Journal {
-    path: PathBuf,
-    ending: &'static str,
-}
+/// A journal in use beside a database, and the end of its name.
+type Journal = (PathBuf, &'static str);
 
 fn journal_of(database: &Path) -> Option<Journal> {
     JOURNALS.into_iter().find_map(|(ending, magic)| {
@@ -245,7 +233,7 @@ fn journal_of(database: &Path) -> Option<Journal> {
         let mut first = Vec::new();
         let file = File::open(&path).ok()?;
         file.take(magic.len() as u64).read_to_end(&mut first).ok()?;
-        (first == magic).then_some(Journal { path, ending })
+        (first == magic).then_some((path, ending))
     })
 }
 
@@ -270,10 +258,10 @@ fn copy_of(path: &Path, content: Content, journal: Option<&Journal>) -> Result<T
             reason: format!("it is more than {largest} bytes long once it is decompressed"),
         });
     }
-    if let Some(journal) = journal {
-        let failed = |error: io::Error| source::failed(&journal.path, error);
-        let mut from = File::open(&journal.path).map_err(failed)?;
-        let mut to = File::create(beside(&place, journal.ending)).map_err(failed)?;
+    if let Some((path, ending)) = journal {
+        let failed = |error: io::Error| source::failed(path, error);
+        let mut from = File::open(path).map_err(failed)?;
+        let mut to = File::create(beside(&place, ending)).map_err(failed)?;
         io::copy(&mut from, &mut to).map_err(failed)?;
     }
     Ok(folder)

@@ -7,11 +7,11 @@ mod record;
 
 use std::path::Path;
 
-use super::message::{MessageFile, Wanted};
+use super::message::MessageFile;
 use crate::log::LogError;
 use crate::log::content::Content;
 
-type Open = fn(&Path, Content, &Wanted) -> Result<Box<dyn MessageFile>, LogError>;
+type Open = fn(&Path, Content, &[String]) -> Result<Box<dyn MessageFile>, LogError>;
 
 pub(in crate::log) struct Format {
     magic: &'static [u8],
