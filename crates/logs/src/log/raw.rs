@@ -91,10 +91,11 @@ impl RawReader {
     /// # Errors
     /// A file that cannot be read, or is no log; without a robot, a recording of several machines.
     pub fn open(spec: &LogSpec, layout: Option<&Layout>) -> Result<Self, LogError> {
-        match layout {
-            Some(layout) => Self::of_layout(spec, layout),
-            None => Self::open_plain(spec, &LogSection::default()),
-        }
+        let Some(layout) = layout else {
+            return Self::open_plain(spec, &LogSection::default());
+        };
+        let pass = LogPass::open(spec, layout, Strictness::Record)?;
+        Ok(Self { pass })
     }
 
     /// Opens a log of no robot that is known, by what `section` says of topic, delimiter and rate.
@@ -105,12 +106,7 @@ impl RawReader {
             section: section.clone(),
             ..Layout::joint_columns(&[] as &[&str])
         };
-        Self::of_layout(spec, &layout)
-    }
-
-    fn of_layout(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        let pass = LogPass::open(spec, layout, Strictness::Record)?;
-        Ok(Self { pass })
+        Self::open(spec, Some(&layout))
     }
 
     /// Name of the log, for messages.

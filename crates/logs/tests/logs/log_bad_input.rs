@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::log_support;
+
 use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{Block, Layout, LogError, LogSpec, Provenance, Reader};
 
@@ -40,10 +42,7 @@ fn layout() -> Layout {
 
 #[track_caller]
 fn refused(spec: &str, layout: &Layout, words: &[&str]) {
-    let text = read(spec, layout).unwrap_err().to_string();
-    for word in words {
-        assert!(text.contains(word), "`{word}` is missing in: {text}");
-    }
+    log_support::says(&read(spec, layout).unwrap_err().to_string(), words);
 }
 
 /// The message for a log of joint q1 with this content.
@@ -62,10 +61,7 @@ fn message(content: impl AsRef<[u8]>) -> String {
 
 #[track_caller]
 fn says(content: impl AsRef<[u8]>, words: &[&str]) {
-    let text = message(content);
-    for word in words {
-        assert!(text.contains(word), "`{word}` is missing in: {text}");
-    }
+    log_support::says(&message(content), words);
 }
 
 #[test]

@@ -193,27 +193,23 @@ fn field_type(field: &[u8], mut implicit: bool) -> Result<(FieldType, Option<Str
             _ => {}
         }
     }
-    let number_of = |kind| match kind {
-        1 => Some(Number::Double),
-        2 => Some(Number::Float),
-        3 => Some(Number::Int64),
-        4 => Some(Number::Uint64),
+    let kind = match kind {
+        1 => Kind::Number(Number::Double),
+        2 => Kind::Number(Number::Float),
+        3 => Kind::Number(Number::Int64),
+        4 => Kind::Number(Number::Uint64),
         // An enumeration is a number too.
-        5 | 14 => Some(Number::Int32),
-        6 => Some(Number::Fixed64),
-        7 => Some(Number::Fixed32),
-        8 => Some(Number::Bool),
-        13 => Some(Number::Uint32),
-        15 => Some(Number::Sfixed32),
-        16 => Some(Number::Sfixed64),
-        17 => Some(Number::Sint32),
-        18 => Some(Number::Sint64),
-        _ => None,
-    };
-    let kind = match (kind, number_of(kind)) {
-        (_, Some(number)) => Kind::Number(number),
-        (9, _) => Kind::Text,
-        (11, _) if type_name.is_some() => Kind::Message(0),
+        5 | 14 => Kind::Number(Number::Int32),
+        6 => Kind::Number(Number::Fixed64),
+        7 => Kind::Number(Number::Fixed32),
+        8 => Kind::Number(Number::Bool),
+        9 => Kind::Text,
+        11 if type_name.is_some() => Kind::Message(0),
+        13 => Kind::Number(Number::Uint32),
+        15 => Kind::Number(Number::Sfixed32),
+        16 => Kind::Number(Number::Sfixed64),
+        17 => Kind::Number(Number::Sint32),
+        18 => Kind::Number(Number::Sint64),
         _ => Kind::Other,
     };
     let repeated = label == 3;

@@ -163,36 +163,28 @@ fn find_field<'f>(fields: &'f [Field], name: &str) -> Option<(usize, &'f Field)>
 }
 
 /// The slot at the end of some hops, made where there is none.
-fn slot<'n>(mut node: &'n mut Node, hops: &[Hop], new: impl FnOnce() -> Slot) -> &'n mut Slot {
-    let mut rest = hops;
-    loop {
-        let (field, tail) = match rest.split_first() {
-            Some((Hop::Field(field), tail)) => (*field, tail),
-            // Hops begin with a field, and an element is followed by one.
-            _ => (0, &[][..]),
-        };
-        if tail.is_empty() {
-            return node.entry(field, new);
-        }
-        rest = tail;
-        node = match tail[0] {
-            Hop::Field(_) => match node.entry(field, || Slot::Inner(Node::default())) {
-                Slot::Inner(inner) => inner,
+fn slot<'n>(node: &'n mut Node, hops: &[Hop], new: impl FnOnce() -> Slot) -> &'n mut Slot {
+    let [Hop::Field(field), rest @ ..] = hops else {
+        // hops begin with a field, and an element is followed by one
+        return node.entry(0, new);
+    };
+    match rest {
+        [] => node.entry(*field, new),
+        [Hop::Element(element), rest @ ..] => {
+            let elements = match node.entry(*field, || Slot::Elements(Vec::new())) {
+                Slot::Elements(elements) => elements,
                 other => return other,
-            },
-            Hop::Element(element) => {
-                rest = &tail[1..];
-                let elements = match node.entry(field, || Slot::Elements(Vec::new())) {
-                    Slot::Elements(elements) => elements,
-                    other => return other,
-                };
-                let at = elements.partition_point(|(index, _)| *index < element);
-                if elements.get(at).is_none_or(|(index, _)| *index != element) {
-                    elements.insert(at, (element, Node::default()));
-                }
-                &mut elements[at].1
+            };
+            let at = elements.partition_point(|(index, _)| index < element);
+            if elements.get(at).is_none_or(|(index, _)| index != element) {
+                elements.insert(at, (*element, Node::default()));
             }
-        };
+            slot(&mut elements[at].1, rest, new)
+        }
+        rest => match node.entry(*field, || Slot::Inner(Node::default())) {
+            Slot::Inner(inner) => slot(inner, rest, new),
+            other => other,
+        },
     }
 }
 
