@@ -62,11 +62,14 @@ pub(super) enum Number {
     Bool,
 }
 
-/// All types of a set, by their full name; each field with the name of its type, not looked up yet.
+/// A field with the name of its type, which is not looked up yet.
+type Unresolved = (FieldType, Option<String>);
+
+/// All types of a set, by their full name.
 #[derive(Default)]
 struct Found {
     names: BTreeMap<String, usize>,
-    messages: Vec<(Vec<(FieldType, Option<String>)>, bool)>,
+    messages: Vec<(Vec<Unresolved>, bool)>,
 }
 
 impl Types {
@@ -82,7 +85,7 @@ impl Types {
         let root = found.names.get(&full).copied();
         let root = root.ok_or_else(|| format!("its descriptor set does not define {name}"))?;
         let Found { names, messages } = found;
-        let resolve = |(mut field, type_name): (FieldType, Option<String>)| {
+        let resolve = |(mut field, type_name): Unresolved| {
             if matches!(field.kind, Kind::Message(_)) {
                 let found = type_name.and_then(|name| names.get(&name).copied());
                 field.kind = found.map_or(Kind::Other, Kind::Message);
@@ -178,7 +181,7 @@ fn ask_presence(options: &[u8], features: u32, implicit: &mut bool) -> Result<()
 }
 
 /// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9, proto3_optional 17.
-fn field_type(field: &[u8], mut implicit: bool) -> Result<(FieldType, Option<String>), Broken> {
+fn field_type(field: &[u8], mut implicit: bool) -> Result<Unresolved, Broken> {
     let (mut name, mut type_name) = (String::new(), None);
     let (mut number, mut label, mut kind, mut chosen) = (0, 1, 0, false);
     for item in Fields::new(field) {
