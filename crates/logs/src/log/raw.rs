@@ -83,6 +83,8 @@ impl RawBlock {
 #[derive(Debug)]
 pub struct RawReader {
     pass: LogPass,
+    /// Fields that are neither empty nor a number, per column.
+    words: Vec<u64>,
 }
 
 impl RawReader {
@@ -95,7 +97,8 @@ impl RawReader {
             return Self::open_plain(spec, &LogSection::default());
         };
         let pass = LogPass::open(spec, layout, Strictness::Record)?;
-        Ok(Self { pass })
+        let words = vec![0; pass.rows.names().len()];
+        Ok(Self { pass, words })
     }
 
     /// Opens a log of no robot that is known, by what `section` says of topic, delimiter and rate.
@@ -191,7 +194,7 @@ impl RawReader {
     /// # Errors
     /// A file that can no longer be read, or a line without an end.
     pub fn read(&mut self, block: &mut RawBlock) -> Result<bool, LogError> {
-        let width = self.names().len();
+        let width = self.words.len();
         block.clear(width);
         let most = (RawBlock::NUMBERS / width.max(1)).clamp(16, RawBlock::ROWS);
         while block.rows() < most
@@ -212,6 +215,7 @@ impl RawReader {
                 if number.is_none() {
                     // else most of the numbers, or all rows, would be lost in silence
                     self.pass.rows.refuse_comma(index)?;
+                    self.words[index] += 1;
                 }
                 column.push(number.unwrap_or(f64::NAN));
             }
@@ -225,7 +229,7 @@ impl RawReader {
     }
 
     /// Rows with more or fewer fields than the header, so far; they are passed over.
-    pub(crate) fn malformed(&self) -> u64 {
+    pub fn malformed(&self) -> u64 {
         self.pass.rows.malformed()
     }
 
@@ -245,6 +249,11 @@ impl RawReader {
 
     pub(crate) fn uneven(&self) -> Vec<(u64, String)> {
         self.pass.rows.uneven()
+    }
+
+    /// Fields of a column that hold words, so far.
+    pub fn words(&self, column: usize) -> u64 {
+        self.words.get(column).copied().unwrap_or(0)
     }
 
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.
@@ -287,7 +296,7 @@ mod tests {
         assert_eq!(block.columns[0], [0.0, 1.0, 0.5, 3.0, 3.0]);
         let finite: Vec<bool> = block.columns[1].iter().map(|x| x.is_finite()).collect();
         assert_eq!(finite, [true, false, false, false, true]);
-        assert_eq!(log.malformed(), 1);
+        assert_eq!((log.malformed(), log.words(1), log.words(2)), (1, 1, 4));
     }
 
     #[test]
