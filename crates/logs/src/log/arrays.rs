@@ -31,21 +31,12 @@ impl Arrays {
     /// # Errors
     /// Numbers of values that do not belong together.
     pub fn new(name: &str, t: Vec<f64>, q: Vec<f64>, tau: Vec<f64>) -> Result<Self, LogError> {
-        let rows = t.len();
-        let shape = |channel, values, remedy| {
-            Err(LogError::Shape {
-                log: name.to_owned(),
-                channel,
-                values,
-                rows,
-                remedy,
-            })
-        };
-        if q.len().checked_rem(rows) != Some(0) || q.is_empty() {
-            return shape("q", q.len(), "give one position per joint and row");
+        let of = (name, t.len());
+        if q.len().checked_rem(t.len()) != Some(0) || q.is_empty() {
+            return Err(shape(of, "q", q.len(), POSITIONS));
         }
         if !tau.is_empty() && tau.len() != q.len() {
-            return shape("tau", tau.len(), "give one torque beside every position");
+            return Err(shape(of, "tau", tau.len(), TORQUES));
         }
         let mut checksum = Checksum::default();
         for value in t.iter().chain(&q).chain(&tau) {
@@ -68,13 +59,12 @@ impl Arrays {
     /// Another number of values than there are positions.
     pub fn with_references(mut self, references: Vec<f64>) -> Result<Self, LogError> {
         if references.len() != self.q.len() {
-            return Err(LogError::Shape {
-                log: self.name,
-                channel: "the reference",
-                values: references.len(),
-                rows: self.t.len(),
-                remedy: "give one reference beside every position",
-            });
+            return Err(shape(
+                (&self.name, self.t.len()),
+                "the reference",
+                references.len(),
+                "give one reference beside every position",
+            ));
         }
         let of = Self::new(&self.name, self.t.clone(), references, Vec::new())?;
         self.references = Some(Arc::new(of));
@@ -92,13 +82,8 @@ impl Arrays {
     ) -> Result<Self, LogError> {
         let channel = "the temperature";
         if temperatures.len() != self.t.len() {
-            return Err(LogError::Shape {
-                log: self.name,
-                channel,
-                values: temperatures.len(),
-                rows: self.t.len(),
-                remedy: "give one temperature per row",
-            });
+            let (of, values) = ((&*self.name, self.t.len()), temperatures.len());
+            return Err(shape(of, channel, values, "give one temperature per row"));
         }
         if let Some(row) = temperatures.iter().position(|x| !is_usable(*x)) {
             let value = temperatures[row];
@@ -151,8 +136,25 @@ impl Arrays {
     }
 }
 
-/// Arrays as rows one by one.
-#[derive(Debug)]
+/// What to do about numbers of values that do not belong together.
+const POSITIONS: &str = "give one position per joint and row";
+const TORQUES: &str = "give one torque beside every position";
+
+fn shape(
+    (log, rows): (&str, usize),
+    channel: &'static str,
+    values: usize,
+    remedy: &'static str,
+) -> LogError {
+    LogError::Shape {
+        log: log.to_owned(),
+        channel,
+        values,
+        rows,
+        remedy,
+    }
+}
+
 pub(super) struct ArrayRows {
     arrays: Arc<Arrays>,
     /// Names of the positions, then of the torques that are read.
@@ -163,22 +165,14 @@ pub(super) struct ArrayRows {
 }
 
 impl ArrayRows {
-    /// The rows for a layout of joint channels.
     pub(super) fn open(arrays: &Arc<Arrays>, layout: &Layout) -> Result<Self, LogError> {
         let joints = layout.positions.len();
-        let (rows, values) = (arrays.t.len(), arrays.q.len());
-        let shape = |channel, values, remedy| LogError::Shape {
-            log: arrays.name.clone(),
-            channel,
-            values,
-            rows,
-            remedy,
-        };
-        if values != joints * rows {
-            return Err(shape("q", values, "give one position per joint and row"));
+        let (of, values) = ((arrays.name(), arrays.t.len()), arrays.q.len());
+        if values != joints * arrays.t.len() {
+            return Err(shape(of, "q", values, POSITIONS));
         }
         if arrays.tau.is_empty() && !layout.torques.is_empty() {
-            return Err(shape("tau", 0, "give one torque beside every position"));
+            return Err(shape(of, "tau", 0, TORQUES));
         }
         let channels = layout.positions.iter().chain(&layout.torques);
         Ok(Self {
@@ -208,10 +202,6 @@ impl ArrayRows {
 }
 
 impl LogRows for ArrayRows {
-    fn names(&self) -> &[String] {
-        &self.names
-    }
-
     fn next(&mut self) -> Result<Option<Stamped>, LogError> {
         let Some(t) = self.arrays.t.get(self.row).copied() else {
             return Ok(None);
@@ -221,10 +211,6 @@ impl LogRows for ArrayRows {
             true => Ok(Some(Stamped::Seconds(t))),
             false => Err(self.not_finite("t", t)),
         }
-    }
-
-    fn logged(&self, column: usize) -> Option<f64> {
-        Some(self.values().nth(column).unwrap_or(f64::NAN))
     }
 
     fn append(&self, block: &mut Block) -> Result<(), LogError> {
@@ -245,11 +231,10 @@ impl LogRows for ArrayRows {
             return false;
         };
         let Arrays { t, q, tau, .. } = &*self.arrays;
-        [(t, 1), (q, self.joints), (tau, self.joints)]
-            .iter()
-            .all(|(x, n)| {
-                x.get(before * n..(before + 1) * n) == x.get((before + 1) * n..(before + 2) * n)
-            })
+        let mut parts = [(t, 1), (q, self.joints), (tau, self.joints)].into_iter();
+        parts.all(|(x, n)| {
+            x.get(before * n..(before + 1) * n) == x.get((before + 1) * n..(before + 2) * n)
+        })
     }
 
     fn number(&self) -> u64 {
@@ -287,37 +272,28 @@ mod tests {
     fn arrays_are_read_as_a_file_is() {
         let (q, tau) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]);
         let block = read(&[0.0, 0.1], &q, &tau).unwrap();
-        assert_eq!(
-            (block.q.as_slice(), block.tau.as_slice()),
-            (&q[..], &tau[..])
-        );
-        assert_eq!((block.t.as_slice(), block.line0), (&[0.0, 0.1][..], 1));
+        assert_eq!([block.t, block.q, block.tau], [&[0.0, 0.1][..], &q, &tau]);
+        assert_eq!(block.line0, 1);
     }
 
     #[test]
     fn what_a_file_is_refused_for_arrays_are_too() {
         let (q, tau) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]);
-        let shown = |t: &[f64], q: &[f64], tau: &[f64]| read(t, q, tau).unwrap_err().to_string();
-        let text = shown(&[0.1, 0.0], &q, &tau);
-        assert!(
-            text.starts_with("arm, row 2: time runs backwards"),
-            "{text}"
-        );
-        let text = shown(&[0.0, 0.1], &[1.0, f64::NAN, 3.0, 4.0], &tau);
-        assert!(
-            text.starts_with("arm, row 1: column `q_q2` holds NaN"),
-            "{text}"
-        );
-        let text = shown(&[0.0, 0.1], &q, &[0.0; 4]);
-        assert!(
-            text.starts_with("arm: torque column `tau_q1` is 0"),
-            "{text}"
-        );
-        let text = shown(&[0.0, 0.1], &q, &tau[..2]);
-        assert!(
-            text.starts_with("arm: tau holds 2 values for 2 rows"),
-            "{text}"
-        );
-        assert!(shown(&[0.0, 0.1], &q[..2], &[]).contains("q holds 2 values"));
+        let (t, one_nan) = ([0.0, 0.1], [1.0, f64::NAN, 3.0, 4.0]);
+        for (t, q, tau, said) in [
+            (
+                [0.1, 0.0],
+                &q[..],
+                &tau[..],
+                "arm, row 2: time runs backwards",
+            ),
+            (t, &one_nan, &tau, "arm, row 1: column `q_q2` holds NaN"),
+            (t, &q, &[0.0; 4], "arm: torque column `tau_q1` is 0"),
+            (t, &q, &tau[..2], "arm: tau holds 2 values for 2 rows"),
+            (t, &q[..2], &[], "arm: q holds 2 values"),
+        ] {
+            let text = read(&t, q, tau).unwrap_err().to_string();
+            assert!(text.starts_with(said), "{text}");
+        }
     }
 }

@@ -12,7 +12,6 @@ pub(super) struct ScaledColumn {
     pub(super) offset: f64,
 }
 
-/// The columns of one log that are read.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ScaledColumns {
     pub(super) time: Option<ScaledColumn>,
@@ -22,21 +21,16 @@ pub(super) struct ScaledColumns {
     pub(super) velocities: Vec<ScaledColumn>,
 }
 
-/// A header and where it stands.
 pub(super) struct Header<'a> {
-    pub(super) file: String,
-    pub(super) line: u64,
+    pub(super) at: String,
     pub(super) names: &'a [String],
 }
 
 impl Header<'_> {
-    /// Finds every channel of the layout.
     pub(super) fn columns(&self, layout: &Layout) -> Result<ScaledColumns, LogError> {
         let each = |channels: &[Channel], what: &str| -> Result<Vec<ScaledColumn>, LogError> {
-            let named = channels.iter().zip(&layout.joints);
-            named
-                .map(|(channel, joint)| self.find(channel, &format!("{what} of {joint}")))
-                .collect()
+            let of = |(channel, joint)| self.find(channel, &format!("{what} of {joint}"));
+            channels.iter().zip(&layout.joints).map(of).collect()
         };
         let time = match layout.section.rate_hz {
             Some(_) => None,
@@ -46,14 +40,14 @@ impl Header<'_> {
         let torques = each(&layout.torques, "torque")?;
         // A velocity is optional unless the robot file names its column.
         let wanted = |c: &Channel| c.key.is_some() || position_of(self.names, c).is_some();
-        let velocities = if layout.velocities.iter().all(wanted) {
-            // nothing is fitted to velocities: those in another unit are none
-            match each(&layout.velocities, "velocity") {
-                Err(LogError::Unit { .. }) => Vec::new(),
-                found => found?,
-            }
-        } else {
-            Vec::new()
+        let velocities = match layout.velocities.iter().all(wanted) {
+            true => each(&layout.velocities, "velocity"),
+            false => Ok(Vec::new()),
+        };
+        // nothing is fitted to velocities: those in another unit are none
+        let velocities = match velocities {
+            Err(LogError::Unit { .. }) => Vec::new(),
+            found => found?,
         };
         Ok(ScaledColumns {
             time,
@@ -71,8 +65,7 @@ impl Header<'_> {
         let more = indices.count();
         if more > 0 {
             return Err(LogError::RepeatedColumn {
-                file: self.file.clone(),
-                line: self.line,
+                at: self.at.clone(),
                 column: escape(&channel.column),
                 count: more + 1,
             });
@@ -93,8 +86,7 @@ impl Header<'_> {
             Some(key) => format!("`{key}` of the robot file"),
         };
         LogError::MissingColumn {
-            file: self.file.clone(),
-            line: self.line,
+            at: self.at.clone(),
             column: escape(&channel.column),
             purpose: purpose.to_owned(),
             remedy: format!(
@@ -108,17 +100,12 @@ impl Header<'_> {
     /// Refuses a header that states another unit than the one that the number is read in.
     fn check_unit(&self, channel: &Channel, name: &str) -> Result<(), LogError> {
         let stated = unit_of(name);
-        let (Some(found), Some(declared)) =
-            (stated.and_then(known_unit), known_unit(&channel.unit))
-        else {
+        let units = stated.and_then(known_unit).zip(known_unit(&channel.unit));
+        let Some((found, declared)) = units.filter(|(found, declared)| found != declared) else {
             return Ok(());
         };
-        if found == declared {
-            return Ok(());
-        }
         Err(LogError::Unit {
-            file: self.file.clone(),
-            line: self.line,
+            at: self.at.clone(),
             column: escape(name),
             found,
             declared,
@@ -145,7 +132,6 @@ pub(super) fn time_of(names: &[String], time: &Channel) -> Option<usize> {
     position_of(names, &of_one_column(names, time))
 }
 
-/// Places of the columns that a channel may be.
 fn positions_of<'n>(names: &'n [String], channel: &'n Channel) -> impl Iterator<Item = usize> + 'n {
     let number = column_number(&channel.column);
     let is = move |(index, name): &(usize, &String)| match number {
@@ -155,7 +141,6 @@ fn positions_of<'n>(names: &'n [String], channel: &'n Channel) -> impl Iterator<
     names.iter().enumerate().filter(is).map(|(index, _)| index)
 }
 
-/// The first column that a channel may be.
 pub(super) fn position_of(names: &[String], channel: &Channel) -> Option<usize> {
     positions_of(names, channel).next()
 }
@@ -175,13 +160,10 @@ pub(super) fn choose(names: &[String], layout: &Layout) -> Layout {
 /// `q1 [deg]` and `q1 (deg)` are q1 in deg; `effort[2]` and `position[name=q1]` are places in messages.
 pub(super) fn name_and_unit(name: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
-        if let Some((base, unit)) = name
-            .strip_suffix(close)
-            .and_then(|head| head.rsplit_once(open))
-        {
-            let of_path = !base.ends_with(' ')
-                && !unit.is_empty()
-                && unit.bytes().all(|b| b.is_ascii_digit());
+        let head = name.strip_suffix(close);
+        if let Some((base, unit)) = head.and_then(|head| head.rsplit_once(open)) {
+            let digits = !unit.is_empty() && unit.bytes().all(|b| b.is_ascii_digit());
+            let of_path = digits && !base.ends_with(' ');
             if of_path || unit.contains('=') {
                 break;
             }
@@ -208,7 +190,6 @@ const OTHERS: [&str; 18] = [
     "min", "h", "date",
 ];
 
-/// Whether a text is a unit.
 pub(super) fn is_unit(text: &str) -> bool {
     known_unit(text).is_some() || OTHERS.contains(&&*text.to_lowercase())
 }
@@ -245,58 +226,46 @@ fn known_unit(text: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    fn header(names: &[String]) -> Header<'_> {
-        Header {
-            file: "a.csv".to_owned(),
-            line: 1,
-            names,
-        }
-    }
-
-    fn names(text: &str) -> Vec<String> {
-        text.split(',').map(str::to_owned).collect()
+    fn found(header: &str, layout: &Layout) -> Result<ScaledColumns, LogError> {
+        let names: Vec<String> = header.split(',').map(str::to_owned).collect();
+        let header = Header {
+            at: "a.csv:1".to_owned(),
+            names: &names,
+        };
+        header.columns(layout)
     }
 
     #[test]
     fn columns_are_found_by_name_in_any_order_with_or_without_a_unit() {
-        let names = names("tau_q1 [Nm],extra,q_q1 (rad),t [s]");
-        let columns = header(&names)
-            .columns(&Layout::joint_columns(&["q1"]))
-            .unwrap();
-        assert_eq!(columns.time.unwrap().index, 3);
-        assert_eq!(columns.positions[0].index, 2);
-        assert_eq!(columns.torques[0].index, 0);
-        assert!(columns.velocities.is_empty());
+        let layout = Layout::joint_columns(&["q1"]);
+        let found = found("tau_q1 [Nm],extra,q_q1 (rad),t [s]", &layout).unwrap();
+        let places = [found.time.unwrap(), found.positions[0], found.torques[0]];
+        assert_eq!(places.map(|column| column.index), [3, 2, 0]);
+        assert!(found.velocities.is_empty());
     }
 
     #[test]
     fn a_header_in_degrees_is_refused_where_radians_are_declared_and_taken_where_degrees_are() {
-        let names = names("t,q_q1 [deg],tau_q1");
+        let header = "t,q_q1 [deg],tau_q1";
         let mut layout = Layout::joint_columns(&["q1"]);
         layout.positions[0].unit = "rad".to_owned();
-        let message = header(&names).columns(&layout).unwrap_err().to_string();
-        assert!(
-            message.contains("a.csv:1")
-                && message.contains("in deg")
-                && message.contains("\"deg\""),
-            "{message}"
-        );
+        let message = found(header, &layout).unwrap_err().to_string();
+        for part in ["a.csv:1", "in deg", "\"deg\""] {
+            assert!(message.contains(part), "{message}");
+        }
         layout.positions[0].unit = "deg".to_owned();
-        assert!(header(&names).columns(&layout).is_ok());
+        assert!(found(header, &layout).is_ok());
     }
 
     #[test]
     fn velocities_are_read_only_where_all_of_them_are_there() {
         let layout = Layout::joint_columns(&["a", "b"]);
-        let some = names("t,q_a,q_b,tau_a,tau_b,dq_a");
-        assert!(
-            header(&some)
-                .columns(&layout)
-                .unwrap()
-                .velocities
-                .is_empty()
-        );
-        let all = names("t,q_a,q_b,tau_a,tau_b,dq_a,dq_b");
-        assert_eq!(header(&all).columns(&layout).unwrap().velocities.len(), 2);
+        for (header, count) in [
+            ("t,q_a,q_b,tau_a,tau_b,dq_a", 0),
+            ("t,q_a,q_b,tau_a,tau_b,dq_a,dq_b", 2),
+        ] {
+            let found = found(header, &layout).unwrap();
+            assert_eq!(found.velocities.len(), count, "{header}");
+        }
     }
 }

@@ -2,12 +2,8 @@
 
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
 
-use super::held_files::OpenFile;
-use super::source::Checksum;
-use super::stream::{Stream, Watch};
-use super::table::TableText;
+use super::stream::Hashed;
 use super::{LogError, source, table};
 
 /// First bytes of a file of reduced logs.
@@ -16,7 +12,6 @@ pub const REDUCED: &[u8] = b"cft-ident reduced\n";
 /// Bytes that are looked at.
 pub(super) const HEAD: usize = 1 << 16;
 
-/// How a file is compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Compression {
     None,
@@ -24,10 +19,8 @@ pub(super) enum Compression {
     Zstd,
 }
 
-/// The bytes of a log.
 pub(super) type Bytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
 
-/// An open log of any kind.
 pub(super) struct Content {
     pub(super) compression: Compression,
     /// Length of the file as it lies on the disk [bytes].
@@ -35,51 +28,29 @@ pub(super) struct Content {
     head: Vec<u8>,
     rest: Box<dyn Read + Send>,
     /// What is known of a stream while it arrives; none of a file.
-    pub(super) watch: Option<Watch>,
+    pub(super) watch: Option<Hashed>,
     /// The bytes of the file as they lie on the disk; none of a stream and of several files.
-    pub(super) raw: Option<RawBytes>,
+    pub(super) raw: Option<Hashed>,
     /// Whether the text is that of a table which is none: its lines stand nowhere.
     pub(super) table: bool,
     /// What was left out of a table.
     pub(super) notes: Vec<String>,
 }
 
-/// The bytes of an open file, hashed as they are read.
-#[derive(Clone)]
-pub(super) struct RawBytes(Arc<Mutex<(OpenFile, Checksum)>>);
-
-impl RawBytes {
-    fn new(file: OpenFile) -> Self {
-        Self(Arc::new(Mutex::new((file, Checksum::default()))))
-    }
-
-    /// The file, to be read from a byte on.
-    fn file(&self) -> OpenFile {
-        let inner = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        inner.0.from(0)
-    }
-
-    /// SHA-256 of the whole file, hexadecimal; what was not read yet is read.
-    pub(super) fn sha256(&self) -> io::Result<String> {
-        let mut rest = self.clone();
-        io::copy(&mut rest, &mut io::sink())?;
-        let inner = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(inner.1.clone().hexadecimal())
-    }
-}
-
-impl Read for RawBytes {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut inner = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let (file, checksum) = &mut *inner;
-        let count = file.read(buffer)?;
-        checksum.update(&buffer[..count]);
-        Ok(count)
-    }
-}
-
 impl Content {
-    /// Opens a log and looks at its first bytes.
+    fn new(head: Vec<u8>, rest: impl Read + Send + 'static) -> Self {
+        Self {
+            compression: Compression::None,
+            size: 0,
+            head,
+            rest: Box::new(rest),
+            watch: None,
+            raw: None,
+            table: false,
+            notes: Vec::new(),
+        }
+    }
+
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         Self::open_with(path, &[])
     }
@@ -89,24 +60,20 @@ impl Content {
         let fail = |error| source::failed(path, error);
         let file = source::open(path)?;
         let size = file.metadata().map_err(fail)?.len();
-        let raw = RawBytes::new(file);
+        let whole = file.from(0);
+        let raw = Hashed::new(file);
         let mut file = raw.clone();
         let mut magic = Vec::new();
-        Read::by_ref(&mut file)
-            .take(4)
-            .read_to_end(&mut magic)
-            .map_err(fail)?;
+        let read = Read::by_ref(&mut file).take(4).read_to_end(&mut magic);
+        read.map_err(fail)?;
         let compression = match magic[..] {
             [0x1f, 0x8b, ..] => Compression::Gzip,
             _ if magic == ZSTD => Compression::Zstd,
             _ => Compression::None,
         };
         let mut rest = plain(Cursor::new(magic).chain(file), compression).map_err(fail)?;
-        let mut head = Vec::with_capacity(HEAD);
+        let (mut head, read) = head_of(&mut rest);
         // What comes before the end of a file that is cut off may be used: the error waits there.
-        let read = Read::by_ref(&mut rest)
-            .take(HEAD as u64)
-            .read_to_end(&mut head);
         if let Err(error) = read {
             if head.is_empty() {
                 return Err(fail(error));
@@ -114,13 +81,17 @@ impl Content {
             rest = Box::new(CutOff(error.kind(), error.to_string()));
         }
         if compression == Compression::None && table::is_table(&head) {
-            return Self::of_table(
-                table::open(path, &raw.file(), &head, more)?,
+            let mut text = table::open(path, &whole, &head, more)?;
+            let read;
+            (head, read) = head_of(&mut text);
+            read.map_err(fail)?;
+            return Ok(Self {
                 size,
-                raw,
-                more,
-            )
-            .map_err(fail);
+                notes: std::mem::take(&mut text.notes),
+                raw: more.is_empty().then_some(raw),
+                table: true,
+                ..Self::new(head, text)
+            });
         }
         if head.starts_with(REDUCED) {
             return Err(LogError::Format {
@@ -132,41 +103,14 @@ impl Content {
         Ok(Self {
             compression,
             size,
-            head,
-            rest,
-            watch: None,
             raw: Some(raw),
-            table: false,
-            notes: Vec::new(),
-        })
-    }
-
-    fn of_table(
-        mut text: TableText,
-        size: u64,
-        raw: RawBytes,
-        more: &[PathBuf],
-    ) -> io::Result<Self> {
-        let mut head = Vec::with_capacity(HEAD);
-        Read::by_ref(&mut text)
-            .take(HEAD as u64)
-            .read_to_end(&mut head)?;
-        Ok(Self {
-            compression: Compression::None,
-            size,
-            head,
-            notes: std::mem::take(&mut text.notes),
-            rest: Box::new(text),
-            watch: None,
-            raw: more.is_empty().then_some(raw),
-            table: true,
+            ..Self::new(head, rest)
         })
     }
 
     /// Text that arrives while it is read: no more of it is waited for than its first two lines.
     pub(super) fn of_stream(path: &Path, stream: Box<dyn Read + Send>) -> Result<Self, LogError> {
-        let watch = Watch::default();
-        let mut rest = Stream::new(stream, watch.clone());
+        let mut rest = Hashed::new(stream);
         let mut head = vec![0; HEAD];
         let mut filled = 0;
         while filled < HEAD && !has_two_lines(&head[..filled]) {
@@ -178,14 +122,8 @@ impl Content {
         }
         head.truncate(filled);
         Ok(Self {
-            compression: Compression::None,
-            size: 0,
-            head,
-            rest: Box::new(rest),
-            watch: Some(watch),
-            raw: None,
-            table: false,
-            notes: Vec::new(),
+            watch: Some(rest.clone()),
+            ..Self::new(head, rest)
         })
     }
 
@@ -198,6 +136,13 @@ impl Content {
     pub(super) fn into_bytes(self) -> Bytes {
         Cursor::new(self.head).chain(self.rest)
     }
+}
+
+/// The first bytes of a text, and whether they could be read.
+fn head_of(text: &mut impl Read) -> (Vec<u8>, io::Result<usize>) {
+    let mut head = Vec::with_capacity(HEAD);
+    let read = text.take(HEAD as u64).read_to_end(&mut head);
+    (head, read)
 }
 
 /// Whether two whole lines are there that are neither blank nor comments.
@@ -226,9 +171,10 @@ impl Unpacker {
         if !data.starts_with(&ZSTD) {
             return;
         }
-        if self.inner.is_none() {
-            self.inner = zstd::bulk::Decompressor::new().ok();
-        }
+        self.inner = self
+            .inner
+            .take()
+            .or_else(|| zstd::bulk::Decompressor::new().ok());
         let Some(inner) = &mut self.inner else {
             return;
         };
@@ -251,7 +197,6 @@ pub fn unpacked(packed: &[u8]) -> io::Result<Vec<u8>> {
     zstd::stream::decode_all(packed)
 }
 
-/// The end of a file that cannot be read any further.
 struct CutOff(io::ErrorKind, String);
 
 impl Read for CutOff {
@@ -261,7 +206,7 @@ impl Read for CutOff {
 }
 
 fn plain(
-    file: Chain<Cursor<Vec<u8>>, RawBytes>,
+    file: Chain<Cursor<Vec<u8>>, Hashed>,
     compression: Compression,
 ) -> io::Result<Box<dyn Read + Send>> {
     Ok(match compression {

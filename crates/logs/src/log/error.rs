@@ -6,7 +6,7 @@ use thiserror::Error;
 /// An error in a log or in the way it was asked for.
 ///
 /// Files and folders are shown as the user named them; `at` is a file with the line or the message in
-/// it, `line` counts from 1, a `remedy` says what to do.
+/// it, whose count begins at 1, a `remedy` says what to do.
 #[derive(Debug, Explain, Error)]
 pub enum LogError {
     /// A span that makes no sense.
@@ -78,10 +78,10 @@ pub enum LogError {
     Empty { file: String },
     /// The first line holds numbers.
     #[explain(
-        "{file}:{line}: there is no header: the first line holds only numbers",
+        "{at}: there is no header: the first line holds only numbers",
         "add a line that names the columns, e.g. `t,q_q1,tau_q1`, or give them by number in [log] of the robot file, e.g. `time = 1`"
     )]
-    NoHeader { file: String, line: u64 },
+    NoHeader { at: String },
     /// A header and fewer than two rows.
     #[explain(
         "{file}: holds {rows} row(s) after its header, which determine nothing",
@@ -102,45 +102,37 @@ pub enum LogError {
     /// Arrays whose sizes do not belong together.
     #[explain("{log}: {channel} holds {values} values for {rows} rows", remedy)]
     Shape {
-        /// Name of the log.
         log: String,
-        /// What the values are.
         channel: &'static str,
-        /// Number of values.
         values: usize,
-        /// Number of times.
         rows: usize,
-        /// What to do.
         remedy: &'static str,
     },
     /// A column that the robot needs.
-    #[explain("{file}:{line}: column `{column}` ({purpose}) is missing", remedy)]
+    #[explain("{at}: column `{column}` ({purpose}) is missing", remedy)]
     MissingColumn {
-        file: String,
-        line: u64,
+        at: String,
         column: String,
         purpose: String,
         remedy: String,
     },
     /// A column that is there more than once.
     #[explain(
-        "{file}:{line}: column `{column}` is named {count} times",
+        "{at}: column `{column}` is named {count} times",
         "rename or delete all but one"
     )]
     RepeatedColumn {
-        file: String,
-        line: u64,
+        at: String,
         column: String,
         count: usize,
     },
     /// A header that states another unit than the robot file.
     #[explain(
-        "{file}:{line}: column `{column}` is in {found}, but is to be read in {declared}",
+        "{at}: column `{column}` is in {found}, but is to be read in {declared}",
         remedy
     )]
     Unit {
-        file: String,
-        line: u64,
+        at: String,
         column: String,
         /// Unit in the header.
         found: &'static str,
@@ -150,12 +142,11 @@ pub enum LogError {
     },
     /// A row with more or fewer fields than the header.
     #[explain(
-        "{file}:{line}: the row has {found} fields, the header names {expected}",
+        "{at}: the row has {found} fields, the header names {expected}",
         remedy
     )]
     Fields {
-        file: String,
-        line: u64,
+        at: String,
         found: usize,
         expected: usize,
         remedy: &'static str,
@@ -239,13 +230,8 @@ pub enum LogError {
     },
     /// A line or a quoted field without an end.
     #[explain(
-        "{file}:{line}: a line or a quoted field is longer than {limit} bytes",
+        "{at}: a line or a quoted field is longer than {limit} bytes",
         "this is no text log, or a quote is never closed"
     )]
-    LongLine {
-        file: String,
-        line: u64,
-        /// Bytes allowed.
-        limit: usize,
-    },
+    LongLine { at: String, limit: usize },
 }

@@ -5,7 +5,6 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// The files of one log.
 pub(super) struct HeldFiles {
     path: PathBuf,
     files: Mutex<Vec<(PathBuf, Arc<File>)>>,

@@ -55,12 +55,10 @@ pub fn channel(
     key: impl Fn() -> String,
 ) -> Channel {
     Channel {
-        column: named.as_ref().map_or(contract, |name| name.0.clone()),
-        unit: unit.to_owned(),
         factor,
         offset,
-        wrap: None,
         key: named.as_ref().map(|_| key()),
+        ..Channel::si(named.as_ref().map_or(contract, |name| name.0.clone()), unit)
     }
 }
 
@@ -73,9 +71,7 @@ pub enum DeclaredChannels {
     Actuator,
 }
 
-/// Turns the positions, torques and velocities of one row into those of the joints, in place.
-///
-/// Returns false, and leaves both as they are, where the position belongs to no pose of the robot.
+/// Turns a row into that of the joints, in place; false, and as it was, where it belongs to no pose of the robot.
 type RowMap = dyn Fn(&mut [f64], &mut [f64], &mut [f64]) -> bool + Send + Sync;
 
 /// A conversion that the reader applies to every row, so that its blocks are joint-side.
@@ -102,6 +98,12 @@ impl Conversion {
     }
 }
 
+impl PartialEq for Conversion {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
 impl fmt::Debug for Conversion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Conversion")
@@ -113,7 +115,7 @@ impl fmt::Debug for Conversion {
 /// In recordings of messages a channel's column is the path of a field (`a.b[2]`, `/a/b/2`). Where a
 /// message has no such field, the channel is looked for as `position`, `velocity` or `effort` of the
 /// joint that the list `name` holds, as in `sensor_msgs/msg/JointState`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Names of the joints (or actuator coordinates), for messages.
     pub joints: Vec<String>,
@@ -143,13 +145,11 @@ pub struct Layout {
 impl Layout {
     /// The contract's joint channels: `t`, `q_<joint>`, `tau_<joint>`, optional `dq_<joint>`, all SI.
     pub fn joint_columns(joints: &[impl AsRef<str>]) -> Self {
-        let each = |prefix: &str| -> Vec<Channel> {
-            joints
-                .iter()
-                .map(|joint| Channel::si(format!("{prefix}{}", joint.as_ref()), ""))
-                .collect()
-        };
         let joints: Vec<String> = joints.iter().map(|j| j.as_ref().to_owned()).collect();
+        let each = |prefix: &str| {
+            let channel = |joint| Channel::si(format!("{prefix}{joint}"), "");
+            joints.iter().map(channel).collect()
+        };
         Self {
             time: Channel::si("t", "s"),
             positions: each("q_"),
@@ -176,41 +176,15 @@ impl Layout {
     /// Name of a joint in messages that list their joints by name.
     pub(super) fn name_in_messages(&self, joint: usize) -> Option<&str> {
         let joint = self.joints.get(joint)?;
-        let named = self
-            .section
-            .joint
-            .get(joint)
-            .and_then(|c| c.name.as_deref());
-        Some(named.unwrap_or(joint))
+        let named = self.section.joint.get(joint);
+        Some(named.and_then(|c| c.name.as_deref()).unwrap_or(joint))
     }
 
     /// Whether any column is given by its number (`#1`, `#2`, ...), as a log without a header needs.
     pub(super) fn by_number(&self) -> bool {
-        let mut channels = (self.positions.iter())
-            .chain(&self.torques)
-            .chain(std::iter::once(&self.time));
+        let channels = self.positions.iter().chain(&self.torques);
+        let mut channels = channels.chain([&self.time]);
         channels.any(|channel| column_number(&channel.column).is_some())
-    }
-
-    /// Whether both take the same numbers from a log, whatever becomes of them.
-    pub(super) fn reads_like(&self, other: &Self) -> bool {
-        let channels = |of: &Self| {
-            let all = of.positions.iter().chain(&of.torques).chain(&of.velocities);
-            (all.cloned().collect::<Vec<_>>(), of.time.clone())
-        };
-        let counts = |of: &Self| [of.positions.len(), of.torques.len(), of.velocities.len()];
-        let otherwise = match (&self.otherwise, &other.otherwise) {
-            (None, None) => true,
-            (Some(a), Some(b)) => a.reads_like(b),
-            _ => false,
-        };
-        otherwise
-            && self.joints == other.joints
-            && counts(self) == counts(other)
-            && channels(self) == channels(other)
-            && (self.channels, self.zero_order_hold, self.temperatures)
-                == (other.channels, other.zero_order_hold, other.temperatures)
-            && self.section == other.section
     }
 
     /// The same layout with the conversions that `declared` has for these channels.
@@ -236,9 +210,8 @@ impl Layout {
     /// For a trajectory of positions whose torque is asked for.
     pub fn without_torques(mut self) -> Self {
         self.torques.clear();
-        self.otherwise = self
-            .otherwise
-            .map(|other| Box::new(other.without_torques()));
+        let other = self.otherwise;
+        self.otherwise = other.map(|other| Box::new(other.without_torques()));
         self
     }
 }

@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 /// Follows one position that begins anew after its range, through its turns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unwrap {
+#[derive(Debug)]
+pub(crate) struct Unwrap {
     range: f64,
     last: Option<f64>,
     turns: f64,
@@ -13,7 +13,7 @@ pub struct Unwrap {
 
 impl Unwrap {
     /// For a range in the unit of the position; finite and more than 0.
-    pub fn new(range: f64) -> Self {
+    pub(crate) fn new(range: f64) -> Self {
         Self {
             range,
             last: None,
@@ -21,10 +21,9 @@ impl Unwrap {
         }
     }
 
-    /// The next position with the turns that it went through. A step of more than half the range is
-    /// one through its end: nothing distinguishes it from one that is as fast.
+    /// The next position with the turns that it went through; a step of more than half the range is one through its end.
     #[inline]
-    pub fn take(&mut self, position: f64) -> f64 {
+    pub(crate) fn take(&mut self, position: f64) -> f64 {
         if !position.is_finite() {
             return position;
         }
@@ -63,11 +62,10 @@ pub struct Mending {
 }
 
 /// Leaves out rows by their times, row after row.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Failed {
     all: Arc<[f64]>,
     next: usize,
-    /// Rows that were left out.
     pub(super) dropped: u64,
 }
 
@@ -92,7 +90,7 @@ impl Failed {
 }
 
 /// Finds rows that repeat the one before, in a log that holds its samples.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Held {
     /// Rows for which a sample is held; 0 where none is.
     rows: usize,
@@ -100,7 +98,6 @@ pub(super) struct Held {
     last: Vec<f64>,
     /// Rows since then.
     since: usize,
-    /// Rows that were left out.
     pub(super) dropped: u64,
 }
 
@@ -112,8 +109,7 @@ impl Held {
         }
     }
 
-    /// Whether a row holds a sample that is there already. A robot at rest may give equal samples:
-    /// one is kept every so many rows.
+    /// Whether a row holds a sample that is there already; of equal samples one is kept every so many rows.
     #[inline]
     pub(super) fn repeats(&mut self, parts: [&[f64]; 3]) -> bool {
         if self.rows < 2 {
@@ -139,7 +135,7 @@ impl Held {
 }
 
 /// Puts numbers in the place of others, row after row.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Bridging {
     all: Arc<[Bridge]>,
     next: usize,
@@ -178,11 +174,9 @@ mod tests {
     #[test]
     fn a_position_is_followed_through_its_turns_in_both_directions() {
         let range = 360.0;
-        let true_ones: Vec<f64> = (0..4000)
-            .map(|k| 900.0 * (f64::from(k) * 0.003).sin())
-            .collect();
         let mut unwrap = Unwrap::new(range);
-        for q in &true_ones {
+        for k in 0..4000 {
+            let q = 900.0 * (f64::from(k) * 0.003).sin();
             let logged = (q + 180.0).rem_euclid(range) - 180.0;
             assert!((unwrap.take(logged) - q).abs() < 1e-9, "{q}");
         }
@@ -191,9 +185,7 @@ mod tests {
 
     #[test]
     fn of_held_samples_the_fresh_one_is_kept_and_at_rest_one_in_so_many_rows() {
-        let rows = [
-            1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 4.0,
-        ];
+        let rows = [1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3, 4].map(f64::from);
         let mut held = Held::new(Some(3));
         let fresh: Vec<usize> = (0..rows.len())
             .filter(|k| !held.repeats([&rows[*k..=*k], &[7.0], &[]]))
@@ -205,18 +197,11 @@ mod tests {
 
     #[test]
     fn numbers_are_replaced_at_their_rows_and_nowhere_else() {
-        let bridge = |t, channel, value| Bridge { t, channel, value };
-        let all = [
-            bridge(0.0, 0, 5.0),
-            bridge(0.2, 1, 6.0),
-            bridge(0.2, 2, 7.0),
-        ];
+        let all = [(0.0, 0, 5.0), (0.2, 1, 6.0), (0.2, 2, 7.0)];
+        let all = all.map(|(t, channel, value)| Bridge { t, channel, value });
         let mut bridging = Bridging::new(all.into());
-        for (t, expected) in [
-            (0.1, [1.0, 2.0, 3.0]),
-            (0.2, [1.0, 6.0, 7.0]),
-            (0.3, [1.0, 2.0, 3.0]),
-        ] {
+        let as_logged = [1.0, 2.0, 3.0];
+        for (t, expected) in [(0.1, as_logged), (0.2, [1.0, 6.0, 7.0]), (0.3, as_logged)] {
             let (mut q, mut tau) = ([1.0, 2.0], [3.0]);
             bridging.mend(t, &mut q, &mut tau);
             assert_eq!([q[0], q[1], tau[0]], expected);

@@ -4,8 +4,8 @@
 //! channels; a [`Reader`] hands out [`Block`]s of at most [`Block::ROWS`] rows, so that memory does not
 //! grow with the log. What comes out is finite, in strictly increasing time, and in SI.
 //!
-//! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are reported
-//! apart by their first bytes; logs in memory, as [`Arrays`], are read alike.
+//! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are distinguished
+//! by their first bytes; logs in memory, as [`Arrays`], are read alike.
 
 mod arrays;
 mod columns;
@@ -41,14 +41,11 @@ pub use cft_ident_core::block::Block;
 pub use content::REDUCED;
 pub use error::LogError;
 pub use layout::{Channel, Conversion, DeclaredChannels, Layout};
-pub use mend::{Bridge, Mending, Unwrap};
+pub use mend::{Bridge, Mending};
 pub use names::{escape, escape_whole, nearest};
 pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
-pub use recording::{
-    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, StateGroup,
-    TopicFacts, Value,
-};
+pub use recording::{CdrReader, StateGroup, TopicFacts, Value};
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
     PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
@@ -62,6 +59,8 @@ pub use time::Instant;
 pub use columns::unit_of;
 pub use content::unpacked;
 pub use layout::channel;
+pub(crate) use mend::Unwrap;
 pub use names::{did_you_mean, is_hidden, list};
 pub(crate) use pass::round_within;
+pub(crate) use recording::{DelayEstimate, DelayEstimator};
 pub use source::{bytes, named_beside, named_beside_of, remedy, sha256_of_bytes, shown};

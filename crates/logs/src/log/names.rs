@@ -47,9 +47,15 @@ pub fn nearest<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> Opti
 /// "did you mean `x`? " where one of the known names is near, else nothing; `known` is their list as a
 /// message has it, parted by commas.
 pub fn did_you_mean(name: &str, known: &str) -> String {
-    nearest(name, known.split(", "))
-        .map(|near| format!("did you mean `{near}`? "))
-        .unwrap_or_default()
+    suggestion(name, known.split(", "))
+}
+
+/// The same for names from a file.
+pub(super) fn suggestion<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> String {
+    let near = nearest(name, known);
+    near.map_or_else(String::new, |near| {
+        format!("did you mean `{}`? ", escape(near))
+    })
 }
 
 /// Nearness of two names in 0..1: by their common beginning, or by a few slips of the finger.
@@ -63,16 +69,12 @@ fn similarity(a: &str, b: &str) -> f64 {
 /// A list of names for a message, escaped, cut to the first twenty.
 pub fn list<'k>(names: impl IntoIterator<Item = &'k str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
-    let mut text = names
-        .iter()
-        .take(20)
-        .map(|name| escape(name))
-        .collect::<Vec<_>>()
-        .join(", ");
-    if names.len() > 20 {
-        text.push_str(&format!(" and {} more", names.len() - 20));
+    let shown: Vec<String> = names.iter().take(20).map(|name| escape(name)).collect();
+    let shown = shown.join(", ");
+    match names.len().saturating_sub(20) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
     }
-    text
 }
 
 #[cfg(test)]
@@ -89,17 +91,16 @@ mod tests {
 
     #[test]
     fn the_nearest_name_is_offered_only_where_it_is_near() {
-        assert_eq!(
-            nearest("cutof_hz", ["cutoff_hz", "order"]),
-            Some("cutoff_hz")
-        );
-        assert_eq!(nearest("Q_Q1", ["q_q1", "q_q2"]), Some("q_q1"));
-        assert_eq!(nearest("ctf", ["single-joint", "cft"]), Some("cft"));
-        assert_eq!(nearest("banana", ["cutoff_hz", "order"]), None);
-        assert_eq!(
-            did_you_mean("paylod", "gain, payload"),
-            "did you mean `payload`? "
-        );
+        for (name, known, near) in [
+            ("cutof_hz", ["cutoff_hz", "order"], Some("cutoff_hz")),
+            ("Q_Q1", ["q_q1", "q_q2"], Some("q_q1")),
+            ("ctf", ["single-joint", "cft"], Some("cft")),
+            ("banana", ["cutoff_hz", "order"], None),
+        ] {
+            assert_eq!(nearest(name, known), near);
+        }
+        let said = did_you_mean("paylod", "gain, payload");
+        assert_eq!(said, "did you mean `payload`? ");
         assert_eq!(did_you_mean("banana", "gain, payload"), "");
     }
 }

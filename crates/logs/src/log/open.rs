@@ -4,16 +4,16 @@ use std::path::PathBuf;
 
 use super::LogError;
 use super::columns::choose;
-use super::content::{Content, RawBytes};
+use super::content::Content;
 use super::layout::Layout;
 use super::recording::{
     JoinedTopics, JointStates, MessageRows, format_of, has_none, of_joints, of_topics,
 };
 use super::rows::{LogRows, Strictness};
+use super::stream::Hashed;
 use super::table;
 use super::text::TextRows;
 
-/// A log that was opened.
 pub(super) struct Opened {
     pub(super) rows: Box<dyn LogRows>,
     /// The layout that it turns out to have.
@@ -21,7 +21,7 @@ pub(super) struct Opened {
     /// What keeps a strict reader from it.
     pub(super) refused: Option<LogError>,
     /// The bytes of a text log.
-    pub(super) bytes: Option<RawBytes>,
+    pub(super) bytes: Option<Hashed>,
 }
 
 /// Opens files as one log of whatever format they have.
@@ -54,7 +54,7 @@ pub(super) fn open(
     let mut refused = None;
     // Without a robot there are no channels to look for.
     if of_topics(layout) {
-        let rows = JoinedTopics::of_robot(files, layout)?;
+        let rows = JoinedTopics::of_robot(files, layout, false)?;
         return Ok(recorded(Box::new(rows), layout.clone(), None));
     }
     if !layout.joints.is_empty() {

@@ -1,5 +1,6 @@
 //! The one way through a log, strict or not: its rows inside its span, each with its time.
 
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -7,10 +8,10 @@ use super::columns::{time_of, unit_of};
 use super::content::Content;
 use super::layout::Layout;
 use super::open::open;
-use super::rows::{LogRows, Strictness};
+use super::rows::{LogRows, Strictness, counted};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
-use super::stream::Watch;
+use super::stream::Hashed;
 use super::tape::{Tape, TapeRows};
 use super::text::{JsonRows, TextRows};
 use super::time::Instant;
@@ -22,8 +23,6 @@ const UNIT_ROWS: usize = 1024;
 /// Usual steps from a time of 0 to the next one where the clock began at 0.
 const MAX_STEPS_FROM_ZERO: f64 = 10.0;
 
-/// A log that is being gone through.
-#[derive(Debug)]
 pub(super) struct LogPass {
     pub(super) spec: LogSpec,
     pub(super) files: Vec<PathBuf>,
@@ -43,19 +42,22 @@ pub(super) struct LogPass {
     span: Option<(f64, f64)>,
     /// Times of the first and the last row handed out [s].
     used: Option<(f64, f64)>,
-    /// Rows handed out.
     pub(super) samples: u64,
     /// Whether a row was read, and those at the beginning that have no time yet and are left out.
     begun: bool,
     unstamped: u64,
-    /// What is known of a stream.
-    watch: Option<Watch>,
+    watch: Option<Hashed>,
     /// What is kept of its rows, where it is read strictly.
     tape: Option<Arc<Tape>>,
 }
 
+impl fmt::Debug for LogPass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_fmt(format_args!("LogPass({})", self.spec))
+    }
+}
+
 impl LogPass {
-    /// Opens a log of any format and finds its channels.
     pub(super) fn open(
         spec: &LogSpec,
         layout: &Layout,
@@ -103,16 +105,13 @@ impl LogPass {
         if stated || self.rows.is_recording() {
             return Ok(());
         }
-        let kept = self
-            .tape
-            .as_ref()
-            .and_then(|tape| tape.first_times(column, UNIT_ROWS));
-        let times = match kept {
-            Some(times) => times,
-            None => match self.first_numbers(column)? {
-                Some(numbers) => numbers,
-                None => return Ok(()),
-            },
+        let kept = |tape: &Arc<Tape>| tape.first_times(column, UNIT_ROWS);
+        let times = match self.tape.as_ref().and_then(kept) {
+            Some(times) => Some(times),
+            None => self.first_numbers(column)?,
+        };
+        let Some(times) = times else {
+            return Ok(());
         };
         let unit = TimeUnit::of_numbers(&times);
         self.set_time(column, unit.in_seconds().1);
@@ -139,12 +138,10 @@ impl LogPass {
     /// What was chosen on the way, one sentence each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut shown = self.rows.warnings();
-        if self.unstamped > 0 {
-            shown.push(format!(
-                "{} rows at the beginning are stamped 0, before the clock was set, and are left out",
-                self.unstamped
-            ));
-        }
+        shown.extend(counted(
+            self.unstamped,
+            "rows at the beginning are stamped 0, before the clock was set, and are left out",
+        ));
         if let Some((unit, column)) = &self.recognised {
             let unit = unit.in_seconds().0;
             shown.push(format!(
@@ -185,25 +182,20 @@ impl LogPass {
         let path = std::path::Path::new(name);
         let content = Content::of_stream(path, stream)?;
         let watch = content.watch.clone();
-        let (rows, layout): (Box<dyn LogRows>, Layout) =
-            match content.head().trim_ascii_start().first() {
-                Some(b'{') => {
-                    let (rows, layout) = JsonRows::open(path, content, layout)?;
-                    (Box::new(rows), layout)
-                }
-                _ => {
-                    let strict = Strictness::Refuse;
-                    let (rows, layout, _) = TextRows::open(path, content, layout, strict)?;
-                    (Box::new(rows), layout)
-                }
-            };
+        let is_json = content.head().trim_ascii_start().starts_with(b"{");
+        let (rows, layout): (Box<dyn LogRows>, Layout) = if is_json {
+            let (rows, layout) = JsonRows::open(path, content, layout)?;
+            (Box::new(rows), layout)
+        } else {
+            let (rows, layout, _) = TextRows::open(path, content, layout, Strictness::Refuse)?;
+            (Box::new(rows), layout)
+        };
         Ok(Self {
             watch,
             ..Self::of_rows(LogSpec::whole(name), rows, layout)
         })
     }
 
-    /// Says which column is the time, and how many seconds its unit has.
     pub(super) fn set_time(&mut self, column: usize, seconds: f64) {
         self.time = Some((column, seconds));
         self.rows.set_time(column, seconds);
@@ -216,13 +208,10 @@ impl LogPass {
 
     /// The same where they were recognised by their numbers.
     pub(super) fn recognised_s(&self) -> Option<f64> {
-        self.recognised
-            .as_ref()
-            .map(|(unit, _)| unit.in_seconds().1)
+        (self.recognised.as_ref()).map(|(unit, _)| unit.in_seconds().1)
     }
 
-    /// The instant from which times are counted, once a row is read: zero, unless they lie so far
-    /// from it that f64 seconds would lose digits; then the log's first stamp.
+    /// The instant from which times are counted, once a row is read.
     pub(super) fn origin(&self) -> Instant {
         self.origin.unwrap_or_default()
     }
@@ -269,11 +258,16 @@ impl LogPass {
 
     /// The rows from the beginning, once more.
     fn again(&self) -> Result<Box<dyn LogRows>, LogError> {
-        let mut rows: Box<dyn LogRows> = match &self.tape {
-            Some(tape) => Box::new(TapeRows::new(Arc::clone(tape))),
-            None => open(&self.files, &self.layout, self.strictness)?.rows,
-        };
-        if let (None, Some((column, seconds))) = (&self.tape, self.time) {
+        match &self.tape {
+            Some(tape) => Ok(Box::new(TapeRows::new(Arc::clone(tape)))),
+            None => self.anew(),
+        }
+    }
+
+    /// The same from the files.
+    fn anew(&self) -> Result<Box<dyn LogRows>, LogError> {
+        let mut rows = open(&self.files, &self.layout, self.strictness)?.rows;
+        if let Some((column, seconds)) = self.time {
             rows.set_time(column, seconds);
         }
         Ok(rows)
@@ -313,13 +307,9 @@ impl LogPass {
         Ok(last)
     }
 
-    /// The least step of a clock that stands still from row to row, and the rate of the rows: `None` where they are
-    /// no rows of a clock that is only too coarse.
+    /// The least step of a clock that is too coarse for its rows, and the rate of the rows; `None` of any other clock.
     pub(super) fn coarse_clock(&self) -> Option<(f64, f64)> {
-        let mut rows = open(&self.files, &self.layout, self.strictness).ok()?.rows;
-        if let Some((column, seconds)) = self.time {
-            rows.set_time(column, seconds);
-        }
+        let mut rows = self.anew().ok()?;
         let (mut origin, mut first, mut last) = (self.origin, None, f64::NAN);
         let (mut count, mut still, mut least) = (0_u64, 0_u64, f64::INFINITY);
         while let Some(stamp) = rows.next().ok()? {
@@ -351,19 +341,17 @@ impl LogPass {
         self.used.map(|(first, _)| first)
     }
 
-    /// Time from the first to the last row handed out so far [s].
     pub(super) fn duration_s(&self) -> f64 {
         self.used.map_or(0.0, |(first, last)| last - first)
     }
 
-    /// Name, span, checksum, rows and duration of what was handed out.
     pub(super) fn provenance(&self) -> Result<Provenance, LogError> {
         Ok(Provenance {
             name: self.spec.name(),
             span: self.spec.part(),
             sha256: match (self.rows.sha256(), &self.watch) {
                 (Some(known), _) => known.to_owned(),
-                (None, Some(watch)) => watch.sha256(),
+                (None, Some(watch)) => watch.sha256_so_far(),
                 (None, None) => source::sha256_of(&self.files)?,
             },
             samples: self.samples,

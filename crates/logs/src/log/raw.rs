@@ -17,34 +17,30 @@ use cft_ident_core::number::is_usable;
 
 /// The machines whose joint states a recording holds, by their topics; none of a text log.
 pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
-    let files = spec.files()?;
-    match is_recording(&files)? {
-        true => state_groups(&files),
-        false => Ok(Vec::new()),
-    }
+    of_recording(spec, state_groups)
 }
 
 /// The topics of a recording, with the numbers in their messages; none of a text log.
 pub fn listing(spec: &LogSpec) -> Result<Vec<TopicFacts>, LogError> {
-    let files = spec.files()?;
-    match is_recording(&files)? {
-        true => recording::listing(&files),
-        false => Ok(Vec::new()),
-    }
+    of_recording(spec, recording::listing)
 }
 
-/// Whether files are a recording; an empty part of one that is split is of no format.
-fn is_recording(files: &[PathBuf]) -> Result<bool, LogError> {
-    for file in files {
+/// Looks at a recording, of which an empty part is of no format; nothing of any other log.
+fn of_recording<T>(
+    spec: &LogSpec,
+    look: impl Fn(&[PathBuf]) -> Result<Vec<T>, LogError>,
+) -> Result<Vec<T>, LogError> {
+    let files = spec.files()?;
+    for file in &files {
         let content = Content::open(file)?;
-        if content.table {
-            return Ok(false);
+        if format_of(content.head()).is_some() && !content.table {
+            return look(&files);
         }
-        if format_of(content.head()).is_some() {
-            return Ok(true);
+        if content.table {
+            break;
         }
     }
-    Ok(false)
+    Ok(Vec::new())
 }
 
 /// Consecutive rows of all columns.
@@ -97,10 +93,12 @@ impl RawReader {
     /// # Errors
     /// A file that cannot be read, or is no log; without a robot, a recording of several machines.
     pub fn open(spec: &LogSpec, layout: Option<&Layout>) -> Result<Self, LogError> {
-        match layout {
-            Some(layout) => Self::of_layout(spec, layout),
-            None => Self::open_plain(spec, &LogSection::default()),
-        }
+        let Some(layout) = layout else {
+            return Self::open_plain(spec, &LogSection::default());
+        };
+        let pass = LogPass::open(spec, layout, Strictness::Record)?;
+        let words = vec![0; pass.rows.names().len()];
+        Ok(Self { pass, words })
     }
 
     /// Opens a log of no robot that is known, by what `section` says of topic, delimiter and rate.
@@ -111,13 +109,7 @@ impl RawReader {
             section: section.clone(),
             ..Layout::joint_columns(&[] as &[&str])
         };
-        Self::of_layout(spec, &layout)
-    }
-
-    fn of_layout(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        let pass = LogPass::open(spec, layout, Strictness::Record)?;
-        let words = vec![0; pass.rows.names().len()];
-        Ok(Self { pass, words })
+        Self::open(spec, Some(&layout))
     }
 
     /// Name of the log, for messages.
@@ -131,7 +123,7 @@ impl RawReader {
     }
 
     /// What a column is called by the names in the messages of a recording, where its own name is a path.
-    pub fn label(&self, column: usize) -> Option<&str> {
+    pub(crate) fn label(&self, column: usize) -> Option<&str> {
         self.pass.rows.label(column)
     }
 
@@ -202,9 +194,9 @@ impl RawReader {
     /// # Errors
     /// A file that can no longer be read, or a line without an end.
     pub fn read(&mut self, block: &mut RawBlock) -> Result<bool, LogError> {
-        block.clear(self.words.len());
-        let wide = RawBlock::NUMBERS / self.words.len().max(1);
-        let most = wide.clamp(16, RawBlock::ROWS);
+        let width = self.words.len();
+        block.clear(width);
+        let most = (RawBlock::NUMBERS / width.max(1)).clamp(16, RawBlock::ROWS);
         while block.rows() < most
             && let Some(t) = self.pass.next()?
         {
@@ -246,19 +238,16 @@ impl RawReader {
         self.pass.warnings()
     }
 
-    /// Where files break off; call it after the last block.
-    pub fn breaks(&self) -> Vec<String> {
+    pub(crate) fn breaks(&self) -> Vec<String> {
         self.pass.rows.breaks()
     }
 
-    /// Messages that contradict the others of their topic and are left out, with how many they are; call it after
-    /// the last block.
-    pub fn contradictions(&self) -> Vec<(u64, String)> {
+    /// Messages that contradict the others of their topic and are left out, with how many they are.
+    pub(crate) fn contradictions(&self) -> Vec<(u64, String)> {
         self.pass.rows.contradictions()
     }
 
-    /// Arrays of messages that cannot be given to joints, with how many; call it after the last block.
-    pub fn uneven(&self) -> Vec<(u64, String)> {
+    pub(crate) fn uneven(&self) -> Vec<(u64, String)> {
         self.pass.rows.uneven()
     }
 
@@ -314,11 +303,9 @@ mod tests {
     fn spans_are_those_of_the_strict_reader() {
         let rows: String = (0..10).map(|k| format!("{k},{k}\n")).collect();
         let text = format!("t,q\n{rows}");
-        assert_eq!(
-            read(&text, "@0..50%").1.columns[1],
-            [0.0, 1.0, 2.0, 3.0, 4.0]
-        );
-        assert_eq!(read(&text, "@7..s").1.columns[1], [7.0, 8.0, 9.0]);
+        let rows = |span| read(&text, span).1.columns[1].clone();
+        assert_eq!(rows("@0..50%"), [0.0, 1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(rows("@7..s"), [7.0, 8.0, 9.0]);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::arrays::{ArrayRows, Arrays};
 use super::layout::{Channel, Layout};
 use super::mend::{Bridging, Failed, Held, Mending, Unwrap};
 use super::pass::LogPass;
-use super::rows::Strictness;
+use super::rows::{Strictness, counted};
 use super::source::{self, Provenance};
 use super::stale::Stale;
 use super::time::Instant;
@@ -33,7 +33,6 @@ pub struct Reader {
     pending: Block,
 }
 
-/// What a joint did so far.
 #[derive(Debug, Clone, Copy, Default)]
 struct Activity {
     first_position: Option<f64>,
@@ -107,21 +106,15 @@ impl Reader {
     /// followed through their turns in any case.
     pub fn mend(&mut self, mending: &Mending) {
         let positions = self.pass.layout.positions.iter().enumerate();
-        let range = |(place, channel): (usize, &Channel)| {
-            let range = channel.wrap.or(*mending.wraps.get(place)?);
-            range.map(|range| (place, Unwrap::new(range)))
+        let turning = |(place, channel): (usize, &Channel)| {
+            let found = mending.wraps.get(place).copied().flatten();
+            Some((place, Unwrap::new(channel.wrap.or(found)?)))
         };
-        let named = |(place, channel): (usize, &Channel)| {
-            channel.wrap.map(|range| (place, Unwrap::new(range)))
-        };
-        self.turning = match mending.wraps.is_empty() {
-            true => positions.filter_map(named).collect(),
-            false => positions.filter_map(range).collect(),
-        };
+        self.turning = positions.filter_map(turning).collect();
         self.held = Held::new(mending.held);
         self.bridging = Bridging::new(Arc::clone(&mending.bridges));
         self.failed = Failed::new(Arc::clone(&mending.failed));
-        self.stale.keep(mending.keep_repeats);
+        self.stale.keep = mending.keep_repeats;
     }
 
     /// Rows for which each sample was held, in a log that repeats most of its rows while the robot
@@ -214,12 +207,10 @@ impl Reader {
     pub fn warnings(&self) -> Vec<String> {
         let name = super::escape(&self.pass.spec.name());
         let mut found = self.pass.warnings();
-        if self.duplicates > 0 {
-            found.push(format!(
-                "{} messages repeat the message before, time included, and are left out",
-                self.duplicates
-            ));
-        }
+        found.extend(counted(
+            self.duplicates,
+            "messages repeat the message before, time included, and are left out",
+        ));
         if self.held.dropped > 0 {
             let rows = self.pass.samples + self.held.dropped;
             found.push(format!(
@@ -228,11 +219,10 @@ impl Reader {
                 100.0 * self.held.dropped as f64 / rows as f64
             ));
         }
-        if self.stale.dropped() > 0 {
+        if self.stale.dropped > 0 {
             found.push(format!(
                 "{} rows repeat the positions of the row before; {} of them, in the middle of a motion, are stale samples and are left out",
-                self.stale.repeated(),
-                self.stale.dropped()
+                self.stale.repeated, self.stale.dropped
             ));
         }
         found.iter().map(|text| format!("{name}: {text}")).collect()
@@ -242,7 +232,7 @@ impl Reader {
     pub fn left_out(&self) -> [(u64, &'static str); 2] {
         [
             (self.held.dropped, "sample-and-hold"),
-            (self.stale.dropped(), "repeated-rows"),
+            (self.stale.dropped, "repeated-rows"),
         ]
     }
 
@@ -358,9 +348,8 @@ impl Reader {
                 positions: format!("{q:?}"),
             });
         }
-        let stale = self
-            .stale
-            .judge(t, &block.q[at_q..], || block.repeats_beside_positions());
+        let same = || block.repeats_beside_positions();
+        let stale = self.stale.judge(t, &block.q[at_q..], same);
         if stale > 0 {
             block.remove_before_last(stale);
         }
@@ -387,15 +376,14 @@ impl Reader {
                 _ => LogError::TooFewRows { file: file(), rows },
             });
         }
-        let dead = self.activity.iter().position(|a| a.moved && !a.driven);
-        match dead {
-            None => Ok(()),
-            Some(joint) => Err(LogError::ZeroTorque {
-                file: file(),
-                column: super::escape(&self.pass.layout.torques[joint].column),
-                joint: super::escape(&self.pass.layout.joints[joint]),
-                rows,
-            }),
-        }
+        let Some(joint) = self.activity.iter().position(|a| a.moved && !a.driven) else {
+            return Ok(());
+        };
+        Err(LogError::ZeroTorque {
+            file: file(),
+            column: super::escape(&self.pass.layout.torques[joint].column),
+            joint: super::escape(&self.pass.layout.joints[joint]),
+            rows,
+        })
     }
 }

@@ -1,9 +1,12 @@
 //! What every log is made of, whatever the format of its files: rows, one after the other.
 
-use std::fmt::Debug;
-
 use super::time::Stamped;
 use super::{Block, LogError};
+
+/// A sentence that begins with a number, where that is not 0.
+pub(super) fn counted(count: u64, text: &str) -> Option<String> {
+    (count > 0).then(|| format!("{count} {text}"))
+}
 
 /// What becomes of a row, a field or a channel that cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,10 +17,11 @@ pub(super) enum Strictness {
     Record,
 }
 
-/// The rows of one log.
-pub(super) trait LogRows: Debug + Send {
-    /// Names of the columns.
-    fn names(&self) -> &[String];
+pub(super) trait LogRows: Send {
+    /// Names of the columns; none of rows that are read strictly and have times in seconds.
+    fn names(&self) -> &[String] {
+        &[]
+    }
 
     /// What a column is called by the names in the messages, where its own name is a path.
     fn label(&self, _column: usize) -> Option<&str> {
@@ -28,7 +32,9 @@ pub(super) trait LogRows: Debug + Send {
     fn next(&mut self) -> Result<Option<Stamped>, LogError>;
 
     /// The number in a column of the current row as logged, NaN where there is none; `None` for words.
-    fn logged(&self, column: usize) -> Option<f64>;
+    fn logged(&self, _column: usize) -> Option<f64> {
+        None
+    }
 
     /// Refuses a field that is no number because it has a decimal comma.
     fn refuse_comma(&self, _column: usize) -> Result<(), LogError> {
@@ -40,7 +46,6 @@ pub(super) trait LogRows: Debug + Send {
         Ok(())
     }
 
-    /// Whether velocities are among the channels.
     fn has_velocities(&self) -> bool {
         false
     }
@@ -73,8 +78,7 @@ pub(super) trait LogRows: Debug + Send {
         String::new()
     }
 
-    /// What to do about a row that is not later than the one before, `t` seconds into the log, where
-    /// nobody can mend rows by hand.
+    /// What to do about a row that is not later than the one before, `t` s into the log, where nobody can mend it by hand.
     fn clock_remedy(&self, _t: f64) -> Option<String> {
         None
     }
@@ -94,8 +98,7 @@ pub(super) trait LogRows: Debug + Send {
         None
     }
 
-    /// Messages that contradict the others of their topic and are left out, with how many they are, once the
-    /// last row is read.
+    /// Messages that contradict the others of their topic and are left out, with how many they are.
     fn contradictions(&self) -> Vec<(u64, String)> {
         Vec::new()
     }

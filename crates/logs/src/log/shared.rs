@@ -1,5 +1,6 @@
 //! Whether two logs that are given hold the same rows: a file twice, a copy of it, spans that overlap.
 
+use std::fs::Metadata;
 use std::path::PathBuf;
 
 use super::source::sha256_of;
@@ -28,38 +29,30 @@ fn same_bytes(a: &[PathBuf], b: &[PathBuf]) -> bool {
     if of_a == of_b && of_a.iter().all(Option::is_some) {
         return true;
     }
-    let lengths = |files: &[PathBuf]| {
-        let about = files.iter().map(|file| file.metadata().ok());
-        // what is no file, a pipe, can be read but once
-        about
-            .map(|about| {
-                about
-                    .filter(|about| about.is_file())
-                    .map(|about| about.len())
-            })
-            .collect::<Option<Vec<u64>>>()
+    // what is no file, a pipe, can be read but once
+    let length = |file: &PathBuf| {
+        let about = file.metadata().ok().filter(Metadata::is_file);
+        about.map(|about| about.len())
     };
-    let lengths = lengths(a).zip(lengths(b));
-    lengths.is_some_and(|(a, b)| a == b)
-        && sha256_of(a)
-            .ok()
-            .zip(sha256_of(b).ok())
-            .is_some_and(|(a, b)| a == b)
+    let lengths = |files: &[PathBuf]| files.iter().map(length).collect::<Option<Vec<u64>>>();
+    let of_a = lengths(a);
+    of_a.is_some()
+        && of_a == lengths(b)
+        && sha256_of(a).is_ok_and(|sum| sha256_of(b).is_ok_and(|other| sum == other))
 }
 
 /// Whether the spans of one log have rows in common; both are half open.
 fn overlap(a: &LogSpec, b: &LogSpec, layout: Option<&Layout>) -> bool {
-    use Span::{Percent, Seconds, Whole};
-    let meet = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a.max(c) < b.min(d);
+    use Span::{Percent, Seconds};
     match (a.span, b.span) {
-        (Whole, _) | (_, Whole) => true,
-        (Percent { from: a, to: b }, Percent { from: c, to: d })
-        | (Seconds { from: a, to: b }, Seconds { from: c, to: d }) => meet([a, b], [c, d]),
-        (Percent { from, to }, Seconds { from: c, to: d })
-        | (Seconds { from: c, to: d }, Percent { from, to }) => {
-            let seconds = duration_s(a, layout).map(|all| [from, to].map(|p| all * p / 100.0));
-            seconds.is_ok_and(|span| meet(span, [c, d]))
+        (Percent { from, to }, seconds @ Seconds { .. })
+        | (seconds @ Seconds { .. }, Percent { from, to }) => {
+            duration_s(a, layout).is_ok_and(|all| {
+                let [from, to] = [from, to].map(|percent| all * percent / 100.0);
+                Seconds { from, to }.meets(seconds)
+            })
         }
+        (a, b) => a.meets(b),
     }
 }
 
@@ -100,17 +93,13 @@ mod tests {
     #[test]
     fn copies_and_overlapping_spans_share_rows_and_halves_do_not() {
         let folder = tempfile::tempdir().unwrap();
-        let rows: String = (0..1001)
-            .map(|k| format!("{},0\n", f64::from(k) / 100.0))
-            .collect();
-        let text = format!("t,q_a\n{rows}");
-        std::fs::write(folder.path().join("a.csv"), &text).unwrap();
-        std::fs::write(folder.path().join("copy.csv"), &text).unwrap();
-        std::fs::write(
-            folder.path().join("other.csv"),
-            text.replace("10,0", "10,1"),
-        )
-        .unwrap();
+        let rows = (0..1001).map(|k| format!("{},0\n", f64::from(k) / 100.0));
+        let text = format!("t,q_a\n{}", rows.collect::<String>());
+        let write =
+            |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        write("a.csv", &text);
+        write("copy.csv", &text);
+        write("other.csv", &text.replace("10,0", "10,1"));
         for (a, b, shared) in [
             ("a.csv", "a.csv", true),
             ("a.csv", "copy.csv", true),

@@ -1,6 +1,6 @@
 //! Files as they lie on the disk: opened with errors that help, and known again by their checksum.
 
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -71,24 +71,19 @@ impl Provenance {
 
     /// An input that is no log: a model, robot, campaign or trajectory file.
     pub fn of_file(path: &Path) -> Result<Self, LogError> {
-        Ok(Self {
-            name: file_name(path),
-            span: None,
-            sha256: sha256(path)?,
-            samples: 0,
-            duration_s: 0.0,
-            role: None,
-        })
+        Ok(Self::of_bytes(file_name(path), sha256(path)?))
     }
 
     /// An input that is no file of the user: a configuration that comes with the tool.
     pub fn of_text(name: &str, text: &str) -> Self {
-        let mut checksum = Checksum::default();
-        checksum.update(text.as_bytes());
+        Self::of_bytes(name.to_owned(), sha256_of_bytes(text.as_bytes()))
+    }
+
+    fn of_bytes(name: String, sha256: String) -> Self {
         Self {
-            name: name.to_owned(),
+            name,
             span: None,
-            sha256: checksum.hexadecimal(),
+            sha256,
             samples: 0,
             duration_s: 0.0,
             role: None,
@@ -131,7 +126,6 @@ pub(super) fn shown_all(paths: &[PathBuf]) -> String {
     }
 }
 
-/// Opens a file for reading.
 pub(super) fn open(path: &Path) -> Result<OpenFile, LogError> {
     opened(path).map_err(|error| failed(path, error))
 }
@@ -171,13 +165,11 @@ pub fn named_beside_of(path: &Path, ends: &[&str], wanted: &dyn Fn(&Path) -> boo
     }
 }
 
-/// Endings of files that hold logs.
 const LOGS: [&str; 12] = [
     "csv", "txt", "dat", "tsv", "npz", "npy", "parquet", "mcap", "db3", "csv.gz", "csv.zst",
     "mcap.zst",
 ];
 
-/// The error for a read that the system refused.
 pub(super) fn failed(path: &Path, error: io::Error) -> LogError {
     let beside = match error.kind() {
         io::ErrorKind::NotFound => named_beside(path, &LOGS),
@@ -213,22 +205,14 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, LogError> {
 /// SHA-256 of whole files one after the other, hexadecimal.
 pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
     let mut checksum = Checksum::default();
-    let mut buffer = vec![0; 1 << 16];
     for path in paths {
-        let mut file = open(path)?;
-        loop {
-            match file.read(&mut buffer) {
-                Ok(0) => break,
-                Ok(count) => checksum.update(&buffer[..count]),
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(failed(path, error)),
-            }
-        }
+        let mut file = BufReader::with_capacity(1 << 16, open(path)?);
+        let read = io::copy(&mut file, &mut checksum.0);
+        read.map_err(|error| failed(path, error))?;
     }
     Ok(checksum.hexadecimal())
 }
 
-/// SHA-256 of what it is given piece by piece.
 #[derive(Clone, Default)]
 pub(super) struct Checksum(Sha256);
 
@@ -237,7 +221,6 @@ impl Checksum {
         self.0.update(bytes);
     }
 
-    /// As hexadecimal digits.
     pub(super) fn hexadecimal(self) -> String {
         let digest = self.0.finalize();
         digest.iter().map(|byte| format!("{byte:02x}")).collect()
@@ -256,27 +239,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("abc.csv");
         std::fs::write(&path, "abc").unwrap();
-        let provenance = Provenance::of_file(&path).unwrap();
-        assert_eq!(
-            (provenance.name.as_str(), provenance.sha256.as_str()),
-            ("abc.csv", abc)
-        );
+        let Provenance { name, sha256, .. } = Provenance::of_file(&path).unwrap();
+        assert_eq!((&*name, &*sha256), ("abc.csv", abc));
     }
 
     #[test]
-    fn a_folder_and_a_missing_file_are_told_apart() {
+    fn a_folder_and_a_missing_file_are_distinguished() {
         let folder = tempfile::tempdir().unwrap();
-        let folder_error = sha256(folder.path()).unwrap_err().to_string();
+        let refused = |path: &Path| sha256(path).unwrap_err().to_string();
+        let said = refused(folder.path());
+        assert!(said.contains("name a file inside"), "{said}");
+        let said = refused(&folder.path().join("none.csv"));
         assert!(
-            folder_error.contains("name a file inside"),
-            "{folder_error}"
-        );
-        let missing = sha256(&folder.path().join("none.csv"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            missing.contains("none.csv") && missing.contains("check the path"),
-            "{missing}"
+            said.contains("none.csv") && said.contains("check the path"),
+            "{said}"
         );
     }
 }

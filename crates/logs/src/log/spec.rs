@@ -79,24 +79,16 @@ impl Span {
 
     /// Reads `0..70%` or `15.2..23s`; either number may be left out.
     fn parse(text: &str) -> Result<Self, &'static str> {
-        let (body, percent) = if let Some(body) = text.strip_suffix('%') {
-            (body, true)
-        } else if let Some(body) = text.strip_suffix('s') {
-            (body, false)
-        } else {
-            return Err("it ends neither in % nor in s");
-        };
-        let Some((from, to)) = body.split_once("..") else {
-            return Err("it has no `..` between its two numbers");
-        };
-        let number = |text: &str, default: f64| -> Result<f64, &'static str> {
-            let text = text.trim();
-            if text.is_empty() {
-                return Ok(default);
-            }
-            match text.parse::<f64>() {
-                Ok(value) if value.is_finite() => Ok(value),
-                _ => Err("it holds something that is no number"),
+        let percent = text.ends_with('%');
+        let body = text.strip_suffix(['%', 's']);
+        let body = body.ok_or("it ends neither in % nor in s")?;
+        let numbers = body.split_once("..");
+        let (from, to) = numbers.ok_or("it has no `..` between its two numbers")?;
+        let number = |text: &str, default: f64| match text.trim() {
+            "" => Ok(default),
+            text => {
+                let number = text.parse::<f64>().ok().filter(|x| x.is_finite());
+                number.ok_or("it holds something that is no number")
             }
         };
         let from = number(from, 0.0)?;
@@ -110,10 +102,9 @@ impl Span {
         if percent && to > 100.0 {
             return Err("it goes beyond 100 %");
         }
-        Ok(if percent {
-            Span::Percent { from, to }
-        } else {
-            Span::Seconds { from, to }
+        Ok(match percent {
+            true => Span::Percent { from, to },
+            false => Span::Seconds { from, to },
         })
     }
 }
@@ -170,13 +161,9 @@ impl LogSpec {
     pub fn part(&self) -> Option<String> {
         let without = self.leave_out.iter();
         let without: Vec<String> = without.map(|[from, to]| format!("{from}..{to}s")).collect();
-        match (self.span.label(), without.is_empty()) {
-            (span, true) => span,
-            (span, false) => Some(format!(
-                "{}{WITHOUT}{}",
-                span.unwrap_or_default(),
-                without.join(", ")
-            )),
+        match without.is_empty() {
+            true => self.span.label(),
+            false => Some(format!("{}{WITHOUT}{}", self.span, without.join(", "))),
         }
     }
 
@@ -190,13 +177,9 @@ impl LogSpec {
     ///
     /// Files that are joined with `+` keep it between their names.
     pub fn name(&self) -> String {
-        match self.joined() {
-            None => file_name(&self.path),
-            Some(parts) => {
-                let names: Vec<String> = parts.iter().map(|part| file_name(part)).collect();
-                names.join("+")
-            }
-        }
+        let parts = self.joined().unwrap_or_else(|| vec![self.path.clone()]);
+        let names: Vec<String> = parts.iter().map(|part| file_name(part)).collect();
+        names.join("+")
     }
 
     /// The files of the log, in order: one file; the recordings in a folder; or `A+B`, joined.
@@ -226,8 +209,8 @@ fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, LogError> {
     for entry in entries {
         let path = entry.map_err(|error| failed(folder, error))?.path();
         let name = file_name(&path).to_lowercase();
-        let plain = [".zst", ".zstd", ".gz"]
-            .iter()
+        let mut packed = [".zst", ".zstd", ".gz"].iter();
+        let plain = packed
             .find_map(|end| name.strip_suffix(end))
             .unwrap_or(&name);
         let format = FORMATS.iter().find(|format| plain.ends_with(format.ending));
@@ -282,21 +265,17 @@ impl FromStr for LogSpec {
             return Ok(Self::whole(text));
         };
         // A file whose own name holds an @ is still a file.
-        let looks_like_span = tail.contains("..")
-            || tail.ends_with('%')
-            || tail
-                .strip_suffix('s')
-                .is_some_and(|n| n.parse::<f64>().is_ok());
+        let seconds = tail.strip_suffix('s').map(str::parse::<f64>);
+        let looks_like_span =
+            tail.contains("..") || tail.ends_with('%') || matches!(seconds, Some(Ok(_)));
         if !looks_like_span || path.is_empty() || Path::new(text).exists() {
             return Ok(Self::whole(text));
         }
-        match Span::parse(tail.trim()) {
-            Ok(span) => Ok(Self::new(PathBuf::from(path), span)),
-            Err(reason) => Err(LogError::Span {
-                spec: escape_whole(text),
-                reason,
-            }),
-        }
+        let span = Span::parse(tail.trim()).map_err(|reason| LogError::Span {
+            spec: escape_whole(text),
+            reason,
+        });
+        Ok(Self::new(PathBuf::from(path), span?))
     }
 }
 
@@ -329,22 +308,13 @@ mod tests {
 
     #[test]
     fn percent_and_second_spans_are_read_and_printed_back() {
-        for text in [
-            "a.csv@0..70%",
-            "a@b.csv@15.2..23s",
-            "a.csv@70..100%",
-            "a.csv@3..s",
-        ] {
+        let specs = "a.csv@0..70% a@b.csv@15.2..23s a.csv@70..100% a.csv@3..s";
+        for text in specs.split(' ') {
             assert_eq!(parse(text).to_string(), text);
         }
         let spec = parse("a.csv@..70%");
-        assert_eq!(
-            spec.span,
-            Span::Percent {
-                from: 0.0,
-                to: 70.0
-            }
-        );
+        let (from, to) = (0.0, 70.0);
+        assert_eq!(spec.span, Span::Percent { from, to });
         assert_eq!(spec.path, PathBuf::from("a.csv"));
     }
 
@@ -368,10 +338,8 @@ mod tests {
     fn parts_of_a_split_recording_are_ordered_by_their_numbers() {
         let mut names = ["bag_10.mcap", "bag_9.mcap", "bag_010.mcap", "bag_1.mcap"];
         names.sort_by_cached_key(|name| natural(name));
-        assert_eq!(
-            names,
-            ["bag_1.mcap", "bag_9.mcap", "bag_010.mcap", "bag_10.mcap"]
-        );
+        let sorted = ["bag_1.mcap", "bag_9.mcap", "bag_010.mcap", "bag_10.mcap"];
+        assert_eq!(names, sorted);
     }
 
     #[test]

@@ -19,7 +19,7 @@ const MIN_MOTION_STEPS: u64 = 50;
 const MAX_SPEED_RATIO: f64 = 3.0;
 
 /// The motion right before the current row.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Stale {
     /// Time and positions of the last row that moved.
     t: Option<f64>,
@@ -33,10 +33,10 @@ pub(super) struct Stale {
     run: usize,
     /// All of them repeat everything.
     whole: bool,
-    repeated: u64,
-    dropped: u64,
-    /// Whether stale rows stay.
-    keep: bool,
+    /// Rows so far that repeat the positions of the row before, and those of them that are stale.
+    pub(super) repeated: u64,
+    pub(super) dropped: u64,
+    pub(super) keep: bool,
     /// Steps of a motion that goes on, and rows between them that repeat everything.
     moving: u64,
     held: u64,
@@ -45,24 +45,12 @@ pub(super) struct Stale {
 impl Stale {
     pub(super) fn new(joints: usize) -> Self {
         Self {
-            t: None,
             q: vec![0.0; joints],
             step: vec![0.0; joints],
-            duration: 0.0,
             resolution: vec![f64::INFINITY; joints],
-            run: 0,
             whole: true,
-            repeated: 0,
-            dropped: 0,
-            keep: false,
-            moving: 0,
-            held: 0,
+            ..Self::default()
         }
-    }
-
-    /// Says whether stale rows stay.
-    pub(super) fn keep(&mut self, keep: bool) {
-        self.keep = keep;
     }
 
     /// Rows for which each sample was held, where at least every other row of the motion is one that was held.
@@ -72,8 +60,7 @@ impl Stale {
         held.then(|| rows.round() as usize)
     }
 
-    /// Takes the next row into account; `same` says whether all but its positions repeats too. How
-    /// many rows before it turn out to be stale.
+    /// Takes the next row; `same`: all but its positions repeats too. How many rows before it turn out to be stale.
     #[inline]
     pub(super) fn judge(&mut self, t: f64, q: &[f64], same: impl FnOnce() -> bool) -> usize {
         if self.q == q && self.t.is_some() && !q.is_empty() {
@@ -136,16 +123,6 @@ impl Stale {
             true => self.run,
             false => 0,
         }
-    }
-
-    /// Rows so far that repeat the positions of the row before.
-    pub(super) fn repeated(&self) -> u64 {
-        self.repeated
-    }
-
-    /// Rows so far that are stale.
-    pub(super) fn dropped(&self) -> u64 {
-        self.dropped
     }
 }
 

@@ -1,75 +1,67 @@
-//! Bytes that arrive while they are read, as on standard input: counted and hashed on the way, so that
-//! the end of the last line is known and the input has a checksum like a file.
+//! Bytes that are counted and hashed as they are read: a file has a checksum without being read again, and of what
+//! arrives on standard input the end of the last line is known.
 
 use std::io::{self, Read};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
+use super::held_files::lock;
 use super::source::Checksum;
 
-/// What has arrived so far.
-#[derive(Default)]
-pub(super) struct Arrived {
+/// A reader; its copies go on where another one has come to.
+#[derive(Clone)]
+pub(super) struct Hashed(Arc<Mutex<Inner>>);
+
+struct Inner {
+    from: Box<dyn Read + Send>,
     checksum: Checksum,
     bytes: u64,
     last: Option<u8>,
     ended: bool,
 }
 
-/// A look at what has arrived, from beside the reader that takes it.
-#[derive(Clone, Default)]
-pub(super) struct Watch(Arc<Mutex<Arrived>>);
-
-impl std::fmt::Debug for Watch {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Watch")
-    }
-}
-
-impl Watch {
-    fn with<T>(&self, look: impl FnOnce(&mut Arrived) -> T) -> T {
-        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+impl Hashed {
+    pub(super) fn new(from: impl Read + Send + 'static) -> Self {
+        Self(Arc::new(Mutex::new(Inner {
+            from: Box::new(from),
+            checksum: Checksum::default(),
+            bytes: 0,
+            last: None,
+            ended: false,
+        })))
     }
 
     /// Whether the input has ended at byte `at` without the end of a line.
     pub(super) fn is_cut_at(&self, at: u64) -> bool {
-        self.with(|arrived| {
-            let open = !matches!(arrived.last, None | Some(b'\n' | b'\r'));
-            arrived.ended && open && at >= arrived.bytes
-        })
+        let inner = lock(&self.0);
+        let open = !matches!(inner.last, None | Some(b'\n' | b'\r'));
+        inner.ended && open && at >= inner.bytes
     }
 
-    /// SHA-256 of what has arrived, hexadecimal.
-    pub(super) fn sha256(&self) -> String {
-        self.with(|arrived| arrived.checksum.clone().hexadecimal())
+    /// SHA-256 of what was read so far, hexadecimal.
+    pub(super) fn sha256_so_far(&self) -> String {
+        lock(&self.0).checksum.clone().hexadecimal()
     }
-}
 
-/// Reads a stream and counts.
-pub(super) struct Stream {
-    inner: Box<dyn Read + Send>,
-    watch: Watch,
-}
-
-impl Stream {
-    pub(super) fn new(inner: Box<dyn Read + Send>, watch: Watch) -> Self {
-        Self { inner, watch }
+    /// SHA-256 of all bytes, hexadecimal; what was not read yet is read.
+    pub(super) fn sha256(&self) -> io::Result<String> {
+        io::copy(&mut self.clone(), &mut io::sink())?;
+        Ok(self.sha256_so_far())
     }
 }
 
-impl Read for Stream {
+impl Read for Hashed {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let inner = &mut *lock(&self.0);
         let count = loop {
-            match self.inner.read(buffer) {
+            match inner.from.read(buffer) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => break other?,
             }
         };
-        self.watch.with(|arrived| {
-            arrived.checksum.update(&buffer[..count]);
-            arrived.bytes += count as u64;
-            arrived.last = buffer[..count].last().copied().or(arrived.last);
-            arrived.ended |= count == 0 && !buffer.is_empty();
-        });
+        inner.checksum.update(&buffer[..count]);
+        inner.bytes += count as u64;
+        inner.last = buffer[..count].last().copied().or(inner.last);
+        inner.ended |= count == 0 && !buffer.is_empty();
         Ok(count)
     }
 }

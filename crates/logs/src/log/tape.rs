@@ -9,17 +9,17 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, OnceLock, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, Weak};
 use std::time::SystemTime;
 
 use self::chunk::{Chunk, NUMBERS, ROW_BYTES, ROWS};
 use super::columns::position_of;
-use super::content::RawBytes;
 use super::held_files::{HeldFiles, lock};
 use super::layout::Layout;
 use super::open::{Opened, open};
 use super::rows::{LogRows, Strictness};
 use super::source;
+use super::stream::Hashed;
 use super::time::Stamped;
 use super::{Block, LogError};
 
@@ -67,7 +67,7 @@ impl Kept {
         let state = states(files);
         let mut tapes = lock(&self.tapes);
         tapes.retain(|(_, tape)| tape.state == state);
-        if let Some((_, tape)) = tapes.iter().find(|(of, _)| of.reads_like(&layout)) {
+        if let Some((_, tape)) = tapes.iter().find(|(of, _)| *of == layout) {
             return Ok(Arc::clone(tape));
         }
         let tape = Arc::new(Tape::open(files, &layout, state)?);
@@ -95,8 +95,7 @@ pub(super) struct Tape {
     /// The layout that the log turned out to have.
     pub(super) found: Layout,
     names: Vec<String>,
-    recording: bool,
-    velocities: bool,
+    /// Numbers of positions, torques and velocities in a row.
     widths: [usize; 3],
     /// The column of times, where its numbers are taken as seconds.
     time_column: Option<usize>,
@@ -106,17 +105,9 @@ pub(super) struct Tape {
     sha256: OnceLock<String>,
 }
 
-impl fmt::Debug for Tape {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Tape")
-            .field("files", &self.files)
-            .finish_non_exhaustive()
-    }
-}
-
 struct Inner {
     source: Box<dyn LogRows>,
-    bytes: Option<RawBytes>,
+    bytes: Option<Hashed>,
     time: Option<(usize, f64)>,
     chunks: Vec<Place>,
     /// Bytes of the chunks that are in memory.
@@ -128,7 +119,6 @@ struct Inner {
     error: Option<LogError>,
 }
 
-/// Where a chunk is.
 enum Place {
     Memory(Arc<Chunk>),
     /// At this byte of the temporary file, with so many rows.
@@ -143,38 +133,20 @@ impl Tape {
             bytes,
             ..
         } = open(files, layout, Strictness::Refuse)?;
-        let velocities = rows.has_velocities();
         let plain = found.time.factor == 1.0 && found.section.rate_hz.is_none();
-        let dq = if velocities {
-            found.velocities.len()
-        } else {
-            0
-        };
+        let time = || position_of(rows.names(), &found.time);
+        let dq = usize::from(rows.has_velocities()) * found.velocities.len();
         Ok(Self {
             files: files.to_vec(),
             layout: layout.clone(),
             state,
             names: rows.names().to_vec(),
-            recording: rows.is_recording(),
-            velocities,
             widths: [found.positions.len(), found.torques.len(), dq],
-            time_column: plain
-                .then(|| position_of(rows.names(), &found.time))
-                .flatten(),
+            time_column: plain.then(time).flatten(),
             found,
             first: OnceLock::new(),
             sha256: OnceLock::new(),
-            inner: Mutex::new(Inner {
-                source: rows,
-                bytes,
-                time: None,
-                chunks: Vec::new(),
-                size: 0,
-                spilled: None,
-                ended: false,
-                failed: false,
-                error: None,
-            }),
+            inner: Mutex::new(Inner::new(rows, bytes)),
         })
     }
 
@@ -193,28 +165,28 @@ impl Tape {
                 let read = inner.restored(at, rows, width);
                 Ok(Some(Arc::new(read.map_err(|error| self.no_room(error))?)))
             }
-            None if inner.failed => Err(match inner.error.take() {
-                Some(error) => error,
+            None if inner.failed => match inner.error.take() {
+                Some(error) => Err(error),
                 None => {
                     let rows = inner.rows();
                     drop(inner);
-                    return self.fresh_at(rows + 1).map(|_| None);
+                    self.fresh_at(rows + 1).map(|_| None)
                 }
-            }),
+            },
             None => Ok(None),
         }
     }
 
     /// Goes to the end of the log, or to what ends it.
-    fn to_the_end(&self) {
+    fn to_the_end(&self) -> MutexGuard<'_, Inner> {
         loop {
             let mut inner = lock(&self.inner);
             if inner.ended {
-                return;
+                return inner;
             }
             let chunk = inner.produce(self.widths);
             if inner.keep(chunk).is_err() {
-                return;
+                return inner;
             }
         }
     }
@@ -267,10 +239,16 @@ impl Tape {
         }
         if !inner.chunks.is_empty() || inner.ended {
             match open(&self.files, &self.layout, Strictness::Refuse) {
-                Ok(opened) => inner.begin(opened.rows, opened.bytes),
+                Ok(opened) => {
+                    *inner = Inner {
+                        time: inner.time,
+                        spilled: inner.spilled.take(),
+                        ..Inner::new(opened.rows, opened.bytes)
+                    };
+                }
                 Err(error) => {
                     inner.chunks.clear();
-                    (inner.ended, inner.failed, inner.error) = (true, true, Some(error));
+                    inner.end(error);
                     return;
                 }
             }
@@ -280,8 +258,7 @@ impl Tape {
 
     fn checksum(&self) -> Option<&str> {
         if self.sha256.get().is_none() {
-            self.to_the_end();
-            let bytes = lock(&self.inner).bytes.clone();
+            let bytes = self.to_the_end().bytes.clone();
             let sum = match bytes {
                 Some(bytes) => bytes.sha256().ok(),
                 None => source::sha256_of(&self.files).ok(),
@@ -293,11 +270,22 @@ impl Tape {
 }
 
 impl Inner {
-    fn begin(&mut self, source: Box<dyn LogRows>, bytes: Option<RawBytes>) {
-        (self.source, self.bytes) = (source, bytes);
-        self.chunks.clear();
-        self.size = 0;
-        (self.ended, self.failed, self.error) = (false, false, None);
+    fn new(source: Box<dyn LogRows>, bytes: Option<Hashed>) -> Self {
+        Self {
+            source,
+            bytes,
+            time: None,
+            chunks: Vec::new(),
+            size: 0,
+            spilled: None,
+            ended: false,
+            failed: false,
+            error: None,
+        }
+    }
+
+    fn end(&mut self, error: LogError) {
+        (self.ended, self.failed, self.error) = (true, true, Some(error));
     }
 
     fn rows(&self) -> usize {
@@ -308,7 +296,6 @@ impl Inner {
         self.chunks.iter().map(rows).sum()
     }
 
-    /// The next rows of the source.
     fn produce(&mut self, widths: [usize; 3]) -> Chunk {
         let width: usize = widths.iter().sum();
         let mut chunk = Chunk::default();
@@ -321,23 +308,20 @@ impl Inner {
                     break;
                 }
                 Err(error) => {
-                    self.ended = true;
-                    self.failed = true;
-                    self.error = Some(error);
+                    self.end(error);
                     break;
                 }
             }
             row.clear();
-            let bad = self.source.append(&mut row).is_err();
+            let read = self.source.append(&mut row).is_ok();
             let parts = [&row.q, &row.tau, &row.dq];
-            let whole = parts.iter().zip(widths).all(|(part, n)| part.len() == n);
-            if bad || !whole {
-                chunk.values.resize(chunk.values.len() + width, f64::NAN);
-            } else {
-                parts.iter().for_each(|part| chunk.values.extend(*part));
+            let whole = read && parts.iter().zip(widths).all(|(part, n)| part.len() == n);
+            match whole {
+                true => parts.iter().for_each(|part| chunk.values.extend(*part)),
+                false => chunk.values.resize(chunk.values.len() + width, f64::NAN),
             }
             chunk.numbers.push(self.source.number());
-            chunk.flags.push((self.source.repeats(), bad || !whole));
+            chunk.flags.push((self.source.repeats(), !whole));
         }
         chunk
     }
@@ -374,7 +358,6 @@ impl Inner {
 }
 
 /// One way along a tape.
-#[derive(Debug)]
 pub(super) struct TapeRows {
     tape: Arc<Tape>,
     chunk: Arc<Chunk>,
@@ -419,11 +402,6 @@ impl LogRows for TapeRows {
         Ok(Some(self.chunk.stamps[self.begun - 1]))
     }
 
-    /// A tape keeps channels alone.
-    fn logged(&self, _: usize) -> Option<f64> {
-        None
-    }
-
     fn append(&self, block: &mut Block) -> Result<(), LogError> {
         let row = self.begun - 1;
         if self.chunk.flags[row].1 {
@@ -438,7 +416,7 @@ impl LogRows for TapeRows {
     }
 
     fn has_velocities(&self) -> bool {
-        self.tape.velocities
+        self.tape.widths[2] > 0
     }
 
     fn set_time(&mut self, column: usize, seconds: f64) {
@@ -446,7 +424,7 @@ impl LogRows for TapeRows {
     }
 
     fn is_recording(&self) -> bool {
-        self.tape.recording
+        lock(&self.tape.inner).source.is_recording()
     }
 
     fn repeats(&self) -> bool {
@@ -466,32 +444,12 @@ impl LogRows for TapeRows {
         lock(&self.tape.inner).source.clock_remedy(t)
     }
 
-    fn malformed(&self) -> u64 {
-        lock(&self.tape.inner).source.malformed()
-    }
-
     fn warnings(&self) -> Vec<String> {
-        self.tape.to_the_end();
-        lock(&self.tape.inner).source.warnings()
-    }
-
-    fn contradictions(&self) -> Vec<(u64, String)> {
-        self.tape.to_the_end();
-        lock(&self.tape.inner).source.contradictions()
-    }
-
-    fn uneven(&self) -> Vec<(u64, String)> {
-        self.tape.to_the_end();
-        lock(&self.tape.inner).source.uneven()
+        self.tape.to_the_end().source.warnings()
     }
 
     fn begins(&self) -> Option<f64> {
         lock(&self.tape.inner).source.begins()
-    }
-
-    fn breaks(&self) -> Vec<String> {
-        self.tape.to_the_end();
-        lock(&self.tape.inner).source.breaks()
     }
 
     fn sha256(&self) -> Option<&str> {

@@ -52,7 +52,6 @@ impl Temperatures {
         })
     }
 
-    /// Those of rows in memory, joint by joint.
     pub(super) fn of_columns<'a>(
         t: &[f64],
         columns: impl Iterator<Item = (usize, &'a [f64])>,
@@ -85,8 +84,7 @@ impl Temperatures {
 }
 
 impl Course {
-    /// Takes a row, unless it is not later than the one before. Of rows of one value the first and the last are kept:
-    /// slow sensors give the same one many times.
+    /// Takes a row that is later than the one before; of rows of one value the first and the last are kept.
     fn push(&mut self, t: f64, value: f64) {
         if self.t.last().is_some_and(|last| t <= *last) {
             return;

@@ -9,33 +9,18 @@ const NANOSECOND: i128 = 1_000_000;
 /// Times beyond this are counted from the log's first one [s]: below, f64 resolves 0.12 ns.
 pub(super) const FAR_S: f64 = (1 << 20) as f64;
 
-/// An instant on the clock of a log, exact to the femtosecond.
+/// An instant on the clock of a log, in whole femtoseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Instant {
-    fs: i128,
-}
+pub struct Instant(pub(super) i128);
 
 impl Instant {
     /// An instant from whole nanoseconds.
     pub fn from_ns(ns: impl Into<i128>) -> Self {
-        Self {
-            fs: ns.into() * NANOSECOND,
-        }
+        Self(ns.into() * NANOSECOND)
     }
 
-    pub(super) fn of_femtoseconds(fs: i128) -> Self {
-        Self { fs }
-    }
-
-    pub(super) fn femtoseconds(self) -> i128 {
-        self.fs
-    }
-
-    /// An instant from whole seconds and nanoseconds.
     pub(crate) fn from_s_ns(s: i64, ns: i64) -> Self {
-        Self {
-            fs: i128::from(s) * SECOND + i128::from(ns) * NANOSECOND,
-        }
+        Self(i128::from(s) * SECOND + i128::from(ns) * NANOSECOND)
     }
 
     /// Seconds since the zero of the clock, as near as f64 has them.
@@ -45,13 +30,13 @@ impl Instant {
 
     /// Whole nanoseconds since the zero of the clock, rounded down.
     pub fn nanoseconds(self) -> i128 {
-        self.fs.div_euclid(NANOSECOND)
+        self.0.div_euclid(NANOSECOND)
     }
 
     /// Seconds from `origin` to this instant; the nearest f64 where both are whole nanoseconds.
     pub fn since(self, origin: Self) -> f64 {
-        let Ok(fs) = i64::try_from(self.fs - origin.fs) else {
-            let ns = (self.fs - origin.fs) / NANOSECOND;
+        let Ok(fs) = i64::try_from(self.0 - origin.0) else {
+            let ns = (self.0 - origin.0) / NANOSECOND;
             return ns as f64 / 1e9;
         };
         if fs % NANOSECOND as i64 == 0 {
@@ -63,29 +48,23 @@ impl Instant {
 
     /// Whether seconds from the zero of the clock would lose resolution.
     pub(super) fn is_far(self) -> bool {
-        self.fs.unsigned_abs() >= (FAR_S as u128) * SECOND as u128
+        self.0.unsigned_abs() >= (FAR_S as u128) * SECOND as u128
     }
 
     /// The sum with an instant that counts from it.
     pub(super) fn and(self, rest: Self) -> Self {
-        Self {
-            fs: self.fs.saturating_add(rest.fs),
-        }
+        Self(self.0.saturating_add(rest.0))
     }
 
     /// Later by `s` seconds, rounded to the femtosecond.
     pub(super) fn plus(self, s: f64) -> Self {
-        Self {
-            fs: self.fs.saturating_add((s * 1e15).round() as i128),
-        }
+        Self(self.0.saturating_add((s * 1e15).round() as i128))
     }
 
     /// Later by `s` seconds, rounded to the nanosecond.
     pub fn later(self, s: f64) -> Self {
-        let exact = self.plus(s).fs;
-        Self {
-            fs: (exact + NANOSECOND / 2).div_euclid(NANOSECOND) * NANOSECOND,
-        }
+        let exact = self.plus(s).0;
+        Self((exact + NANOSECOND / 2).div_euclid(NANOSECOND) * NANOSECOND)
     }
 
     /// Reads a decimal number in units of 10^`power` s, e.g. -9 for nanoseconds.
@@ -129,13 +108,10 @@ impl Instant {
             (false, None) if mantissa == 0 => 0,
             (false, scale) => mantissa.checked_mul(scale?)?,
         };
-        Some(Self {
-            fs: if negative { -fs } else { fs },
-        })
+        Some(Self(if negative { -fs } else { fs }))
     }
 
-    /// Reads an ISO 8601 date and time, `2024-05-01T12:34:56.789+02:00`, or `1.5.2024 12:34:56`; without a zone it is
-    /// UTC. A time of day without a date, `12:34:56.789`, counts from midnight.
+    /// Reads `2024-05-01T12:34:56.789+02:00` (ISO 8601) or `1.5.2024 12:34:56`, UTC without a zone; or a time of day.
     pub(super) fn parse_iso(field: &[u8]) -> Option<Self> {
         let text = std::str::from_utf8(unquoted(field)).ok()?;
         let (days, clock) = match text.split_once(['T', 't', ' ']) {
@@ -164,9 +140,7 @@ impl Instant {
             Self::parse_decimal(format!("0.{fraction}").as_bytes(), 0)?
         };
         let whole = days * 86_400 + hours * 3600 + minutes * 60 + seconds - offset_s(zone.trim())?;
-        Some(Self {
-            fs: i128::from(whole) * SECOND + fraction.fs,
-        })
+        Some(Self(i128::from(whole) * SECOND + fraction.0))
     }
 }
 
@@ -194,11 +168,16 @@ pub(super) enum Stamped {
     Exact(Instant),
 }
 
+impl Default for Stamped {
+    fn default() -> Self {
+        Self::Seconds(0.0)
+    }
+}
+
 impl Stamped {
     /// Of a row without a time.
     pub(super) const NONE: Self = Self::Seconds(f64::NAN);
 
-    /// Whether it is the zero of the clock.
     pub(super) fn is_zero(self) -> bool {
         self.instant() == Instant::default()
     }
@@ -229,8 +208,8 @@ impl Stamped {
 /// Seconds, with as many decimals as the instant has.
 impl fmt::Display for Instant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sign = if self.fs < 0 { "-" } else { "" };
-        let fs = self.fs.unsigned_abs();
+        let sign = if self.0 < 0 { "-" } else { "" };
+        let fs = self.0.unsigned_abs();
         let (whole, rest) = (fs / SECOND as u128, fs % SECOND as u128);
         let fraction = format!("{rest:015}");
         let fraction = fraction.trim_end_matches('0');
@@ -341,41 +320,23 @@ mod tests {
         assert_eq!(iso("1970-01-01T00:00"), Some(Instant::default()));
         let of_day = iso("12:34:56.789").unwrap();
         assert_eq!(of_day.seconds(), 45_296.789);
-        assert_eq!(iso("1969-12-31T23:59:59Z"), Some(Instant::from_s_ns(-1, 0)));
-        assert_eq!(
-            iso("2000-03-01T00:00:00Z"),
-            Some(Instant::from_s_ns(951_868_800, 0))
-        );
+        for (text, s) in [
+            ("1969-12-31T23:59:59Z", -1),
+            ("2000-03-01T00:00:00Z", 951_868_800),
+        ] {
+            assert_eq!(iso(text), Some(Instant::from_s_ns(s, 0)));
+        }
     }
 
     #[test]
     fn what_is_no_stamp_is_refused() {
-        for text in [
-            "12:34",
-            "25:00:00",
-            "1.13.2024 00:00:00",
-            "2024-13-01T00:00",
-            "2024-01-01",
-            "2024-01-01T25:00",
-            "24-01-01T00:00",
-            "2024-01-01T00:00:00+99:00",
-            "2024-01-01T00:00:00x",
-            "2024-01-01T00:00:00.x",
-            "",
-            "T",
-        ] {
+        let stamps = "12:34|25:00:00|1.13.2024 00:00:00|2024-13-01T00:00|2024-01-01|2024-01-01T25:00|24-01-01T00:00|\
+            2024-01-01T00:00:00+99:00|2024-01-01T00:00:00x|2024-01-01T00:00:00.x||T";
+        for text in stamps.split('|') {
             assert_eq!(iso(text), None, "{text}");
         }
-        for text in [
-            "",
-            "-",
-            ".",
-            "1e",
-            "1.2.3",
-            "0x1",
-            "1e99999",
-            &"9".repeat(60),
-        ] {
+        let long = "9".repeat(60);
+        for text in ["", "-", ".", "1e", "1.2.3", "0x1", "1e99999", &long] {
             assert_eq!(Instant::parse_decimal(text.as_bytes(), 0), None, "{text}");
         }
         assert_eq!(decimal("1e-300", 0), Instant::default());

@@ -15,10 +15,7 @@ const EPOCH_S: [f64; 2] = [1e9, 4e9];
 const MIN_ROWS: usize = 64;
 
 impl TimeUnit {
-    /// The unit of these times, which may be in any order; seconds where nothing speaks for another.
-    ///
-    /// Numbers of the size of seconds, milliseconds, .. since 1970 are of that unit where their step
-    /// makes a rate that a log may have; else the step decides, for no robot is logged once a second.
+    /// The unit of these times by their size since 1970, where their step fits it, else by their step alone.
     pub(super) fn of_numbers(times: &[f64]) -> Self {
         let mut steps: Vec<f64> = times
             .windows(2)

@@ -41,12 +41,7 @@ pub(super) fn rest_of(names: &[String], seconds: usize) -> Option<(usize, i32)> 
     let name = names.get(seconds)?;
     let stem = SECONDS.iter().find_map(|ending| without(name, ending));
     // `ZeitInNanoSec` ends with seconds too
-    let is_rest = |name: &str| {
-        PARTS
-            .iter()
-            .find_map(|(end, _)| without(name, end))
-            .is_some()
-    };
+    let is_rest = |name: &str| PARTS.iter().any(|(end, _)| without(name, end).is_some());
     let stem = stem.filter(|_| !is_rest(name))?;
     PARTS.iter().find_map(|(ending, power)| {
         let of = |name: &String| without(name, ending) == Some(stem);

@@ -9,19 +9,10 @@ use cft_ident_logs::log::{Block, DeclaredChannels, Layout, LogSpec, Reader, Time
 use cft_ident_logs::output::LogWriter;
 use proptest::prelude::*;
 
+use crate::log_support::{finite, says};
+
 fn read(path: &Path, layout: &Layout) -> (Block, Reader) {
-    let mut reader = Reader::open(&LogSpec::whole(path), layout).unwrap();
-    let (mut block, mut all) = (Block::default(), Block::default());
-    while reader.read(&mut block).unwrap() {
-        if all.is_empty() {
-            all.line0 = block.line0;
-        }
-        all.t.extend(&block.t);
-        all.q.extend(&block.q);
-        all.tau.extend(&block.tau);
-        all.dq.extend(&block.dq);
-    }
-    (all, reader)
+    crate::log_support::read(&path.to_string_lossy(), layout)
 }
 
 fn read_text(text: &str, layout: &Layout) -> Block {
@@ -211,13 +202,8 @@ fn a_log_without_a_header_is_read_by_the_numbers_of_its_columns() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, "1,2,3\n2,3,4\n").unwrap();
-    let message = Reader::open(&LogSpec::whole(&path), &layout)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        message.contains("`#4`") && message.contains("velocity"),
-        "{message}"
-    );
+    let refused = Reader::open(&LogSpec::whole(&path), &layout).unwrap_err();
+    says(&refused.to_string(), &["`#4`", "velocity"]);
 }
 
 #[test]
@@ -304,20 +290,6 @@ fn coupled_gears_take_the_motors_side_to_the_joints() {
         block.tau[..4],
         [32.0, 64.0, 45.0 * 3.0 + 32.0 * 4.0, -48.0 * 4.0]
     );
-}
-
-/// Numbers of every size that a log may hold.
-fn finite() -> impl Strategy<Value = f64> {
-    any::<u64>()
-        .prop_map(f64::from_bits)
-        .prop_filter("finite", |value| value.is_finite())
-        .prop_map(|value| {
-            if value.abs() > 1e30 {
-                1.0 / value
-            } else {
-                value
-            }
-        })
 }
 
 /// A log: joints, and rows of time, q, tau and one foreign column.

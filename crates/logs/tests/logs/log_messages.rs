@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use cft_ident_core::robot::cft::actuation::ENCODER_SCALE;
 use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{Block, DeclaredChannels, Layout, LogSpec, Reader};
-use log_support::read;
 use log_support::recording::{JointState, Recording};
+use log_support::{finite, fixture, read, says};
 use mcap::{Compression, WriteOptions};
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -153,15 +153,13 @@ fn the_delay_between_two_topics_is_told_and_taken_off_only_where_the_robot_file_
         "{:?}",
         reader.warnings()
     );
-    let said = reader.warnings().join("\n");
-    for words in [
+    let words = [
         "/encoders",
         "standard deviation",
         "not removed",
         "`torque_delay_s`",
-    ] {
-        assert!(said.contains(words), "{words}: {said}");
-    }
+    ];
+    says(&reader.warnings().join("\n"), &words);
     let (aligned, reader) = read(
         &shown(&path),
         &one_joint(
@@ -169,11 +167,9 @@ fn the_delay_between_two_topics_is_told_and_taken_off_only_where_the_robot_file_
         ),
     );
     assert!(told_delay(&reader).abs() <= 0.2, "{:?}", reader.warnings());
-    assert!(
-        reader
-            .warnings()
-            .join("\n")
-            .contains("13.1 ms are taken off already")
+    says(
+        &reader.warnings().join("\n"),
+        &["13.1 ms are taken off already"],
     );
     // The same torques, 13.1 ms earlier. Without the shift, no torque is known at the first position.
     assert_eq!(late.q[..3], aligned.q[1..4]);
@@ -192,13 +188,8 @@ fn the_effort_of_a_foreign_recording_is_not_guessed_to_be_a_torque() {
         "[log]\ntorque_topic = \"/efforts\"\n",
     ] {
         let head = "[robot]\nmodel = \"single-joint\"\njoint = \"q1\"\nkind = \"revolute\"\n";
-        let message = RobotFile::parse("r.toml", &format!("{head}{log}"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            message.contains("torque_is") && message.contains("effort"),
-            "{message}"
-        );
+        let refused = RobotFile::parse("r.toml", &format!("{head}{log}")).unwrap_err();
+        says(&refused.to_string(), &["torque_is", "effort"]);
     }
 }
 
@@ -218,16 +209,14 @@ fn a_clock_that_runs_backwards_names_the_message_and_the_other_clock() {
         recording.joint_state("/joint_states", EPOCH_NS + 10_000_000 * k as u64, &state);
     }
     recording.finish();
-    let message = refused(&path, &one_joint(""));
-    for words in [
+    let words = [
         "message 4",
         "/joint_states",
         "from 0.02 s to 0.015 s",
         "`stamp = \"log\"`",
         "FILE@0..0.02s",
-    ] {
-        assert!(message.contains(words), "{words}: {message}");
-    }
+    ];
+    says(&refused(&path, &one_joint("")), &words);
     let (block, _) = read(&shown(&path), &one_joint("[log]\nstamp = \"log\"\n"));
     assert_eq!(block.t, [0.0, 0.01, 0.02, 0.03, 0.04]);
     let (block, _) = read(&format!("{}@0..0.02s", path.display()), &one_joint(""));
@@ -256,33 +245,27 @@ fn a_message_whose_number_is_none_is_left_out_and_told_and_a_recording_of_none_e
     let path = recorded("log.mcap", &|k| k == 3);
     let (block, reader) = read(&shown(&path), &one_joint(""));
     assert_eq!(block.t, [0.0, 1e-3, 2e-3, 4e-3]);
-    let described = reader.warnings().concat();
-    for words in [
+    let words = [
         "1 of 5 messages",
         "message 4",
         "no number as `position[name=q1]`",
-    ] {
-        assert!(described.contains(words), "{words}: {described}");
-    }
+    ];
+    says(&reader.warnings().concat(), &words);
     let message = refused(&recorded("none.mcap", &|_| true), &one_joint(""));
-    for words in [
-        "none of 5 messages",
-        "message 1",
-        "position[name=q1]",
-        "another one",
-    ] {
-        assert!(message.contains(words), "{words}: {message}");
-    }
+    says(
+        &message,
+        &[
+            "none of 5 messages",
+            "message 1",
+            "position[name=q1]",
+            "another one",
+        ],
+    );
 }
 
 /// The text's rows in a rosbag2 database whose journal is as SQLite makes it by `pragma`.
 fn database(path: &Path, pragma: &str) -> rusqlite::Connection {
-    let fixture = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../..",
-        "/fixtures/logs/arm.db3"
-    );
-    std::fs::copy(fixture, path).unwrap();
+    std::fs::copy(fixture("arm.db3"), path).unwrap();
     let database = rusqlite::Connection::open(path).unwrap();
     let mode = database.query_row(pragma, [], |row| row.get::<_, String>(0));
     assert!(pragma.ends_with(&mode.unwrap()), "{pragma}");
@@ -345,26 +328,13 @@ fn a_database_whose_recorder_was_killed_gives_what_was_committed_and_says_so() {
         assert_eq!(block.len(), 30, "{ending}");
         let warnings = reader.warnings();
         assert_eq!(warnings.len(), 1, "{warnings:?}");
-        for words in ["log.db3", "did not close it", "30 messages"] {
-            assert!(warnings[0].contains(words), "{words}: {warnings:?}");
-        }
+        says(
+            &warnings[0],
+            &["log.db3", "did not close it", "30 messages"],
+        );
         drop(reader);
         assert_eq!(files(&killed), before);
     }
-}
-
-/// Numbers of every size that a log may hold.
-fn finite() -> impl Strategy<Value = f64> {
-    any::<u64>()
-        .prop_map(f64::from_bits)
-        .prop_filter("finite", |value| value.is_finite())
-        .prop_map(|value| {
-            if value.abs() > 1e30 {
-                1.0 / value
-            } else {
-                value
-            }
-        })
 }
 
 /// How a recording is written.

@@ -7,6 +7,8 @@
 //! speed. The delay of the least residual is the one by which the torques lag; its standard
 //! deviation is that of the jackknife over the stretches.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Rows that are used at most.
@@ -19,17 +21,15 @@ const COLUMNS: usize = 7;
 const PASSIVE_COLUMNS: usize = 4;
 /// Share of the torque that the motion must explain.
 const MIN_EXPLAINED_SHARE: f64 = 0.5;
-/// Least share of each direction in the squared speed: one way at one speed, a torque that depends
-/// on position cannot be distinguished from any delay.
+/// Least share of each direction in the squared speed: one way at one speed, cogging looks like any delay.
 const MIN_SHARE_EACH_WAY: f64 = 0.1;
 /// Share of the gain over no delay that another minimum may reach.
 const MAX_GAIN_OF_SECOND_BEST: f64 = 0.5;
 /// Stretches of the jackknife: the most, and the least that give a deviation.
 const JACKKNIFE_STRETCHES: std::ops::RangeInclusive<usize> = 3..=8;
 
-/// Rows from which a delay is estimated.
 #[derive(Debug, Default)]
-pub struct DelayEstimator {
+pub(crate) struct DelayEstimator {
     joints: usize,
     t: Vec<f64>,
     q: Vec<f64>,
@@ -38,13 +38,11 @@ pub struct DelayEstimator {
     begins: Vec<usize>,
 }
 
-/// An estimated delay of the torques behind the positions.
+/// An estimated delay of the torques behind the positions, and its standard deviation [s].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DelayEstimate {
-    /// Delay [s], positive where torques lag.
-    pub delay_s: f64,
-    /// Its standard deviation [s].
-    pub std_s: f64,
+pub(crate) struct DelayEstimate {
+    pub(crate) delay_s: f64,
+    pub(crate) std_s: f64,
 }
 
 /// Sums of one joint over one stretch.
@@ -63,7 +61,7 @@ struct Sums {
 
 impl DelayEstimator {
     /// Adds a row; those beyond the first some thousands are not needed.
-    pub fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
+    pub(crate) fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
         if self.t.len() == MAX_ROWS || q.len() != tau.len() || q.is_empty() {
             return;
         }
@@ -78,7 +76,7 @@ impl DelayEstimator {
     }
 
     /// The next row does not follow the last one.
-    pub fn begin_stretch(&mut self) {
+    pub(crate) fn begin_stretch(&mut self) {
         self.begins.push(self.t.len());
     }
 
@@ -100,9 +98,8 @@ impl DelayEstimator {
         }
     }
 
-    /// Estimates the delay; `None` where the motion explains too little of the torques, or some
-    /// stretches alone decide it.
-    pub fn estimate(&self) -> Option<DelayEstimate> {
+    /// The delay; `None` where the motion explains too little of the torques, or some stretches alone decide it.
+    pub(crate) fn estimate(&self) -> Option<DelayEstimate> {
         let mut steps: Vec<f64> = self.t.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
         let dt = *steps.get(steps.len() / 2)?;
@@ -115,10 +112,8 @@ impl DelayEstimator {
             .filter_map(|joint| self.sums(joint, &stretches, dt, half))
             .collect();
         let delay = best_delay(&sums, None)? * dt;
-        let without: Option<Vec<f64>> = (0..stretches.len())
-            .map(|left_out| Some(best_delay(&sums, Some(left_out))? * dt))
-            .collect();
-        let without = without?;
+        let without = |left_out| Some(best_delay(&sums, Some(left_out))? * dt);
+        let without: Vec<f64> = (0..stretches.len()).map(without).collect::<Option<_>>()?;
         let count = without.len() as f64;
         let mean = without.iter().sum::<f64>() / count;
         let scatter: f64 = without.iter().map(|delay| (delay - mean).powi(2)).sum();
@@ -129,7 +124,7 @@ impl DelayEstimator {
     }
 
     /// Stretches of at least four edges, as many as the jackknife wants.
-    fn stretches(&self, edge: usize) -> Vec<std::ops::Range<usize>> {
+    fn stretches(&self, edge: usize) -> Vec<Range<usize>> {
         let mut ends = self.begins.clone();
         ends.push(self.t.len());
         let mut whole = Vec::new();
@@ -144,7 +139,7 @@ impl DelayEstimator {
             let stride = whole.len().div_ceil(*JACKKNIFE_STRETCHES.end());
             return whole.into_iter().step_by(stride).collect();
         }
-        let pieces = |range: std::ops::Range<usize>| {
+        let pieces = |range: Range<usize>| {
             let most = JACKKNIFE_STRETCHES.end().div_ceil(whole.len());
             let count = (range.len() / (4 * edge)).clamp(1, most);
             let step = range.len() / count;
@@ -157,40 +152,34 @@ impl DelayEstimator {
     fn sums(
         &self,
         joint: usize,
-        stretches: &[std::ops::Range<usize>],
+        stretches: &[Range<usize>],
         dt: f64,
         half: usize,
     ) -> Option<Vec<Sums>> {
-        let of = |values: &[f64], rows: &std::ops::Range<usize>| -> Vec<f64> {
+        let of = |values: &[f64], rows: &Range<usize>| -> Vec<f64> {
             let values = &values[rows.start * self.joints..rows.end * self.joints];
             let values = values.iter().skip(joint).step_by(self.joints);
             values.copied().collect()
         };
-        let motions: Vec<[Vec<f64>; 4]> = stretches
-            .iter()
-            .map(|rows| {
-                // lightly smoothed for the sign of the speed; torque and motion alike for the fit
-                let q = smoothed(&of(&self.q, rows), half.min(2));
-                let v = derivative(&q, dt);
-                let a = derivative(&v, dt);
-                [q, v, a, of(&self.tau, rows)]
-            })
-            .collect();
+        let motion = |rows: &Range<usize>| {
+            // lightly smoothed for the sign of the speed; torque and motion alike for the fit
+            let q = smoothed(&of(&self.q, rows), half.min(2));
+            let v = derivative(&q, dt);
+            let a = derivative(&v, dt);
+            [q, v, a, of(&self.tau, rows)]
+        };
+        let motions: Vec<[Vec<f64>; 4]> = stretches.iter().map(motion).collect();
         let rows: usize = motions.iter().map(|m| m[0].len()).sum();
         let rms = |which: usize| {
             let squares = motions.iter().flat_map(|m| &m[which]).map(|x| x * x);
             (squares.sum::<f64>() / rows as f64).sqrt()
         };
         let (v_rms, a_rms) = (rms(1), rms(2));
-        let back = motions
-            .iter()
-            .flat_map(|m| &m[1])
-            .map(|v| v.min(0.0).powi(2));
-        let back = back.sum::<f64>() / (v_rms * v_rms * rows as f64);
-        if v_rms == 0.0
-            || a_rms == 0.0
-            || !(MIN_SHARE_EACH_WAY..=1.0 - MIN_SHARE_EACH_WAY).contains(&back)
-        {
+        let speeds = motions.iter().flat_map(|m| &m[1]);
+        let back: f64 = speeds.map(|v| v.min(0.0).powi(2)).sum();
+        let back = back / (v_rms * v_rms * rows as f64);
+        let both_ways = (MIN_SHARE_EACH_WAY..=1.0 - MIN_SHARE_EACH_WAY).contains(&back);
+        if v_rms == 0.0 || a_rms == 0.0 || !both_ways {
             return None;
         }
         let sums = motions.iter().map(|[q, v, a, tau]| {
@@ -272,20 +261,17 @@ impl Sums {
             return None;
         }
         // the columns of each subset of the passive ones, with those of any sign
-        let subsets: Vec<(Vec<usize>, Cholesky<f64, Dyn>)> = (0..1usize << PASSIVE_COLUMNS)
-            .filter_map(|subset| {
-                let taken =
-                    |column: &usize| *column >= PASSIVE_COLUMNS || subset >> column & 1 == 1;
-                let columns: Vec<usize> = (0..COLUMNS).filter(taken).collect();
-                let factor = self.of_columns(&columns).cholesky()?;
-                Some((columns, factor))
-            })
-            .collect();
+        let factored = |subset: usize| {
+            let taken = |column: &usize| *column >= PASSIVE_COLUMNS || subset >> column & 1 == 1;
+            let columns: Vec<usize> = (0..COLUMNS).filter(taken).collect();
+            let factor = self.of_columns(&columns).cholesky()?;
+            Some((columns, factor))
+        };
+        let subsets: Vec<_> = (0..1 << PASSIVE_COLUMNS).filter_map(factored).collect();
         let (mut ahead, mut turned) = (Vec::new(), Vec::new());
         for (right, power) in self.right.iter().zip(&self.power) {
-            let explained = subsets
-                .iter()
-                .map(|(columns, factor)| explained(columns, factor, right));
+            let all = subsets.iter();
+            let explained = all.map(|(columns, factor)| explained(columns, factor, right));
             let most = explained.fold([0.0f64; 2], |[a, b], [x, y]| [a.max(x), b.max(y)]);
             let [own, other] = most.map(|most| ((power - most) / variation).max(0.0));
             ahead.push(own);
@@ -293,11 +279,10 @@ impl Sums {
         }
         // a torque whose sign is turned has its delay too
         let least = |left: &[f64]| left.iter().copied().fold(f64::INFINITY, f64::min);
-        Some(if least(&turned) < least(&ahead) {
-            turned
-        } else {
-            ahead
-        })
+        match least(&turned) < least(&ahead) {
+            true => Some(turned),
+            false => Some(ahead),
+        }
     }
 }
 
@@ -343,8 +328,7 @@ fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
     (curvature > 0.0).then(|| least as f64 - TRIALS as f64 + 0.5 * (before - after) / curvature)
 }
 
-/// Power that these columns explain where passive ones take power, and where all of them drive: then the sign of the
-/// torque is turned; 0 where neither is so.
+/// Power that these columns explain where passive ones take power, and where all of them drive; else 0.
 fn explained(columns: &[usize], factor: &Cholesky<f64, Dyn>, right: &[f64; COLUMNS]) -> [f64; 2] {
     let right = DVector::from_iterator(columns.len(), columns.iter().map(|i| right[*i]));
     let x = factor.solve(&right);
@@ -360,12 +344,11 @@ fn explained(columns: &[usize], factor: &Cholesky<f64, Dyn>, right: &[f64; COLUM
 
 /// Mean over `half` neighbours on each side.
 fn smoothed(x: &[f64], half: usize) -> Vec<f64> {
-    (0..x.len())
-        .map(|i| {
-            let near = &x[i.saturating_sub(half)..(i + half + 1).min(x.len())];
-            near.iter().sum::<f64>() / near.len() as f64
-        })
-        .collect()
+    let mean = |i: usize| {
+        let near = &x[i.saturating_sub(half)..(i + half + 1).min(x.len())];
+        near.iter().sum::<f64>() / near.len() as f64
+    };
+    (0..x.len()).map(mean).collect()
 }
 
 /// Central differences; 0 at the ends.

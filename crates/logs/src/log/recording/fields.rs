@@ -4,9 +4,8 @@ use std::ops::Range;
 
 use super::message::MessageHead;
 use super::path::FieldPath;
-use super::value::Value;
+use super::value::{Value, stamp_ns};
 use crate::log::layout::{Channel, Layout, column_number};
-use crate::log::section::Stamp;
 use crate::log::time::{FAR_S, Instant, Stamped};
 use cft_ident_core::number::is_usable;
 
@@ -97,27 +96,18 @@ impl RobotFields {
         !range.is_empty() && !values[range.clone()].contains(&Value::Absent)
     }
 
-    /// Whether a message holds the time that the robot file names.
     pub(super) fn has_time(&self, values: &[Value]) -> bool {
         values[self.time] != Value::Absent
     }
 
     /// The stamp of a message's header \[ns\].
     pub(super) fn header_ns(&self, values: &[Value]) -> Option<i128> {
-        let part = |index: usize| values[index].integer();
-        let (s, ns) = (part(self.header[0])?, part(self.header[1])?);
-        s.checked_mul(1_000_000_000)?.checked_add(ns)
+        stamp_ns(values[self.header[0]], values[self.header[1]])
     }
 
     /// Whether a message has a header with a stamp other than 0.
     pub(super) fn has_header(&self, values: &[Value]) -> bool {
         self.header_ns(values).is_some_and(|ns| ns != 0)
-    }
-
-    /// Whether a message that is one with others of its instant lacks some of their fields: positions, torques
-    /// and velocities of other joints.
-    pub(super) fn channels(&self) -> Range<usize> {
-        0..self.time
     }
 
     /// Time of a message; `None` where it has none of this kind.
@@ -139,10 +129,7 @@ impl RobotFields {
                 Value::Absent => None,
                 Value::Float(value) => {
                     let seconds = value * self.time_factor;
-                    if !is_usable(seconds) {
-                        return None;
-                    }
-                    Some(match seconds.abs() < FAR_S {
+                    is_usable(seconds).then(|| match seconds.abs() < FAR_S {
                         true => Stamped::Seconds(seconds),
                         false => Stamped::Exact(Instant::default().plus(seconds)),
                     })
@@ -156,14 +143,48 @@ impl RobotFields {
             },
         }
     }
+}
 
-    /// The time source that the robot file asks for; `None` where it is found in the messages.
-    pub(super) fn asked(stamp: Stamp) -> Option<TimeSource> {
-        match stamp {
-            Stamp::Auto => None,
-            Stamp::Header => Some(TimeSource::Header),
-            Stamp::Log => Some(TimeSource::Log),
-            Stamp::Publish => Some(TimeSource::Publish),
+/// Fields of the last message that lacked some.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Parts {
+    /// Its instant \[ns\]; none where nothing waits.
+    instant: Option<i128>,
+    values: Vec<Value>,
+    waiting: u64,
+}
+
+impl Parts {
+    /// Fills in what messages of the same instant held; how many of those this one makes whole.
+    pub(super) fn join(
+        &mut self,
+        fields: &RobotFields,
+        head: &MessageHead,
+        values: &mut [Value],
+    ) -> u64 {
+        let channels = 0..fields.time;
+        let absent = |values: &[Value]| values[channels.clone()].contains(&Value::Absent);
+        if !absent(values) {
+            self.instant = None;
+            return 0;
+        }
+        let stamped = fields.header_ns(values).filter(|ns| *ns != 0);
+        let instant = stamped.unwrap_or(i128::from(head.log_ns));
+        if self.instant.replace(instant) == Some(instant) {
+            for (value, known) in values[channels.clone()].iter_mut().zip(&self.values) {
+                if *value == Value::Absent {
+                    *value = *known;
+                }
+            }
+        } else {
+            self.waiting = 0;
+        }
+        self.values.clear();
+        self.values.extend(&values[channels.clone()]);
+        self.waiting += 1;
+        match absent(values) {
+            true => 0,
+            false => std::mem::take(&mut self.waiting) - 1,
         }
     }
 }

@@ -2,17 +2,17 @@
 //! first by linear interpolation.
 
 use std::collections::VecDeque;
-use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Wanted};
+use super::message::{MessageHead, MessageReader, Schema, refused};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
-use super::value::Value;
+use super::state_topics::{ARRAYS, FoundTopic, survey};
+use super::value::{Value, stamp_ns};
 use crate::log::layout::{Channel, Layout};
-use crate::log::rows::LogRows;
+use crate::log::rows::{LogRows, counted};
 use crate::log::time::{Instant, Stamped};
 use crate::log::{Block, LogError, escape, list, source};
 use cft_ident_core::number::{beyond, is_usable};
@@ -28,7 +28,6 @@ const MAX_WAITING_ROWS: usize = 1 << 14;
 /// A step longer than this many usual ones is a dropout.
 const DROPOUT_STEPS: f64 = 2.5;
 
-/// The numbers of one topic.
 struct Source {
     topic: String,
     schema: Arc<Schema>,
@@ -40,7 +39,6 @@ struct Source {
     steps: (f64, u32),
 }
 
-/// The rows of a recording.
 pub(in crate::log) struct JoinedTopics {
     recording: MessageFiles,
     sources: Vec<Source>,
@@ -58,13 +56,8 @@ pub(in crate::log) struct JoinedTopics {
     file: String,
 }
 
-impl fmt::Debug for JoinedTopics {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("JoinedTopics")
-            .field("names", &self.names)
-            .finish_non_exhaustive()
-    }
-}
+/// Topics, each with its columns and their labels.
+type Fields = Vec<(String, Vec<(String, String)>)>;
 
 /// `/topic:path` as topic and path.
 fn parted(column: &str) -> Option<(&str, &str)> {
@@ -80,42 +73,28 @@ pub(in crate::log) fn of_topics(layout: &Layout) -> bool {
 }
 
 impl JoinedTopics {
-    /// The channels of a robot, `/topic:path` each.
-    pub(in crate::log) fn of_robot(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
-        Self::of_channels(paths, layout, false)
-    }
-
-    /// The same where each joint may come in messages of its own, though of one topic.
-    pub(super) fn of_parts(paths: &[PathBuf], layout: &Layout) -> Result<Self, LogError> {
-        Self::of_channels(paths, layout, true)
-    }
-
-    fn of_channels(paths: &[PathBuf], layout: &Layout, apart: bool) -> Result<Self, LogError> {
+    /// The channels of a robot, `/topic:path` each; `apart`: joints of one topic may come in messages of their own.
+    pub(in crate::log) fn of_robot(
+        paths: &[PathBuf],
+        layout: &Layout,
+        apart: bool,
+    ) -> Result<Self, LogError> {
         let named = |channels: &[Channel]| channels.iter().all(|c| parted(&c.column).is_some());
         let mut layout = layout.clone();
         if !named(&layout.velocities) {
             layout.velocities.clear();
         }
-        let all = || {
-            layout
-                .positions
-                .iter()
-                .chain(&layout.torques)
-                .chain(&layout.velocities)
-        };
-        if let Some(channel) = all().find(|channel| parted(&channel.column).is_none()) {
-            return Err(LogError::Topic {
-                file: source::shown_all(paths),
-                problem: format!("`{}` names no topic, as other channels do", escape(&channel.column)),
-                remedy: "write every position and torque as \"/topic:path\" in [log.joint]\n`inspect` lists topics and paths".to_owned(),
-            });
-        }
-        let mut fields: Vec<(String, Vec<(String, String)>)> = Vec::new();
+        let mut fields = Fields::new();
         let mut joints: Vec<usize> = Vec::new();
         let kinds = [&layout.positions, &layout.torques, &layout.velocities];
         for (joint, channel) in kinds.into_iter().flat_map(|of| of.iter().enumerate()) {
             let Some((topic, path)) = parted(&channel.column) else {
-                continue;
+                let column = escape(&channel.column);
+                return Err(refused(
+                    paths,
+                    format!("`{column}` names no topic, as other channels do"),
+                    "write every position and torque as \"/topic:path\" in [log.joint]\n`inspect` lists topics and paths",
+                ));
             };
             let entry = (channel.column.clone(), path.to_owned());
             let same =
@@ -128,23 +107,20 @@ impl JoinedTopics {
                 }
             }
         }
-        let wanted = layout.clone();
+        let channels = kinds.map(Vec::clone);
         let mut rows = Self::open(paths, fields, layout)?;
-        let place = |channel: &Channel| rows.names.iter().position(|name| *name == channel.column);
-        let places = |channels: &[Channel]| -> Vec<usize> {
-            channels
-                .iter()
-                .filter_map(|c| Some(place(c)? - 1))
-                .collect()
+        let place = |channel: Channel| {
+            let mut names = rows.names.iter();
+            Some(names.position(|name| *name == channel.column)? - 1)
         };
-        rows.channels = [&wanted.positions, &wanted.torques, &wanted.velocities].map(|c| places(c));
+        rows.channels = channels.map(|all| all.into_iter().filter_map(place).collect());
         Ok(rows)
     }
 
     /// Every number of a topic: of the one that is named, of the first that holds a whole state, else of all.
     pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
-        let mut recording = MessageFiles::open(paths, Wanted::default())?;
-        let mut found: Vec<(String, Vec<(String, String)>)> = Vec::new();
+        let mut recording = MessageFiles::open(paths, Vec::new())?;
+        let mut found = Fields::new();
         let (mut looked, mut unread) = (0, None);
         while looked < SEARCHED_MESSAGES
             && let Some(message) = recording.next()?
@@ -173,21 +149,18 @@ impl JoinedTopics {
         }
         if found.is_empty() {
             let topics = recording.seen.iter().map(|topic| topic.name.as_str());
-            return Err(LogError::Topic {
-                file: source::shown_all(paths),
-                problem: match unread {
-                    Some((topic, reason)) => format!(
-                        "messages of {} cannot be read: {}",
-                        escape(&topic),
-                        escape(&reason)
-                    ),
-                    None => "no message of it holds numbers that can be read".to_owned(),
-                },
-                remedy: format!(
-                    "record the joints' states, as CDR with ros2msg definitions, protobuf or JSON\nthe topics are {}",
-                    list(topics)
-                ),
-            });
+            let problem = match unread {
+                Some((topic, reason)) => {
+                    let (topic, reason) = (escape(&topic), escape(&reason));
+                    format!("messages of {topic} cannot be read: {reason}")
+                }
+                None => "no message of it holds numbers that can be read".to_owned(),
+            };
+            let remedy = format!(
+                "record the joints' states, as CDR with ros2msg definitions, protobuf or JSON\nthe topics are {}",
+                list(topics)
+            );
+            return Err(refused(paths, problem, remedy));
         }
         let alone = found.len() == 1;
         let mut left = COLUMNS;
@@ -203,20 +176,14 @@ impl JoinedTopics {
             });
             (topic.clone(), named.collect())
         });
-        let fields: Vec<(String, Vec<(String, String)>)> = fields.collect();
+        let fields: Fields = fields.collect();
         Self::open(paths, fields, Layout::joint_columns(&[] as &[&str]))
     }
 
-    /// Opens topics, each with its columns and their labels.
-    fn open(
-        paths: &[PathBuf],
-        fields: Vec<(String, Vec<(String, String)>)>,
-        layout: Layout,
-    ) -> Result<Self, LogError> {
+    fn open(paths: &[PathBuf], fields: Fields, layout: Layout) -> Result<Self, LogError> {
         let topics: Vec<String> = fields.iter().map(|(topic, _)| topic.clone()).collect();
         let mut schemas: Vec<Option<Arc<Schema>>> = vec![None; topics.len()];
-        let names = topics.clone();
-        let mut recording = MessageFiles::open(paths, Wanted { names })?;
+        let mut recording = MessageFiles::open(paths, topics.clone())?;
         while schemas.contains(&None)
             && let Some(message) = recording.next()?
         {
@@ -226,26 +193,23 @@ impl JoinedTopics {
                 }
             }
         }
-        let refuse = |topic: &str, problem: String| LogError::Topic {
-            file: source::shown_all(paths),
-            problem: format!("topic {}: {problem}", escape(topic)),
-            remedy: "`cft-ident inspect` lists the topics and what is in them".to_owned(),
+        let refuse = |topic: &str, problem: &str| {
+            let problem = format!("topic {}: {problem}", escape(topic));
+            let remedy = "`cft-ident inspect` lists the topics and what is in them";
+            refused(paths, problem, remedy)
         };
-        let (mut sources, mut columns, mut labels) =
-            (Vec::new(), vec!["t".to_owned()], vec!["t".to_owned()]);
+        let mut sources = Vec::new();
+        let [mut columns, mut labels] = [(); 2].map(|()| vec!["t".to_owned()]);
         for ((topic, own), schema) in fields.into_iter().zip(schemas) {
-            let schema = schema.ok_or_else(|| refuse(&topic, "no message of it".to_owned()))?;
-            let mut wanted = vec![
-                vec![FieldPath::parse("header.stamp.sec")],
-                vec![FieldPath::parse("header.stamp.nanosec")],
-            ];
+            let schema = schema.ok_or_else(|| refuse(&topic, "no message of it"))?;
+            let mut wanted = FieldPath::each(&["header.stamp.sec", "header.stamp.nanosec"]);
             for (column, label) in own {
                 let path = parted(&column).map_or(&*column, |(_, path)| path);
                 wanted.push(vec![FieldPath::parse(path)]);
                 columns.push(column);
                 labels.push(label);
             }
-            let reader = reader_of(&schema, &wanted).map_err(|reason| refuse(&topic, reason))?;
+            let reader = reader_of(&schema, &wanted).map_err(|reason| refuse(&topic, &reason))?;
             sources.push(Source {
                 values: vec![Value::Absent; wanted.len()],
                 topic,
@@ -255,9 +219,8 @@ impl JoinedTopics {
                 steps: (0.0, 0),
             });
         }
-        let names = topics;
         Ok(Self {
-            recording: MessageFiles::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, topics)?,
             sources,
             row: vec![f64::NAN; columns.len() - 1],
             names: columns,
@@ -272,7 +235,6 @@ impl JoinedTopics {
         })
     }
 
-    /// Reads one message.
     fn take_message(&mut self) -> Result<(), LogError> {
         let Some(message) = self.recording.next()? else {
             self.ended = true;
@@ -342,9 +304,7 @@ impl JoinedTopics {
 
 impl Source {
     fn instant(&self, head: &MessageHead) -> Instant {
-        let part = |index: usize| self.values[index].integer();
-        let stamp = part(0).zip(part(1)).map(|(s, ns)| s * 1_000_000_000 + ns);
-        let stamp = stamp.filter(|ns| *ns != 0);
+        let stamp = stamp_ns(self.values[0], self.values[1]).filter(|ns| *ns != 0);
         Instant::from_ns(stamp.unwrap_or(i128::from(head.log_ns)))
     }
 
@@ -400,15 +360,10 @@ impl LogRows for JoinedTopics {
     }
 
     fn append(&self, block: &mut Block) -> Result<(), LogError> {
-        let Layout {
-            positions,
-            torques,
-            velocities,
-            ..
-        } = &self.layout;
+        let [q, tau, dq] = &self.channels;
         let parts = [
-            (positions, &self.channels[0], &mut block.q),
-            (torques, &self.channels[1], &mut block.tau),
+            (&self.layout.positions, q, &mut block.q),
+            (&self.layout.torques, tau, &mut block.tau),
         ];
         let scaled = |channel: &Channel, place: usize| {
             let number = self.row.get(place).copied().unwrap_or(f64::NAN);
@@ -428,10 +383,8 @@ impl LogRows for JoinedTopics {
                 to.push(value);
             }
         }
-        let pairs = velocities.iter().zip(&self.channels[2]);
-        block
-            .dq
-            .extend(pairs.map(|(channel, place)| scaled(channel, *place)));
+        let velocities = self.layout.velocities.iter().zip(dq);
+        (block.dq).extend(velocities.map(|(channel, place)| scaled(channel, *place)));
         Ok(())
     }
 
@@ -461,12 +414,58 @@ impl LogRows for JoinedTopics {
                 "rows are those of {topics}, interpolated linearly at the times of the first"
             ));
         }
-        if self.lost > 0 {
-            out.push(format!(
-                "{} messages of {topics} are left out: no message of another topic is near, or they cannot be read",
-                self.lost
-            ));
-        }
+        let lost = format!(
+            "messages of {topics} are left out: no message of another topic is near, or they cannot be read"
+        );
+        out.extend(counted(self.lost, &lost));
         out
     }
+}
+
+/// The rows of a robot each of whose joints is found on one topic alone; `None` where one is not.
+pub(in crate::log) fn of_joints(
+    paths: &[PathBuf],
+    layout: &Layout,
+) -> Result<Option<(JoinedTopics, Layout)>, LogError> {
+    let found = survey(paths)?.found;
+    let needed = [!layout.positions.is_empty(), !layout.torques.is_empty()];
+    let topic_of = |joint: usize| -> Option<&FoundTopic> {
+        let name = layout.name_in_messages(joint)?;
+        let holds = |one: &&FoundTopic| {
+            let mut filled = needed.iter().zip(one.arrays);
+            one.topic.starts_with('/')
+                && one.names.iter().any(|own| own == name)
+                && filled.all(|(needed, filled)| filled || !needed)
+        };
+        let mut all = found.iter().filter(holds);
+        all.next().filter(|_| all.next().is_none())
+    };
+    let topics: Option<Vec<&FoundTopic>> = (0..layout.joints.len()).map(topic_of).collect();
+    // one message of one topic that holds them all is refused for another reason
+    let several = |topics: &Vec<&FoundTopic>| {
+        let [first, others @ ..] = &topics[..] else {
+            return false;
+        };
+        first.most < first.names.len() || others.iter().any(|one| one.topic != first.topic)
+    };
+    let Some(topics) = topics.filter(several) else {
+        return Ok(None);
+    };
+    let mut split = layout.clone();
+    let kinds = [
+        &mut split.positions,
+        &mut split.torques,
+        &mut split.velocities,
+    ];
+    for (channels, (array, _)) in kinds.into_iter().zip(ARRAYS) {
+        for (joint, (channel, one)) in channels.iter_mut().zip(&topics).enumerate() {
+            let name = layout.name_in_messages(joint).unwrap_or_default();
+            channel.column = format!("{}:{array}[name={name}]", one.topic);
+        }
+    }
+    if !topics.iter().all(|one| one.arrays[2]) {
+        split.velocities.clear();
+    }
+    let rows = JoinedTopics::of_robot(paths, &split, true)?;
+    Ok(Some((rows, split)))
 }

@@ -3,20 +3,21 @@
 //! The topic of the joints gives `q_<joint>`, `tau_<joint>`, `dq_<joint>`; another topic puts its own
 //! name before that of the joint. Messages of one instant are one row.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Uneven, Wanted};
+use super::message::{MessageHead, MessageReader, Schema, Uneven, refused};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
 use super::sources::{Publisher, Publishers};
-use super::state_topics::{ARRAYS, COLUMNS, FoundTopic, Survey, TIMES, Times, groups, survey};
-use super::value::Value;
-use crate::log::names::{escape, list, nearest};
-use crate::log::rows::LogRows;
+use super::state_topics::{
+    ARRAYS, COLUMNS, FoundTopic, Survey, TIMES, Times, groups, header_stamp, survey,
+};
+use super::value::{Value, stamp_ns};
+use crate::log::LogError;
+use crate::log::names::{escape, list, suggestion};
+use crate::log::rows::{LogRows, counted};
 use crate::log::time::{Instant, Stamped};
-use crate::log::{LogError, source};
 
 /// What is wrong with a recording without joint states.
 const NO_STATES: &str = "no topic holds sensor_msgs/msg/JointState";
@@ -26,13 +27,11 @@ pub(in crate::log) fn has_none(error: &LogError) -> bool {
     matches!(error, LogError::Topic { problem, .. } if problem == NO_STATES)
 }
 
-/// One topic and the columns that it fills.
 struct StateTopic {
     topic: String,
     schema: Schema,
     reader: Box<dyn MessageReader>,
     values: Vec<Value>,
-    /// Place of its first column.
     first: usize,
     stamped: bool,
     zero_is_time: bool,
@@ -43,7 +42,7 @@ struct StateTopic {
     first_uneven: Option<Uneven>,
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Default)]
 struct StateRow {
     key: i128,
     /// The time where it is no whole nanosecond.
@@ -53,7 +52,6 @@ struct StateRow {
     full: bool,
 }
 
-/// The rows of a recording.
 pub(in crate::log) struct JointStates {
     recording: MessageFiles,
     sources: Vec<StateTopic>,
@@ -75,14 +73,6 @@ pub(in crate::log) struct JointStates {
     paths: Vec<PathBuf>,
 }
 
-impl fmt::Debug for JointStates {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("JointStates")
-            .field("columns", &self.columns)
-            .finish_non_exhaustive()
-    }
-}
-
 impl JointStates {
     /// Finds the topics, those of `topic` and of what was recorded at its instants where one is named.
     pub(in crate::log) fn open(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
@@ -93,19 +83,15 @@ impl JointStates {
             cause,
         } = survey(paths)?;
         if found.is_empty() {
-            if let Some(cause) = cause {
-                return Err(LogError::Topic {
-                    file: source::shown_all(paths),
-                    problem: cause.problem,
-                    remedy: cause.remedy.to_owned(),
-                });
-            }
-            return Err(LogError::Topic {
-                file: source::shown_all(paths),
-                problem: NO_STATES.to_owned(),
-                remedy: format!(
-                    "say with a robot file (-r) which fields are the channels; the topics are {}",
-                    list(other_topics.iter().map(String::as_str))
+            return Err(match cause {
+                Some((problem, remedy)) => refused(paths, problem, remedy),
+                None => refused(
+                    paths,
+                    NO_STATES,
+                    format!(
+                        "say with a robot file (-r) which fields are the channels; the topics are {}",
+                        list(other_topics.iter().map(String::as_str))
+                    ),
                 ),
             });
         }
@@ -114,36 +100,26 @@ impl JointStates {
         let chosen = match (topic, &groups[..]) {
             (None, [only]) => only,
             (None, several) => {
-                return Err(LogError::Topic {
-                    file: source::shown_all(paths),
-                    problem: format!(
-                        "holds {} topics of joint states with instants of their own",
-                        several.len()
-                    ),
-                    remedy: format!("name one with --topic: {}", list(names())),
-                });
+                let count = several.len();
+                return Err(refused(
+                    paths,
+                    format!("holds {count} topics of joint states with instants of their own"),
+                    format!("name one with --topic: {}", list(names())),
+                ));
             }
             (Some(name), groups) => {
                 let has = |group: &&Vec<usize>| group.iter().any(|k| found[*k].topic == name);
                 groups.iter().find(has).ok_or_else(|| {
-                    let near = nearest(name, names());
-                    let near = near.map(|near| format!("did you mean `{}`? ", escape(near)));
-                    LogError::Topic {
-                        file: source::shown_all(paths),
-                        problem: format!("no joint states on topic `{}`", escape(name)),
-                        remedy: format!(
-                            "{}the topics are {}",
-                            near.unwrap_or_default(),
-                            list(names())
-                        ),
-                    }
+                    let near = suggestion(name, names());
+                    refused(
+                        paths,
+                        format!("no joint states on topic `{}`", escape(name)),
+                        format!("{near}the topics are {}", list(names())),
+                    )
                 })?
             }
         };
-        let main = match topic {
-            Some(name) => name.to_owned(),
-            None => found[chosen[0]].topic.clone(),
-        };
+        let main = topic.unwrap_or(&found[chosen[0]].topic).to_owned();
         let mut place = 0..;
         found.retain(|one| {
             let kept = place.next().is_some_and(|k| chosen.contains(&k));
@@ -166,16 +142,7 @@ impl JointStates {
         let apart = joints.len() == all;
         for one in found {
             let first = columns.len();
-            let mut fields = vec![
-                vec![
-                    FieldPath::parse("header.stamp.sec"),
-                    FieldPath::parse("header.stamp.secs"),
-                ],
-                vec![
-                    FieldPath::parse("header.stamp.nanosec"),
-                    FieldPath::parse("header.stamp.nsecs"),
-                ],
-            ];
+            let mut fields = header_stamp().to_vec();
             for ((array, letter), _) in ARRAYS.iter().zip(one.arrays).filter(|(_, filled)| *filled)
             {
                 for name in &one.names {
@@ -193,7 +160,7 @@ impl JointStates {
                 reader,
                 first,
                 stamped: one.stamped,
-                zero_is_time: one.zero_is_time,
+                zero_is_time: one.stamps.are_times(),
                 fields,
                 publishers: Publishers::default(),
                 uneven: 0,
@@ -205,7 +172,7 @@ impl JointStates {
             names.push(TIMES.to_owned());
         }
         let mut states = Self {
-            recording: MessageFiles::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, names)?,
             paths: paths.to_vec(),
             unstamped: 0,
             begun: false,
@@ -256,10 +223,8 @@ impl JointStates {
             let publisher = Publisher::of(&head, &*one.reader);
             let place = (&*self.paths, &*one.topic);
             let numbers = &one.values[2..];
-            if !one
-                .publishers
-                .take(publisher, place, &one.fields[2..], numbers)?
-            {
+            let fields = &one.fields[2..];
+            if !one.publishers.take(publisher, place, fields, numbers)? {
                 continue;
             }
             if let Some(uneven) = one.reader.uneven() {
@@ -274,10 +239,8 @@ impl JointStates {
             let own = one.first..one.first + one.values.len() - 2;
             // messages of one instant may each hold some of the joints
             let apart = |row: &StateRow| {
-                let taken = row.values[own.clone()].iter().zip(&one.values[2..]);
-                taken
-                    .into_iter()
-                    .all(|(known, new)| known.is_nan() || *new == Value::Absent)
+                let mut taken = row.values[own.clone()].iter().zip(&one.values[2..]);
+                taken.all(|(known, new)| known.is_nan() || *new == Value::Absent)
             };
             let same = self.row.full && self.row.key == key && apart(&self.row);
             let row = match same {
@@ -336,25 +299,24 @@ impl LogRows for JointStates {
             let topics = list(self.other_topics.iter().map(String::as_str));
             out.push(format!("topics that are left out: {topics}"));
         }
-        if self.unreadable > 0 {
-            out.push(format!(
-                "{} messages cannot be decoded and are left out",
-                self.unreadable
-            ));
-        }
-        if self.unstamped > 0 {
-            out.push(format!(
-                "{} messages are stamped 0, before their clock was set, and are left out",
-                self.unstamped
-            ));
+        for (count, text) in [
+            (
+                self.unreadable,
+                "messages cannot be decoded and are left out",
+            ),
+            (
+                self.unstamped,
+                "messages are stamped 0, before their clock was set, and are left out",
+            ),
+        ] {
+            out.extend(counted(count, text));
         }
         out.extend(self.contradictions().into_iter().map(|(_, text)| text));
         out.extend(self.uneven().into_iter().map(|(_, text)| text));
-        if self.incomplete > 0 && self.sources.len() > 1 {
-            out.push(format!(
-                "{} rows have no message of one of the topics at their time, and no numbers there",
-                self.incomplete
-            ));
+        if self.sources.len() > 1 {
+            let lacking =
+                "rows have no message of one of the topics at their time, and no numbers there";
+            out.extend(counted(self.incomplete, lacking));
         }
         out
     }
@@ -381,11 +343,10 @@ impl LogRows for JointStates {
 impl StateTopic {
     /// Instant of a message [ns]; `None` where its clock was not set yet.
     fn key(&self, head: &MessageHead) -> Option<i128> {
-        let part = |index: usize| self.values.get(index).and_then(|v| v.integer());
-        match (self.stamped, part(0), part(1)) {
-            (true, Some(0), Some(0)) if !self.zero_is_time => None,
-            (true, Some(s), Some(ns)) => Some(s * 1_000_000_000 + ns),
-            _ => Some(i128::from(head.log_ns)),
+        let stamp = stamp_ns(self.values[0], self.values[1]).filter(|_| self.stamped);
+        match stamp {
+            Some(0) if !self.zero_is_time => None,
+            stamp => Some(stamp.unwrap_or(i128::from(head.log_ns))),
         }
     }
 }
@@ -407,7 +368,6 @@ impl StateRow {
     }
 }
 
-/// Name of the column with one array's element.
 fn column(of: &FoundTopic, letter: &str, name: &str, by_joint: bool) -> String {
     if by_joint && !of.is_columns() {
         return format!("{letter}_{name}");

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::encoding::reader_of;
-use super::message::{Leaf, Wanted};
+use super::message::Leaf;
 use super::parts::MessageFiles;
 use crate::log::{LogError, escape};
 
@@ -15,7 +15,7 @@ use crate::log::{LogError, escape};
 const TOPICS: usize = 1000;
 
 /// A topic of a recording.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct TopicFacts {
     /// Its name.
     pub name: String,
@@ -41,7 +41,7 @@ pub struct TopicFacts {
 
 /// The topics of a recording, those that are declared and have no message too.
 pub(in crate::log) fn listing(paths: &[PathBuf]) -> Result<Vec<TopicFacts>, LogError> {
-    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut recording = MessageFiles::open(paths, Vec::new())?;
     let mut found: Vec<TopicFacts> = Vec::new();
     while let Some(message) = recording.next()? {
         let (topic, head) = (message.topic, message.head);
@@ -70,9 +70,7 @@ pub(in crate::log) fn listing(paths: &[PathBuf]) -> Result<Vec<TopicFacts>, LogE
     }
     for facts in &mut found {
         facts.publishers = facts.channels.len().max(1);
-        let duration = facts
-            .times_ns
-            .map(|(first, last)| last.saturating_sub(first));
+        let duration = (facts.times_ns).map(|(first, last)| last.saturating_sub(first));
         let duration = duration.filter(|ns| *ns > 0 && facts.messages > 1);
         facts.rate_hz = duration.map(|ns| (facts.messages - 1) as f64 / (ns as f64 * 1e-9));
     }
@@ -91,12 +89,7 @@ impl TopicFacts {
             name: name.to_owned(),
             kind: kind.to_owned(),
             publishers: 1,
-            messages: 0,
-            rate_hz: None,
-            fields: Vec::new(),
-            unreadable: None,
-            channels: BTreeSet::new(),
-            times_ns: None,
+            ..Self::default()
         }
     }
 }

@@ -2,60 +2,46 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::value::Value;
-use crate::log::{LogError, escape};
+use crate::log::{LogError, escape, source};
 
-/// How the messages of a topic are written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Schema {
     /// Type, e.g. `sensor_msgs/msg/JointState`.
     pub(super) name: String,
     /// Language of the definition: `ros2msg`, `protobuf`, `jsonschema`, ...
     pub(super) language: String,
-    /// The definition.
     pub(super) text: Vec<u8>,
     /// Encoding of the messages: `cdr`, `json`, `protobuf`, ...
     pub(super) encoding: String,
 }
 
-/// A topic of a file.
 #[derive(Debug, Clone)]
 pub(super) struct Topic {
     pub(super) name: String,
     pub(super) schema: Arc<Schema>,
 }
 
-/// Which topics are read.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Wanted {
-    /// Their names; empty for all.
-    pub(super) names: Vec<String>,
+/// Whether a topic is among those that are read; none are named where all are.
+pub(super) fn is_wanted(topic: &str, names: &[String]) -> bool {
+    names.is_empty() || names.iter().any(|name| name == topic)
 }
 
-impl Wanted {
-    pub(super) fn includes(&self, topic: &str) -> bool {
-        self.names.is_empty() || self.names.iter().any(|name| name == topic)
-    }
-}
-
-/// A message without its bytes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MessageHead {
     /// Index of its topic in the file.
     pub(super) topic: usize,
     /// Channel of the file that it is on: one of each publisher, where the recorder keeps them apart.
     pub(super) channel: u16,
-    /// When it was recorded [ns].
     pub(super) log_ns: u64,
-    /// When it was published [ns].
     pub(super) publish_ns: u64,
     /// Which message of the file it is, from 1.
     pub(super) number: u64,
 }
 
-/// Where and why a file ends before its end.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Break {
     pub(super) reason: String,
@@ -71,13 +57,11 @@ pub(super) trait MessageFile: Send {
     /// The next message of a wanted topic, its bytes in `data`; `None` at the end.
     fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<MessageHead>, LogError>;
 
-    /// Where and why the file breaks off, once it has.
     fn broken(&self) -> Option<&Break>;
 }
 
 /// Reads the fields that it was made for out of the messages of one topic: what each encoding does.
 pub(super) trait MessageReader: Send {
-    /// Reads the fields of one message.
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String>;
 
     /// Names that the message which was read last lists: those of its joints, or of its fields.
@@ -88,8 +72,7 @@ pub(super) trait MessageReader: Send {
         0
     }
 
-    /// An array of the message that was read last which holds another number of elements than the list
-    /// of names has, so that none can be given to a name.
+    /// An array of the message that was read last whose elements cannot be given to the names beside it.
     fn uneven(&self) -> Option<Uneven> {
         None
     }
@@ -101,11 +84,8 @@ pub(super) trait MessageReader: Send {
 /// An array that does not fit its list of names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Uneven {
-    /// Name of the array.
     pub(super) array: String,
-    /// Elements of it.
     pub(super) numbers: usize,
-    /// Names in the list.
     pub(super) names: usize,
 }
 
@@ -124,10 +104,8 @@ impl fmt::Display for Uneven {
     }
 }
 
-/// A number in a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Leaf {
-    /// The path that leads to it.
     pub(super) path: String,
     /// The same with the names that lists of the message give to elements.
     pub(super) label: String,
@@ -140,6 +118,19 @@ pub(super) const MOST_LEAVES: usize = 512;
 pub(super) fn name_elements(names: &[String], elements: usize) -> bool {
     let apart = names.iter().collect::<BTreeSet<_>>().len() == names.len();
     !names.is_empty() && names.len() == elements && apart
+}
+
+/// The error of a recording whose messages cannot be used.
+pub(super) fn refused(
+    paths: &[PathBuf],
+    problem: impl Into<String>,
+    remedy: impl Into<String>,
+) -> LogError {
+    LogError::Topic {
+        file: source::shown_all(paths),
+        problem: problem.into(),
+        remedy: remedy.into(),
+    }
 }
 
 /// A reader of some fields, or why messages of their schema cannot be read, for the user.

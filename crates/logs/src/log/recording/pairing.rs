@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 use super::delay::DelayEstimator;
 use crate::log::layout::Layout;
+use crate::log::rows::counted;
 use crate::log::time::{Instant, Stamped};
 
 /// Rows that wait for their torque at most.
@@ -21,37 +22,20 @@ const PACE_STEPS: usize = 31;
 const DROPOUT_STEPS: f64 = 2.5;
 
 /// What one message, or one row, holds: as logged, not scaled.
-#[derive(Debug, Clone)]
+#[derive(Default)]
 pub(super) struct Sample {
     pub(super) stamp: Stamped,
     pub(super) q: Vec<f64>,
     pub(super) tau: Vec<f64>,
     pub(super) dq: Vec<f64>,
-    /// Number of the message in its file.
     pub(super) number: u64,
     pub(super) path: PathBuf,
     /// The file for a message to the user.
     pub(super) file: String,
 }
 
-impl Default for Sample {
-    fn default() -> Self {
-        Self {
-            stamp: Stamped::Seconds(0.0),
-            q: Vec::new(),
-            tau: Vec::new(),
-            dq: Vec::new(),
-            number: 0,
-            path: PathBuf::new(),
-            file: String::new(),
-        }
-    }
-}
-
-/// Rows and torques on their way to each other.
-#[derive(Debug)]
+#[derive(Default)]
 pub(super) struct Pairing {
-    /// Torques hold from message to message.
     zero_order_hold: bool,
     delay_s: f64,
     waiting: VecDeque<Sample>,
@@ -62,7 +46,6 @@ pub(super) struct Pairing {
     /// The last steps of the torques' clock, and how many there were.
     steps: [f64; PACE_STEPS],
     stepped: usize,
-    paired: u64,
     /// Rows without a torque on both sides, and inside dropouts of the torques.
     outside: u64,
     dropouts: u64,
@@ -76,33 +59,19 @@ impl Pairing {
         Self {
             zero_order_hold: layout.zero_order_hold,
             delay_s: layout.section.torque_delay_s.unwrap_or(0.0),
-            waiting: VecDeque::new(),
-            torques: VecDeque::new(),
-            ready: VecDeque::new(),
-            spare: Vec::new(),
-            steps: [0.0; PACE_STEPS],
-            stepped: 0,
-            paired: 0,
-            outside: 0,
-            dropouts: 0,
-            disordered: 0,
-            delay: DelayEstimator::default(),
+            ..Self::default()
         }
     }
 
     /// Hands out the next row with its torque, where there is one.
     pub(super) fn take(&mut self, row: &mut Sample) -> bool {
-        match self.ready.pop_front() {
-            None => false,
-            Some(next) => {
-                let old = std::mem::replace(row, next);
-                self.spare.push(old);
-                true
-            }
-        }
+        let Some(next) = self.ready.pop_front() else {
+            return false;
+        };
+        self.spare.push(std::mem::replace(row, next));
+        true
     }
 
-    /// A row that has positions and waits for its torque.
     pub(super) fn add_positions(&mut self, row: &mut Sample) {
         let spare = self.spare.pop().unwrap_or_default();
         self.waiting.push_back(std::mem::replace(row, spare));
@@ -115,7 +84,6 @@ impl Pairing {
         self.pair();
     }
 
-    /// Torques, on their own clock.
     pub(super) fn add_torques(&mut self, sample: &mut Sample) {
         let t = sample.stamp.instant().plus(-self.delay_s);
         if let Some((before, _)) = self.torques.back() {
@@ -149,7 +117,6 @@ impl Pairing {
             // The first torque at or after the row.
             let after = self.torques.partition_point(|(time, _)| *time < t);
             if self.torque_at(t, after, &mut row.tau) {
-                self.paired += 1;
                 let seconds = t.since(Instant::default());
                 self.delay.add(seconds, &row.q, &row.tau);
                 self.ready.push_back(row);
@@ -209,23 +176,24 @@ impl Pairing {
         let mut out = vec![format!(
             "positions are those of {positions}, torques those of {torques}, {how} at the times of the positions"
         )];
-        let left = self.outside + self.waiting.len() as u64;
-        if left > 0 {
-            out.push(format!(
-                "{left} messages of {positions} lie before the first or after the last torque and are left out"
-            ));
-        }
-        if self.dropouts > 0 {
-            out.push(format!(
-                "{} messages of {positions} lie in dropouts of {torques} and are left out",
-                self.dropouts
-            ));
-        }
-        if self.disordered > 0 {
-            out.push(format!(
-                "{} messages of {torques} are left out: their time does not increase",
-                self.disordered
-            ));
+        let outside = self.outside + self.waiting.len() as u64;
+        for (count, text) in [
+            (
+                outside,
+                format!(
+                    "{positions} lie before the first or after the last torque and are left out"
+                ),
+            ),
+            (
+                self.dropouts,
+                format!("{positions} lie in dropouts of {torques} and are left out"),
+            ),
+            (
+                self.disordered,
+                format!("{torques} are left out: their time does not increase"),
+            ),
+        ] {
+            out.extend(counted(count, &format!("messages of {text}")));
         }
         out.push(self.delay.describe(positions, torques, self.delay_s));
         out

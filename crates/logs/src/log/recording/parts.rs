@@ -4,29 +4,21 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use super::format::format_of;
-use super::message::{Break, MessageFile, MessageHead, Topic, Wanted};
+use super::message::{Break, MessageFile, MessageHead, Topic};
 use crate::log::content::{Content, Unpacker};
 use crate::log::{LogError, escape, list, source};
 
 /// Files of one recording that are open at a time.
 const OPEN: usize = 16;
-/// Messages of one file that are held back until none of an earlier time can come, and their bytes: some
-/// chunks of the usual size, whose messages may lie there in any order.
+/// Messages of one file that are held back until none of an earlier time can come, and their bytes: some chunks.
 const MAX_HELD_MESSAGES: usize = 4096;
 const HELD_BYTES: usize = 4 << 20;
 
-/// A message that was read ahead.
-struct Held {
-    head: MessageHead,
-    data: Vec<u8>,
-}
-
-/// One file of a recording, some messages ahead.
 struct OpenFile {
     path: PathBuf,
     file: Box<dyn MessageFile>,
-    /// In the order of their times, then of their places in the file.
-    held: VecDeque<Held>,
+    /// Messages that were read ahead, in the order of their times, then of their places in the file.
+    held: VecDeque<(MessageHead, Vec<u8>)>,
     held_bytes: usize,
     /// Memory that is used again.
     spare: Vec<Vec<u8>>,
@@ -40,7 +32,7 @@ struct OpenFile {
 
 impl OpenFile {
     /// Opens a file; `None` for one of no bytes, which a recorder that lost its power leaves behind.
-    fn open(path: &Path, wanted: &Wanted) -> Result<Option<Self>, LogError> {
+    fn open(path: &Path, wanted: &[String]) -> Result<Option<Self>, LogError> {
         let content = Content::open(path)?;
         if content.head().is_empty() {
             return Ok(None);
@@ -78,27 +70,24 @@ impl OpenFile {
                 Ok(Some(head)) => {
                     self.held_bytes += data.len();
                     // mostly the last one: messages lie nearly in the order of their times
-                    let not_later = |held: &Held| held.head.log_ns <= head.log_ns;
+                    let not_later = |(held, _): &(MessageHead, _)| held.log_ns <= head.log_ns;
                     let at = match self.held.back().is_none_or(not_later) {
                         true => self.held.len(),
                         false => self.held.partition_point(not_later),
                     };
-                    self.held.insert(at, Held { head, data });
+                    self.held.insert(at, (head, data));
                 }
             }
         }
         self.head = None;
-        let Some(next) = self.held.pop_front() else {
+        let Some((head, data)) = self.held.pop_front() else {
             return self.failed.take().map_or(Ok(()), Err);
         };
-        self.held_bytes -= next.data.len();
-        self.head = Some(next.head);
-        self.spare
-            .push(std::mem::replace(&mut self.data, next.data));
+        self.held_bytes -= data.len();
+        self.head = Some(head);
+        self.spare.push(std::mem::replace(&mut self.data, data));
         // A recorder of ROS 2 may compress each message by itself.
-        let topic = self
-            .head
-            .and_then(|head| self.file.topics().get(head.topic));
+        let topic = self.file.topics().get(head.topic);
         if topic.is_some_and(|topic| topic.schema.encoding == "cdr") {
             self.unpacker.unpack(&mut self.data);
         }
@@ -111,7 +100,7 @@ pub(super) struct MessageFiles {
     parts: Vec<OpenFile>,
     /// Files that are not open yet, the next one last.
     waiting: Vec<PathBuf>,
-    wanted: Wanted,
+    wanted: Vec<String>,
     /// The part whose message was handed out last.
     current: Option<usize>,
     /// What was said of files that broke off.
@@ -122,7 +111,6 @@ pub(super) struct MessageFiles {
     missing: Vec<String>,
 }
 
-/// A message of a recording.
 pub(super) struct Message<'r> {
     pub(super) path: &'r Path,
     pub(super) topic: &'r Topic,
@@ -132,7 +120,7 @@ pub(super) struct Message<'r> {
 
 impl MessageFiles {
     /// Opens files as one recording; later ones are opened when earlier ones are read.
-    pub(super) fn open(paths: &[PathBuf], wanted: Wanted) -> Result<Self, LogError> {
+    pub(super) fn open(paths: &[PathBuf], wanted: Vec<String>) -> Result<Self, LogError> {
         let mut recording = Self {
             parts: Vec::new(),
             waiting: paths.iter().rev().cloned().collect(),
@@ -162,13 +150,13 @@ impl MessageFiles {
                     self.broken.push((path, nothing));
                 }
             }
-            self.retire()?;
+            self.retire();
         }
         Ok(())
     }
 
     /// Lets go of files that have no further message.
-    fn retire(&mut self) -> Result<(), LogError> {
+    fn retire(&mut self) {
         for part in &self.parts {
             for topic in part.file.topics() {
                 if !self.seen.iter().any(|known| known.name == topic.name) {
@@ -176,41 +164,26 @@ impl MessageFiles {
                 }
             }
         }
-        let mut index = 0;
-        while let Some(part) = self.parts.get(index) {
-            if part.head.is_some() {
-                index += 1;
-                continue;
-            }
-            let part = self.parts.remove(index);
-            if let Some(broken) = part.file.broken() {
-                let broken = broken.clone();
-                self.broken.push((part.path, broken));
-            }
+        for part in self.parts.extract_if(.., |part| part.head.is_none()) {
+            let broken = part.file.broken().cloned();
+            self.broken.extend(broken.map(|broken| (part.path, broken)));
         }
-        Ok(())
     }
 
-    /// The next message; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Message<'_>>, LogError> {
         let current = self.current.take();
         if let Some(part) = current.and_then(|index| self.parts.get_mut(index)) {
             part.advance()?;
             if part.head.is_none() {
-                self.retire()?;
+                self.retire();
                 self.open_more()?;
             }
         }
         let heads = self.parts.iter().enumerate();
-        let earliest = heads
-            .filter_map(|(index, part)| Some((part.head?.log_ns, index)))
-            .min();
-        let Some((_, index)) = earliest else {
-            return Ok(None);
-        };
-        self.current = Some(index);
-        let part = &self.parts[index];
-        Ok(part.head.and_then(|head| {
+        let heads = heads.filter_map(|(index, part)| Some((index, part, part.head?)));
+        let earliest = heads.min_by_key(|(_, _, head)| head.log_ns);
+        self.current = earliest.map(|(index, ..)| index);
+        Ok(earliest.and_then(|(_, part, head)| {
             Some(Message {
                 path: &part.path,
                 topic: part.file.topics().get(head.topic)?,
@@ -220,8 +193,7 @@ impl MessageFiles {
         }))
     }
 
-    /// Where files break off, and parts that are not there, once the last message is read; `of` says how much
-    /// is used of what breaks off.
+    /// Where files break off, `of` saying how much is used of them, and parts that are not there.
     pub(super) fn breaks(&self, of: &str) -> Vec<String> {
         let broken = self.broken.iter().map(|(path, broken)| {
             format!(
@@ -235,10 +207,9 @@ impl MessageFiles {
             format!(
                 "metadata.yaml lists {} and the folder lacks {}: what was in it is lost",
                 list(self.missing.iter().map(String::as_str)),
-                if self.missing.len() == 1 {
-                    "it"
-                } else {
-                    "them"
+                match self.missing.len() {
+                    1 => "it",
+                    _ => "them",
                 },
             )
         });
@@ -270,17 +241,14 @@ fn missing_parts(paths: &[PathBuf]) -> Vec<String> {
     // a description of another recording says nothing of these files
     let own = paths.iter().any(|path| {
         let name = source::file_name(path);
-        listed
-            .iter()
-            .any(|one| Path::new(one).file_name() == Some(name.as_ref()))
+        let mut names = listed.iter().map(|one| Path::new(one).file_name());
+        names.any(|one| one == Some(name.as_ref()))
     });
     let gone = |one: &&str| {
         let plain = one.trim_end_matches(".zstd").trim_end_matches(".zst");
         let names = [(*one).to_owned(), plain.to_owned(), format!("{one}.zstd")];
-        !names
-            .iter()
-            .filter_map(|name| Path::new(name).file_name())
-            .any(|name| folder.join(name).exists())
+        let mut names = names.iter().filter_map(|name| Path::new(name).file_name());
+        !names.any(|name| folder.join(name).exists())
     };
     let gone = listed.iter().filter(|one| own && gone(one));
     gone.map(|one| (*one).to_owned()).collect()

@@ -1,25 +1,15 @@
 //! Where a number stands in a message: `header.stamp.sec`, `position[2]`, `position[name=arm]`, `/joints/0/q`.
 
-/// One step from a message to a number in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum PathStep {
     /// A field of a message; of an array, where it is a number, the element with that index.
     Field(String),
     /// An element of an array, counted from 0.
     Index(usize),
-    /// The element of an array whose index is that of `value` in the list of strings `list`.
-    ///
-    /// The list is looked for beside the array, then further out. Where an array holds messages,
-    /// the element whose own field `list` is `value`.
-    Named {
-        /// Field with the names.
-        list: String,
-        /// The name that is looked for.
-        value: String,
-    },
+    /// The element at the place of `value` in `list`, beside the array or further out, or whose own field `list` it is.
+    Named { list: String, value: String },
 }
 
-/// Where a number stands in a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct FieldPath {
     pub(crate) steps: Vec<PathStep>,
@@ -27,10 +17,7 @@ pub(crate) struct FieldPath {
 }
 
 impl FieldPath {
-    /// Reads a JSON pointer (RFC 6901) or a dotted path.
-    ///
-    /// Text that is neither is the name of a field, spaces and brackets included: any column name
-    /// of a text log is a path too.
+    /// Reads a JSON pointer (RFC 6901) or a dotted path; text that is neither is the name of a field.
     pub(crate) fn parse(text: &str) -> Self {
         let steps = match text.strip_prefix('/') {
             Some(pointer) => pointer
@@ -39,10 +26,13 @@ impl FieldPath {
                 .collect(),
             None => dotted(text).unwrap_or_else(|| vec![PathStep::Field(text.to_owned())]),
         };
-        Self {
-            steps,
-            text: text.to_owned(),
-        }
+        let text = text.to_owned();
+        Self { steps, text }
+    }
+
+    /// Fields of one path each.
+    pub(crate) fn each(paths: &[&str]) -> Vec<Vec<Self>> {
+        paths.iter().map(|path| vec![Self::parse(path)]).collect()
     }
 
     /// `FIELD[LIST=NAME]`: an element that is found by its name, whatever characters it has.
@@ -59,7 +49,6 @@ impl FieldPath {
         }
     }
 
-    /// As it was written.
     pub(crate) fn text(&self) -> &str {
         &self.text
     }
@@ -108,22 +97,21 @@ mod tests {
     #[test]
     fn dotted_paths_indices_names_and_pointers_are_read() {
         let steps = |text: &str| FieldPath::parse(text).steps;
-        assert_eq!(
-            steps("header.stamp.sec"),
-            [field("header"), field("stamp"), field("sec")]
-        );
-        assert_eq!(
-            steps("a[2].b"),
-            [field("a"), PathStep::Index(2), field("b")]
-        );
-        assert_eq!(
-            steps("position[name=left/arm 1]"),
-            FieldPath::named("position", "name", "left/arm 1").steps
-        );
-        assert_eq!(
-            steps("/joints/0/a~1b~0"),
-            [field("joints"), field("0"), field("a/b~")]
-        );
+        let named = FieldPath::named("position", "name", "left/arm 1").steps;
+        for (text, expected) in [
+            (
+                "header.stamp.sec",
+                ["header", "stamp", "sec"].map(field).to_vec(),
+            ),
+            ("a[2].b", vec![field("a"), PathStep::Index(2), field("b")]),
+            ("position[name=left/arm 1]", named),
+            (
+                "/joints/0/a~1b~0",
+                ["joints", "0", "a/b~"].map(field).to_vec(),
+            ),
+        ] {
+            assert_eq!(steps(text), expected, "{text}");
+        }
     }
 
     #[test]

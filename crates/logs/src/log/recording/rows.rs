@@ -1,26 +1,21 @@
 //! Messages of a recording as rows of channels in SI units.
 
-use std::fmt;
-use std::ops::Range;
 use std::path::PathBuf;
-use std::sync::Arc;
 
-use super::encoding::reader_of;
-use super::fields::{RobotFields, TimeSource};
-use super::message::{OpenedReader, Schema, Wanted};
+use super::encoding::Readers;
+use super::fields::{Parts, RobotFields, TimeSource};
+use super::message::refused;
 use super::pairing::{Pairing, Sample};
-use super::partial::Parts;
 use super::parts::{Message, MessageFiles};
 use super::sources::{Publisher, Publishers};
 use super::survey::{self, Choice};
 use super::value::Value;
 use crate::log::layout::{Channel, Layout};
-use crate::log::rows::LogRows;
+use crate::log::rows::{LogRows, counted};
 use crate::log::time::Stamped;
 use crate::log::{Block, LogError, escape, source};
 use cft_ident_core::number::{beyond, is_usable};
 
-/// The rows of a recording.
 pub(in crate::log) struct MessageRows {
     recording: MessageFiles,
     reading: SampleReader,
@@ -32,12 +27,11 @@ pub(in crate::log) struct MessageRows {
     names: Vec<String>,
 }
 
-/// How messages become samples.
 struct SampleReader {
     layout: Layout,
     fields: RobotFields,
     choice: Choice,
-    readers: Vec<(Arc<Schema>, OpenedReader)>,
+    readers: Readers,
     values: Vec<Value>,
     /// Messages that lack a joint or a time, and those that cannot be decoded, with the first reason.
     incomplete: LeftOut,
@@ -66,22 +60,8 @@ impl LeftOut {
         }
         self.count += 1;
     }
-
-    /// So many of them, the last, were not left out after all.
-    fn take_back(&mut self, count: u64) {
-        self.count = self.count.saturating_sub(count);
-    }
 }
 
-impl fmt::Debug for MessageRows {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("MessageRows")
-            .field("choice", &self.reading.choice)
-            .finish_non_exhaustive()
-    }
-}
-
-/// What a message holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Holds {
     Whole,
@@ -110,7 +90,7 @@ impl MessageRows {
         let channels = channels.map(|channel| channel.column.clone());
         let rows = Self {
             names: std::iter::once("t".to_owned()).chain(channels).collect(),
-            recording: MessageFiles::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, names)?,
             pairing,
             row: Sample::default(),
             previous: Sample::default(),
@@ -120,7 +100,7 @@ impl MessageRows {
                 layout: layout.clone(),
                 fields,
                 choice,
-                readers: Vec::new(),
+                readers: Readers::default(),
                 incomplete: LeftOut::default(),
                 unreadable: LeftOut::default(),
                 unstamped: 0,
@@ -171,17 +151,15 @@ impl LogRows for MessageRows {
             }
             let Some(message) = self.recording.next()? else {
                 let incomplete = &self.reading.incomplete;
-                return match self.reading.begun || incomplete.count == 0 {
-                    true => Ok(None),
-                    false => Err(LogError::Topic {
-                        file: source::shown_all(&self.reading.paths),
-                        problem: format!(
-                            "none of {} messages holds every channel of the robot (the first: {})",
-                            self.messages, incomplete.first
-                        ),
-                        remedy: "record again with that channel, or name another one in [log.joint] of the robot file".to_owned(),
-                    }),
-                };
+                if self.reading.begun || incomplete.count == 0 {
+                    return Ok(None);
+                }
+                let problem = format!(
+                    "none of {} messages holds every channel of the robot (the first: {})",
+                    self.messages, incomplete.first
+                );
+                let remedy = "record again with that channel, or name another one in [log.joint] of the robot file";
+                return Err(refused(&self.reading.paths, problem, remedy));
             };
             self.messages += 1;
             let Some(part) = self.reading.read(&message, &mut self.row)? else {
@@ -279,24 +257,19 @@ impl LogRows for MessageRows {
         let reading = &self.reading;
         out.extend(self.breaks());
         let topic = escape(&reading.choice.topic);
-        if reading.incomplete.count > 0 {
-            out.push(format!(
-                "{} of {} messages are left out: they lack a channel of the robot (the first: {})",
-                reading.incomplete.count, self.messages, reading.incomplete.first
-            ));
+        for (LeftOut { count, first }, why) in [
+            (&reading.incomplete, "lack a channel of the robot"),
+            (&reading.unreadable, "cannot be decoded"),
+        ] {
+            let messages = self.messages;
+            let text =
+                format!("of {messages} messages are left out: they {why} (the first: {first})");
+            out.extend(counted(*count, &text));
         }
-        if reading.unreadable.count > 0 {
-            out.push(format!(
-                "{} of {} messages are left out: they cannot be decoded (the first: {})",
-                reading.unreadable.count, self.messages, reading.unreadable.first
-            ));
-        }
-        if reading.unstamped > 0 {
-            out.push(format!(
-                "{} messages of {topic} are stamped 0, before their clock was set, and are left out",
-                reading.unstamped
-            ));
-        }
+        let unset = format!(
+            "messages of {topic} are stamped 0, before their clock was set, and are left out"
+        );
+        out.extend(counted(reading.unstamped, &unset));
         out.extend(self.contradictions().into_iter().map(|(_, text)| text));
         if let (Some(pairing), Some(torques)) = (&self.pairing, &reading.choice.torque_topic) {
             out.extend(pairing.warnings(&topic, &escape(torques)));
@@ -320,21 +293,18 @@ impl SampleReader {
         } = message;
         let (schema, topic) = (&topic.schema, &topic.name);
         let place = || format!("message {} of {}", head.number, escape(topic));
-        let known = self.readers.iter().position(|(s, _)| s == schema);
-        let reader_at = known.unwrap_or_else(|| {
-            let reader = reader_of(schema, &self.fields.paths);
-            self.readers.push((schema.clone(), reader));
-            self.readers.len() - 1
-        });
-        let read = match &mut self.readers[reader_at].1 {
-            Ok(reader) => reader.read(data, &mut self.values),
+        let read = match self.readers.of(schema, &self.fields.paths) {
+            Ok(reader) => reader.read(data, &mut self.values).map(|()| reader),
             Err(reason) => Err(reason.clone()),
         };
-        if let Err(reason) = read {
-            self.unreadable
-                .add(|| format!("{}: {}", place(), escape(&reason)));
-            return Ok(None);
-        }
+        let reader = match read {
+            Ok(reader) => reader,
+            Err(reason) => {
+                self.unreadable
+                    .add(|| format!("{}: {}", place(), escape(&reason)));
+                return Ok(None);
+            }
+        };
         let unset = self.choice.time == TimeSource::Header && !self.choice.zero_is_time;
         if unset && self.fields.header_ns(&self.values) == Some(0) {
             self.unstamped += 1;
@@ -347,40 +317,33 @@ impl SampleReader {
             Some(_) => Holds::Positions,
         };
         let of = usize::from(part == Holds::Torques);
-        let needed = match part {
-            Holds::Whole => self.fields.positions.start..self.fields.torques.end,
-            Holds::Positions => self.fields.positions.clone(),
-            Holds::Torques => self.fields.torques.clone(),
+        let fields = &self.fields;
+        let (q, tau) = (fields.positions.clone(), fields.torques.clone());
+        let (needed, q, tau) = match part {
+            Holds::Whole => (q.start..tau.end, q, tau),
+            Holds::Positions => (q.clone(), q, 0..0),
+            Holds::Torques => (tau.clone(), 0..0, tau),
         };
-        if let Ok(reader) = &self.readers[reader_at].1 {
-            let publisher = Publisher::of(head, &**reader);
-            let paths = &self.fields.paths[needed.clone()];
-            let numbers = &self.values[needed.clone()];
-            let at = (&*self.paths, &**topic);
-            if !self.publishers[of].take(publisher, at, paths, numbers)? {
-                return Ok(None);
-            }
+        let dq = match self.choice.velocities && part != Holds::Torques {
+            true => fields.velocities.clone(),
+            false => 0..0,
+        };
+        let publisher = Publisher::of(head, &**reader);
+        let (paths, numbers) = (&fields.paths[needed.clone()], &self.values[needed.clone()]);
+        let at = (&*self.paths, &**topic);
+        if !self.publishers[of].take(publisher, at, paths, numbers)? {
+            return Ok(None);
         }
         if self.values[needed].contains(&Value::Absent) {
-            let joined = self.parts[of].join(&self.fields, head, &mut self.values);
-            self.incomplete.take_back(joined);
+            let joined = self.parts[of].join(fields, head, &mut self.values);
+            // the last so many were not left out after all
+            self.incomplete.count = self.incomplete.count.saturating_sub(joined);
         }
-        let (fields, values) = (&self.fields, &self.values);
+        let values = &self.values;
         let Some(stamp) = fields.stamp(values, head, self.choice.time) else {
             self.incomplete.add(|| format!("{}: no time", place()));
             return Ok(None);
         };
-        let none = || 0..0;
-        let (q, tau, dq): (Range<usize>, Range<usize>, Range<usize>) = match part {
-            Holds::Whole => (
-                fields.positions.clone(),
-                fields.torques.clone(),
-                fields.velocities.clone(),
-            ),
-            Holds::Positions => (fields.positions.clone(), none(), fields.velocities.clone()),
-            Holds::Torques => (none(), fields.torques.clone(), none()),
-        };
-        let dq = if self.choice.velocities { dq } else { none() };
         let parts = [
             (q, &mut sample.q),
             (tau, &mut sample.tau),
@@ -393,12 +356,10 @@ impl SampleReader {
                 let read = values[index].number();
                 let measured = |x: &f64| x.is_finite() || fields.velocities.contains(&index);
                 let Some(number) = read.filter(measured) else {
-                    let reader = self.readers[reader_at].1.as_ref().ok();
-                    let uneven = reader.and_then(|reader| reader.uneven());
                     self.incomplete.add(|| {
                         let path = fields.paths[index].last();
                         let path = path.map_or("", |path| path.text());
-                        match uneven {
+                        match reader.uneven() {
                             Some(uneven) => format!("in {} {uneven}", place()),
                             None if read.is_some() => {
                                 format!("{} holds no number as `{}`", place(), escape(path))

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, OpenedReader, Schema, Wanted};
+use super::encoding::Readers;
+use super::message::{MessageHead, MessageReader};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
 use super::value::Value;
@@ -31,7 +31,6 @@ impl Publisher {
     }
 }
 
-/// The publishers of one topic that are known.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Publishers {
     /// Each with whether its messages are used.
@@ -56,25 +55,18 @@ impl Publishers {
             return Ok(true);
         }
         let known = |of: &Self| {
-            of.known
-                .iter()
-                .find(|(known, _)| *known == publisher)
-                .copied()
+            let mut known = of.known.iter();
+            known.find_map(|(known, used)| (*known == publisher).then_some(*used))
         };
-        let used = match known(self) {
-            Some((_, used)) => used,
-            None if self.known.is_empty() => {
-                self.known.push((publisher, true));
-                true
-            }
-            None => {
+        if known(self).is_none() {
+            if !self.known.is_empty() {
                 self.known = judged(paths, topic, fields)?;
-                if known(self).is_none() {
-                    self.known.push((publisher, true));
-                }
-                known(self).is_none_or(|(_, used)| used)
             }
-        };
+            if known(self).is_none() {
+                self.known.push((publisher, true));
+            }
+        }
+        let used = known(self).unwrap_or(true);
         if used {
             self.last = Some(publisher);
         } else {
@@ -89,18 +81,13 @@ impl Publishers {
     pub(super) fn left_out(&self, topic: &str) -> Option<(u64, String)> {
         let zeros = if self.zeros { ", all of them zero" } else { "" };
         let count = self.left_out;
-        (count > 0).then(|| {
-            (
-                count,
-                format!(
-                    "{count} messages of {topic} come from another publisher and contradict the others{zeros}: they are left out"
-                ),
-            )
-        })
+        let text = format!(
+            "{count} messages of {topic} come from another publisher and contradict the others{zeros}: they are left out"
+        );
+        (count > 0).then_some((count, text))
     }
 }
 
-/// What one publisher was seen to do.
 #[derive(Default)]
 struct Seen {
     messages: u64,
@@ -125,8 +112,7 @@ impl Seen {
         } else {
             self.moved |= self.first != numbers;
             for (step, (a, b)) in self.steps.iter_mut().zip(self.last.iter().zip(numbers)) {
-                let now = (a - b).abs();
-                *step = if now > *step { now } else { *step };
+                *step = step.max((a - b).abs());
             }
         }
         for ([low, high], x) in self.ranges.iter_mut().zip(numbers) {
@@ -138,14 +124,11 @@ impl Seen {
 
     /// The largest step of each number; infinite where it is no motion that was sampled finely.
     fn fine_steps(&self) -> Vec<f64> {
-        let pairs = self.steps.iter().zip(&self.ranges);
-        let fine = |(step, [low, high]): (&f64, &[f64; 2])| match *step
-            <= MAX_STEP_SHARE_OF_RANGE * (high - low)
-        {
-            true => *step,
-            false => f64::INFINITY,
+        let fine = |(step, [low, high]): (&f64, &[f64; 2])| {
+            let fine = *step <= MAX_STEP_SHARE_OF_RANGE * (high - low);
+            if fine { *step } else { f64::INFINITY }
         };
-        pairs.map(fine).collect()
+        self.steps.iter().zip(&self.ranges).map(fine).collect()
     }
 }
 
@@ -205,19 +188,12 @@ fn through(
     fields: &[Vec<FieldPath>],
     take: &mut dyn FnMut(Publisher, &[f64]),
 ) -> Result<(), LogError> {
-    let names = vec![topic.to_owned()];
-    let mut recording = MessageFiles::open(paths, Wanted { names })?;
-    let mut readers: Vec<(Schema, OpenedReader)> = Vec::new();
+    let mut recording = MessageFiles::open(paths, vec![topic.to_owned()])?;
+    let mut readers = Readers::default();
     let mut values = vec![Value::Absent; fields.len()];
     let mut numbers = Vec::new();
     while let Some(message) = recording.next()? {
-        let schema = &*message.topic.schema;
-        let known = readers.iter().position(|(known, _)| known == schema);
-        let at = known.unwrap_or_else(|| {
-            readers.push((schema.clone(), reader_of(schema, fields)));
-            readers.len() - 1
-        });
-        if let Ok(reader) = &mut readers[at].1
+        if let Ok(reader) = readers.of(&message.topic.schema, fields)
             && reader.read(message.data, &mut values).is_ok()
         {
             numbers.clear();
@@ -228,8 +204,7 @@ fn through(
     Ok(())
 }
 
-/// Whether a header's stamp of 0 is a time: the clock of a simulation begins there, while a driver that has no
-/// clock yet stamps several messages with 0, or goes on far from it.
+/// Stamps of headers, of which 0 is a time where a simulation begins there, and none of a driver without a clock yet.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct ZeroStamps {
     zeros: u32,

@@ -5,11 +5,11 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Wanted};
+use super::message::{MessageHead, MessageReader, Schema};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
 use super::sources::ZeroStamps;
-use super::value::Value;
+use super::value::{Value, stamp_ns};
 use crate::log::{LogError, escape};
 
 /// Messages that are looked at for topics and their names.
@@ -33,7 +33,6 @@ const MIN_SHARED_INSTANTS: f64 = 0.8;
 pub(super) const ARRAYS: [(&str, &str); 3] =
     [("position", "q"), ("effort", "tau"), ("velocity", "dq")];
 
-/// What a topic was found to hold.
 pub(super) struct FoundTopic {
     pub topic: String,
     pub schema: Schema,
@@ -44,10 +43,8 @@ pub(super) struct FoundTopic {
     /// Which arrays are filled.
     pub arrays: [bool; 3],
     pub stamped: bool,
-    /// Whether a stamp of 0 is a time.
-    pub zero_is_time: bool,
+    pub stamps: ZeroStamps,
     looked_at: u32,
-    zeros: ZeroStamps,
     /// Instants of its messages [ns], by the header's stamp where that is set.
     instants: HashSet<i128>,
 }
@@ -60,19 +57,12 @@ pub(super) struct Survey {
     pub found: Vec<FoundTopic>,
     pub others: Vec<String>,
     pub times: Times,
-    /// Why a recording whose topics are of that kind holds no joint state, where none was found.
-    pub cause: Option<Cause>,
+    /// Why a recording whose topics are of that kind holds no joint state, and what to do, where none was found.
+    pub cause: Option<(String, &'static str)>,
 }
 
-/// What keeps the joint states of a recording from being read, and what to do.
-pub(super) struct Cause {
-    pub problem: String,
-    pub remedy: &'static str,
-}
-
-/// Looks at the beginning of a recording.
 pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
-    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut recording = MessageFiles::open(paths, Vec::new())?;
     let mut found: Vec<FoundTopic> = Vec::new();
     let mut times = None;
     let mut messages = 0;
@@ -103,9 +93,8 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
                     most: 0,
                     arrays: [false; 3],
                     stamped: false,
-                    zero_is_time: true,
+                    stamps: ZeroStamps::default(),
                     looked_at: 0,
-                    zeros: ZeroStamps::default(),
                     instants: HashSet::new(),
                 });
                 found.len() - 1
@@ -121,9 +110,6 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
         if let Err(reason) = found[at].look(&message.head, message.data) {
             unreadable.get_or_insert((found[at].topic.clone(), reason));
         }
-    }
-    for one in &mut found {
-        one.zero_is_time = one.zeros.are_times();
     }
     let cause = cause(&recording, &found, unreadable);
     found.retain(|one| !one.names.is_empty() && one.arrays.contains(&true));
@@ -145,17 +131,18 @@ fn cause(
     recording: &MessageFiles,
     found: &[FoundTopic],
     unreadable: Option<(String, String)>,
-) -> Option<Cause> {
+) -> Option<(String, &'static str)> {
     const AGAIN: &str = "copy it again from where it was recorded, or record again";
     if let Some((topic, reason)) = unreadable {
         let (topic, reason) = (escape(&topic), escape(&reason));
-        return Some(Cause {
-            remedy: match reason.contains("definition") || reason.contains("encoding") {
-                true => "record with its message definitions, as `ros2 bag record` does",
-                false => AGAIN,
-            },
-            problem: format!("messages of {topic} cannot be read: {reason}"),
-        });
+        let remedy = match reason.contains("definition") || reason.contains("encoding") {
+            true => "record with its message definitions, as `ros2 bag record` does",
+            false => AGAIN,
+        };
+        return Some((
+            format!("messages of {topic} cannot be read: {reason}"),
+            remedy,
+        ));
     }
     let mut declared = recording.seen.iter();
     let declared = declared.find(|topic| is_joint_state(&topic.schema));
@@ -164,24 +151,20 @@ fn cause(
         && let Some((_, broken)) = recording.broken.first()
     {
         let (of, reason) = (of.unwrap_or_default(), escape(&broken.reason));
-        return Some(Cause {
-            problem: format!(
-                "holds no joint states{of} before it breaks off {}: {reason}",
-                broken.place
-            ),
-            remedy: AGAIN,
-        });
+        let place = &broken.place;
+        let problem = format!("holds no joint states{of} before it breaks off {place}: {reason}");
+        return Some((problem, AGAIN));
     }
     let of = of?;
     Some(match found.is_empty() {
-        true => Cause {
-            problem: format!("holds no message{of}"),
-            remedy: "record again while the robot moves",
-        },
-        false => Cause {
-            problem: format!("the messages{of} name no joint, or hold no number of one"),
-            remedy: "record again with names, positions and efforts filled in",
-        },
+        true => (
+            format!("holds no message{of}"),
+            "record again while the robot moves",
+        ),
+        false => (
+            format!("the messages{of} name no joint, or hold no number of one"),
+            "record again with names, positions and efforts filled in",
+        ),
     })
 }
 
@@ -193,35 +176,28 @@ fn is_joint_state(schema: &Schema) -> bool {
 
 /// What is asked of a message to see what it holds; the last makes the decoder look at the names.
 fn probes() -> Vec<Vec<FieldPath>> {
-    let mut fields: Vec<Vec<FieldPath>> = ARRAYS
-        .iter()
-        .map(|(array, _)| vec![FieldPath::parse(&format!("{array}[0]"))])
-        .collect();
-    fields.push(vec![
-        FieldPath::parse("header.stamp.sec"),
-        FieldPath::parse("header.stamp.secs"),
-    ]);
-    fields.push(vec![
-        FieldPath::parse("header.stamp.nanosec"),
-        FieldPath::parse("header.stamp.nsecs"),
-    ]);
-    let named = ARRAYS
-        .iter()
-        .map(|(array, _)| FieldPath::named(array, "name", ""));
-    fields.extend(named.map(|path| vec![path]));
+    let mut fields = FieldPath::each(&["position[0]", "effort[0]", "velocity[0]"]);
+    fields.extend(header_stamp());
+    fields.extend(ARRAYS.map(|(array, _)| vec![FieldPath::named(array, "name", "")]));
     fields
+}
+
+/// Seconds and nanoseconds of a header's stamp, as ROS 2 and ROS 1 name them.
+pub(super) fn header_stamp() -> [Vec<FieldPath>; 2] {
+    let paths = [
+        ["header.stamp.sec", "header.stamp.secs"],
+        ["header.stamp.nanosec", "header.stamp.nsecs"],
+    ];
+    paths.map(|either| either.map(FieldPath::parse).to_vec())
 }
 
 impl FoundTopic {
     fn look(&mut self, head: &MessageHead, data: &[u8]) -> Result<(), String> {
         let mut values = [Value::Absent; 8];
         self.probe.read(data, &mut values)?;
-        let stamp = match (values[3].integer(), values[4].integer()) {
-            (Some(s), Some(ns)) => Some(s * 1_000_000_000 + ns),
-            _ => None,
-        };
+        let stamp = stamp_ns(values[3], values[4]);
         if let Some(ns) = stamp {
-            self.zeros.take(ns);
+            self.stamps.take(ns);
         }
         let stamp = stamp.filter(|ns| *ns != 0);
         self.instants
@@ -244,7 +220,6 @@ impl FoundTopic {
         Ok(())
     }
 
-    /// Whether its names are those of columns.
     pub(super) fn is_columns(&self) -> bool {
         self.topic.trim_matches('/') == COLUMNS
     }
@@ -270,20 +245,18 @@ impl FoundTopic {
 }
 
 /// The topic whose columns have no name of a topic before them.
-fn main_topic(found: &[FoundTopic]) -> Option<usize> {
+fn main_topic(found: &[FoundTopic]) -> usize {
     let last = |one: &FoundTopic| one.topic.rsplit('/').next() == Some(JOINTS);
     let both = |one: &FoundTopic| one.arrays[0] && one.arrays[1];
     let named = found.iter().position(last);
-    let named = named.or_else(|| found.iter().position(both));
-    named.or_else(|| (!found.is_empty()).then_some(0))
+    named.or_else(|| found.iter().position(both)).unwrap_or(0)
 }
 
-/// Indices of topics that are of one machine, the main one of each first, and the recording's main
-/// topic in the first group.
+/// Topics that are of one machine, the main one of each first, and the recording's main topic in the first group.
 pub(super) fn groups(found: &[FoundTopic]) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..found.len()).collect();
     let main = main_topic(found);
-    order.sort_by_key(|k| (Some(*k) != main, found[*k].is_columns()));
+    order.sort_by_key(|k| (*k != main, found[*k].is_columns()));
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for k in order {
         let of = |group: &&mut Vec<usize>| {
@@ -315,9 +288,7 @@ pub(in crate::log) fn state_groups(paths: &[PathBuf]) -> Result<Vec<StateGroup>,
     let found = survey(paths)?.found;
     let of = |group: &Vec<usize>| StateGroup {
         topic: found[group[0]].topic.clone(),
-        with: (group[1..].iter())
-            .map(|k| found[*k].topic.clone())
-            .collect(),
+        with: (group[1..].iter().map(|k| found[*k].topic.clone())).collect(),
         joints: found[group[0]].names.clone(),
         holds: std::array::from_fn(|i| group.iter().any(|k| found[*k].arrays[i])),
     };

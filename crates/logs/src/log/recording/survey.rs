@@ -3,23 +3,21 @@
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::fields::{RobotFields, TimeSource};
-use super::message::{MessageHead, MessageReader, Uneven, Wanted};
-use super::partial::Parts;
+use super::fields::{Parts, RobotFields, TimeSource};
+use super::message::{MessageHead, OpenedReader, Uneven, refused};
 use super::parts::MessageFiles;
 use super::sources::ZeroStamps;
 use super::value::Value;
+use crate::log::LogError;
 use crate::log::layout::Layout;
-use crate::log::names::{escape, list, nearest};
+use crate::log::names::{escape, list, nearest, suggestion};
 use crate::log::section::Stamp;
-use crate::log::{LogError, source};
 
 /// Messages of a topic that are looked at before it is given up.
 const TRIES: u32 = 200;
 /// Messages that are looked at for further topics once the channels are found.
 const FURTHER: u32 = 2000;
 
-/// The topics that are read, and how.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Choice {
     /// Topic of the positions; of the torques where there are no positions to read.
@@ -27,31 +25,20 @@ pub(super) struct Choice {
     /// Topic of the torques, where it is another one.
     pub(super) torque_topic: Option<String>,
     pub(super) time: TimeSource,
-    /// Whether messages hold velocities of all joints.
     pub(super) velocities: bool,
     /// Whether a stamp of 0 in a header is a time.
     pub(super) zero_is_time: bool,
-    /// What was decided and the user should know.
     pub(super) notes: Vec<String>,
 }
 
-/// What the messages of one topic turned out to hold.
 struct TopicCandidate {
     name: String,
     kind: String,
-    reader: Result<Box<dyn MessageReader>, String>,
+    reader: OpenedReader,
     tries: u32,
-    positions: bool,
-    torques: bool,
-    /// Both in one message.
-    both: bool,
-    /// No message with the positions was without the velocities.
-    velocities: bool,
+    shown: Shown,
     /// Which velocities were a number at least once.
     measured: Vec<bool>,
-    header: bool,
-    time: bool,
-    /// Stamps of the headers.
     stamps: ZeroStamps,
     /// Fields of messages of one instant, each of which holds some of the joints.
     parts: Parts,
@@ -62,6 +49,19 @@ struct TopicCandidate {
     names: Vec<String>,
 }
 
+/// What messages of a topic were seen to hold.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct Shown {
+    positions: bool,
+    torques: bool,
+    /// Both in one message.
+    both: bool,
+    /// No message with the positions was without the velocities.
+    velocities: bool,
+    header: bool,
+    time: bool,
+}
+
 impl TopicCandidate {
     /// Looks at one message; whether it shows anything new.
     fn look(
@@ -70,7 +70,7 @@ impl TopicCandidate {
         fields: &RobotFields,
         values: &mut [Value],
     ) -> bool {
-        let before = self.shown();
+        let before = self.shown;
         self.tries += 1;
         let Ok(reader) = &mut self.reader else {
             return false;
@@ -93,57 +93,45 @@ impl TopicCandidate {
         if let Some(ns) = fields.header_ns(values) {
             self.stamps.take(ns);
         }
-        let (header, time) = (fields.has_header(values), fields.has_time(values));
+        let shown = &mut self.shown;
+        shown.header |= fields.has_header(values);
+        shown.time |= fields.has_time(values);
         self.parts.join(fields, head, values);
         // A robot without positions (or torques) to read finds them everywhere.
         let all = |range| RobotFields::all(values, range) || range.is_empty();
         let (q, tau) = (all(&fields.positions), all(&fields.torques));
         if q {
-            let first = !self.positions;
             // one that is NaN is no measurement, as a driver without velocities publishes them
             let own = &values[fields.velocities.clone()];
             self.measured.resize(own.len(), false);
             for (measured, value) in self.measured.iter_mut().zip(own) {
                 *measured |= value.number().is_some_and(f64::is_finite);
             }
-            self.velocities =
-                (self.velocities || first) && RobotFields::all(values, &fields.velocities);
+            shown.velocities = (shown.velocities || !shown.positions)
+                && RobotFields::all(values, &fields.velocities);
         }
-        self.positions |= q && !fields.positions.is_empty();
-        self.torques |= tau && !fields.torques.is_empty();
-        self.both |= q && tau;
-        self.header |= header;
-        self.time |= time;
-        before != self.shown()
-    }
-
-    fn shown(&self) -> [bool; 6] {
-        let holds = [self.positions, self.torques, self.both];
-        let also = [self.velocities, self.header, self.time];
-        [holds[0], holds[1], holds[2], also[0], also[1], also[2]]
+        shown.positions |= q && !fields.positions.is_empty();
+        shown.torques |= tau && !fields.torques.is_empty();
+        shown.both |= q && tau;
+        before != *shown
     }
 }
 
 /// Reads the beginning of a recording, and chooses.
 pub(super) fn choose(paths: &[PathBuf], layout: &Layout) -> Result<(Choice, Layout), LogError> {
-    let fields = RobotFields::new(layout);
-    let found = survey(paths, layout, &fields)?;
-    let chosen = pick(&found, layout, &fields);
-    if let (Err(_), Some(other)) = (&chosen, &layout.otherwise) {
-        let other_fields = RobotFields::new(other);
-        let others = survey(paths, other, &other_fields)?;
-        if let Ok(choice) = pick(&others, other, &other_fields) {
-            return Ok((choice, (**other).clone()));
-        }
+    let by = |layout: &Layout| {
+        let fields = RobotFields::new(layout);
+        let found = survey(paths, layout, &fields)?;
+        Ok::<_, LogError>(pick(&found, layout, &fields))
+    };
+    let chosen = by(layout)?;
+    if let (Err(_), Some(other)) = (&chosen, &layout.otherwise)
+        && let Ok(choice) = by(other)?
+    {
+        return Ok((choice, (**other).clone()));
     }
-    match chosen {
-        Ok(choice) => Ok((choice, layout.clone())),
-        Err((problem, remedy)) => Err(LogError::Topic {
-            file: source::shown_all(paths),
-            problem,
-            remedy,
-        }),
-    }
+    let choice = chosen.map_err(|(problem, remedy)| refused(paths, problem, remedy))?;
+    Ok((choice, layout.clone()))
 }
 
 /// Looks at the messages of every topic until the channels are found and no other topic has them.
@@ -152,7 +140,7 @@ fn survey(
     layout: &Layout,
     fields: &RobotFields,
 ) -> Result<Vec<TopicCandidate>, LogError> {
-    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut recording = MessageFiles::open(paths, Vec::new())?;
     let mut found: Vec<TopicCandidate> = Vec::new();
     let mut values = vec![Value::Absent; fields.paths.len()];
     let (mut complete, mut further) = (false, 0);
@@ -165,13 +153,8 @@ fn survey(
                     kind: message.topic.schema.name.clone(),
                     reader: reader_of(&message.topic.schema, &fields.paths),
                     tries: 0,
-                    positions: false,
-                    torques: false,
-                    both: false,
-                    velocities: false,
+                    shown: Shown::default(),
                     measured: Vec::new(),
-                    header: false,
-                    time: false,
                     stamps: ZeroStamps::default(),
                     parts: Parts::default(),
                     uneven: None,
@@ -197,27 +180,21 @@ fn survey(
     }
     if found.is_empty() {
         if let Some((path, broken)) = recording.broken.first() {
-            return Err(LogError::Topic {
-                file: source::shown(path),
-                problem: format!(
-                    "holds no message before it breaks off {}: {}",
-                    broken.place,
-                    escape(&broken.reason)
-                ),
-                remedy: "copy it again from where it was recorded, or record again".to_owned(),
-            });
+            let (place, reason) = (&broken.place, escape(&broken.reason));
+            return Err(refused(
+                std::slice::from_ref(path),
+                format!("holds no message before it breaks off {place}: {reason}"),
+                "copy it again from where it was recorded, or record again",
+            ));
         }
-        return Err(LogError::Topic {
-            file: source::shown_all(paths),
-            problem: "holds no message".to_owned(),
-            remedy: match recording.seen.is_empty() {
-                true => "record again, with the topics of the robot".to_owned(),
-                false => format!(
-                    "its topics are {}; record again while the robot moves",
-                    list(recording.seen.iter().map(|topic| topic.name.as_str()))
-                ),
-            },
-        });
+        let remedy = match recording.seen.is_empty() {
+            true => "record again, with the topics of the robot".to_owned(),
+            false => format!(
+                "its topics are {}; record again while the robot moves",
+                list(recording.seen.iter().map(|topic| topic.name.as_str()))
+            ),
+        };
+        return Err(refused(paths, "holds no message", remedy));
     }
     Ok(found)
 }
@@ -252,7 +229,7 @@ fn pick(
     let both = match separate {
         true => None,
         false => one(
-            &|c| c.both && is(c, &asked.topic),
+            &|c| c.shown.both && is(c, &asked.topic),
             key,
             match fields.torques.is_empty() {
                 true if layout.temperatures => "temperatures",
@@ -264,12 +241,10 @@ fn pick(
     let (first, second) = match both {
         Some(candidate) => (candidate, None),
         None => {
-            let q = one(&|c| c.positions && is(c, &asked.topic), key, "positions")?;
-            let tau = one(
-                &|c| c.torques && is(c, &asked.torque_topic),
-                "torque_topic",
-                "torques",
-            )?;
+            let q = |c: &TopicCandidate| c.shown.positions && is(c, &asked.topic);
+            let tau = |c: &TopicCandidate| c.shown.torques && is(c, &asked.torque_topic);
+            let q = one(&q, key, "positions")?;
+            let tau = one(&tau, "torque_topic", "torques")?;
             match (q, tau) {
                 (Some(q), Some(tau)) => (q, Some(tau)),
                 (q, _) => return Err(missing(found, layout, fields, q)),
@@ -281,42 +256,44 @@ fn pick(
         topic: first.name.clone(),
         torque_topic: second.map(|c| c.name.clone()),
         time,
-        velocities: first.velocities && !first.measured.contains(&false),
+        velocities: first.shown.velocities && !first.measured.contains(&false),
         zero_is_time: first.stamps.are_times() && second.is_none_or(|c| c.stamps.are_times()),
         notes,
     })
 }
 
-/// Which time of the messages of one or two topics counts, and what the user should know of it; else
-/// what is wrong and what to do.
+/// Which time of the messages counts, and a note on it; else what is wrong and what to do.
 fn time_source(
     first: &TopicCandidate,
     second: Option<&TopicCandidate>,
     asked: Stamp,
 ) -> Result<(TimeSource, Vec<String>), (String, String)> {
-    let all = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) && second.is_none_or(holds);
-    let any = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) || second.is_some_and(holds);
-    let source = match RobotFields::asked(asked) {
-        Some(TimeSource::Header) if !all(&|c| c.header) => {
+    let shown = [
+        first.shown,
+        second.map_or(first.shown, |second| second.shown),
+    ];
+    let headers = shown.map(|shown| shown.header);
+    let source = match asked {
+        Stamp::Header if headers.contains(&false) => {
             let topic = escape(&first.name);
             return Err((
                 format!("messages of {topic} have no stamp in a header"),
                 "set `stamp = \"log\"` in [log] of the robot file".to_owned(),
             ));
         }
-        Some(asked) => asked,
-        None if all(&|c| c.time) => TimeSource::Field,
-        None if all(&|c| c.header) => TimeSource::Header,
-        None if any(&|c| c.header) => {
+        Stamp::Header => TimeSource::Header,
+        Stamp::Publish => TimeSource::Publish,
+        Stamp::Auto if shown.iter().all(|shown| shown.time) => TimeSource::Field,
+        Stamp::Auto if !headers.contains(&false) => TimeSource::Header,
+        Stamp::Auto if headers.contains(&true) => {
             let note = "only one of the two topics has stamps in headers: the times of recording are used for both, delays of transport included";
             return Ok((TimeSource::Log, vec![note.to_owned()]));
         }
-        None => TimeSource::Log,
+        Stamp::Auto | Stamp::Log => TimeSource::Log,
     };
     Ok((source, Vec::new()))
 }
 
-/// Why no topic can be used.
 fn missing(
     found: &[TopicCandidate],
     layout: &Layout,
@@ -332,14 +309,10 @@ fn missing(
     if let Some(name) = wanted.as_ref().or(asked.topic.as_ref())
         && !found.iter().any(|c| c.name == *name)
     {
-        let near = nearest(name, topics()).map(|near| format!("did you mean `{}`? ", escape(near)));
+        let near = suggestion(name, topics());
         return (
             format!("no message of topic `{}`", escape(name)),
-            format!(
-                "{}the topics are {}",
-                near.unwrap_or_default(),
-                list(topics())
-            ),
+            format!("{near}the topics are {}", list(topics())),
         );
     }
     // The topic that comes nearest to what is wanted.
@@ -349,22 +322,18 @@ fn missing(
         None => (&fields.positions, &layout.positions, layout.what()),
     };
     let count = |c: &TopicCandidate| c.missing[range.clone()].iter().filter(|m| !**m).count();
-    let best = found
-        .iter()
-        .filter(|c| wanted.as_ref().is_none_or(|name| *name == c.name))
-        .max_by_key(|c| (c.reader.is_ok(), count(c), c.kind.contains("JointState")));
-    let Some(best) = best else {
-        return (
-            "no topic holds the robot's channels".to_owned(),
-            String::new(),
-        );
+    let meant = |c: &&TopicCandidate| wanted.as_ref().is_none_or(|name| *name == c.name);
+    let nearness =
+        |c: &&TopicCandidate| (c.reader.is_ok(), count(c), c.kind.contains("JointState"));
+    let Some(best) = found.iter().filter(meant).max_by_key(nearness) else {
+        let problem = "no topic holds the robot's channels";
+        return (problem.to_owned(), String::new());
     };
+    let (topic, kind) = (escape(&best.name), escape(&best.kind));
     if let Err(reason) = &best.reader {
         return (
             format!(
-                "messages of {} ({}) cannot be read: {}",
-                escape(&best.name),
-                escape(&best.kind),
+                "messages of {topic} ({kind}) cannot be read: {}",
                 escape(reason)
             ),
             format!("the topics are {}", list(topics())),
@@ -374,7 +343,7 @@ fn missing(
         && range.clone().any(|index| best.missing[index])
     {
         return (
-            format!("in messages of {}, {uneven}", escape(&best.name)),
+            format!("in messages of {topic}, {uneven}"),
             format!(
                 "where it is known whose they are, say so by their places, `{what} = \"{}[0]\"`, .. in [log.joint] of the robot file; else record again with one number for each name",
                 escape(&uneven.array)
@@ -387,12 +356,9 @@ fn missing(
     let column = channels.get(index).map_or("", |c| c.column.as_str());
     // the names of a message of temperatures may be those of the joints too
     if !layout.temperatures && lacking.is_some() && best.names.iter().any(|name| name == joint) {
+        let joint = escape(joint);
         return (
-            format!(
-                "messages of {} name {}, and hold no number as its {what}",
-                escape(&best.name),
-                escape(joint)
-            ),
+            format!("messages of {topic} name {joint}, and hold no number as its {what}"),
             "see what publishes them: NaN and null are no numbers; record again".to_owned(),
         );
     }
@@ -405,16 +371,11 @@ fn missing(
             escape(column),
             escape(joint)
         ),
-        None => format!(
-            "no message of {} holds the {what}s of all joints at once",
-            escape(&best.name)
-        ),
+        None => format!("no message of {topic} holds the {what}s of all joints at once"),
     };
     let remedy = format!(
-        "{}{} ({}) holds {}: name the joint as `name`, or the field as `{what}`, in [log.joint] of the robot file",
+        "{}{topic} ({kind}) holds {}: name the joint as `name`, or the field as `{what}`, in [log.joint] of the robot file",
         near.unwrap_or_default(),
-        escape(&best.name),
-        escape(&best.kind),
         list(best.names.iter().map(String::as_str)),
     );
     (problem, remedy)

@@ -16,7 +16,7 @@ pub enum Value {
 
 impl Value {
     /// The number; `None` where it is absent.
-    pub fn number(self) -> Option<f64> {
+    pub(crate) fn number(self) -> Option<f64> {
         match self {
             Self::Absent => None,
             Self::Int(value) => Some(value as f64),
@@ -26,11 +26,16 @@ impl Value {
     }
 
     /// The number, where it is whole and stored as such.
-    pub fn integer(self) -> Option<i128> {
+    pub(crate) fn integer(self) -> Option<i128> {
         match self {
             Self::Int(value) => Some(i128::from(value)),
             Self::Unsigned(value) => Some(i128::from(value)),
             Self::Absent | Self::Float(_) => None,
         }
     }
+}
+
+/// Seconds and nanoseconds as one number \[ns\]; `None` where one of them is no whole number.
+pub(super) fn stamp_ns(seconds: Value, nanoseconds: Value) -> Option<i128> {
+    Some(seconds.integer()? * 1_000_000_000 + nanoseconds.integer()?)
 }

@@ -21,10 +21,8 @@ pub(super) fn is_json(head: &[u8]) -> bool {
     )
 }
 
-/// The rows of one file.
 struct JsonTable<R> {
     reader: R,
-    names: Vec<String>,
     /// JSON pointers of the columns.
     places: Vec<String>,
     /// The first object, read for its names.
@@ -32,15 +30,8 @@ struct JsonTable<R> {
     object: Vec<u8>,
 }
 
-/// Opens a file of JSON objects.
 pub(super) fn open(file: &OpenFile) -> io::Result<TableText> {
-    let mut table = JsonTable {
-        reader: BufReader::new(file.from(0)),
-        names: Vec::new(),
-        places: Vec::new(),
-        first: None,
-        object: Vec::new(),
-    };
+    let mut table = JsonTable::new(BufReader::new(file.from(0)));
     table.first = table.next()?;
     let mut leaves = Vec::new();
     for (key, value) in table.first.iter().flat_map(Value::as_object).flatten() {
@@ -52,8 +43,9 @@ pub(super) fn open(file: &OpenFile) -> io::Result<TableText> {
             leaves.len()
         )));
     }
-    (table.names, table.places) = leaves.into_iter().unzip();
-    Ok(TableText::new(Box::new(table), Vec::new()))
+    let names: Vec<String>;
+    (names, table.places) = leaves.into_iter().unzip();
+    Ok(TableText::new(&names, table, Vec::new()))
 }
 
 fn pointed(place: &str, key: &str) -> String {
@@ -78,7 +70,15 @@ fn list(value: &Value, name: String, place: String, out: &mut Vec<(String, Strin
 }
 
 impl<R: BufRead> JsonTable<R> {
-    /// The next object; none at the end.
+    fn new(reader: R) -> Self {
+        Self {
+            reader,
+            places: Vec::new(),
+            first: None,
+            object: Vec::new(),
+        }
+    }
+
     fn next(&mut self) -> io::Result<Option<Value>> {
         self.object.clear();
         let (mut depth, mut quoted, mut escaped) = (0_usize, false, false);
@@ -117,27 +117,21 @@ impl<R: BufRead> JsonTable<R> {
                 ));
             }
             if depth == 0 && !self.object.is_empty() {
-                let object = parsed(&self.object);
-                return object
-                    .map(Some)
-                    .map_err(|error| damaged(&format!("a JSON object cannot be read: {error}")));
+                let no_json = |error| damaged(&format!("a JSON object cannot be read: {error}"));
+                return parsed(&self.object).map(Some).map_err(no_json);
             }
         }
     }
 }
 
 impl<R: BufRead + Send> Table for JsonTable<R> {
-    fn names(&self) -> &[String] {
-        &self.names
-    }
-
     fn row(&mut self, line: &mut Vec<u8>) -> io::Result<bool> {
         let object = match self.first.take() {
-            Some(first) => first,
-            None => match self.next()? {
-                Some(object) => object,
-                None => return Ok(false),
-            },
+            Some(first) => Some(first),
+            None => self.next()?,
+        };
+        let Some(object) = object else {
+            return Ok(false);
         };
         for (k, place) in self.places.iter().enumerate() {
             if k > 0 {
@@ -161,13 +155,7 @@ mod tests {
     use super::*;
 
     fn rows(text: &str) -> Vec<Value> {
-        let mut table = JsonTable {
-            reader: text.as_bytes(),
-            names: Vec::new(),
-            places: Vec::new(),
-            first: None,
-            object: Vec::new(),
-        };
+        let mut table = JsonTable::new(text.as_bytes());
         std::iter::from_fn(|| table.next().unwrap()).collect()
     }
 
@@ -175,10 +163,8 @@ mod tests {
     fn objects_are_rows_whatever_parts_them() {
         let lines = "{\"t\": 0, \"name\": \"}{\\\"\"}\n{\"t\": NaN, \"q\": [1, {\"x\": 2}]}\n";
         let found = rows(lines);
-        assert_eq!(
-            found,
-            rows(&format!("[{}]", lines.trim().replace('\n', ",")))
-        );
+        let listed = format!("[{}]", lines.trim().replace('\n', ","));
+        assert_eq!(found, rows(&listed));
         assert_eq!((found.len(), &found[0]["t"]), (2, &Value::from(0)));
         assert!(found[1]["t"].is_null());
         let mut leaves = Vec::new();

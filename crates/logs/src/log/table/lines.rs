@@ -5,16 +5,11 @@ use std::io::{self, Read, Write};
 /// Columns that a table may have.
 pub(super) const COLUMNS: usize = 4096;
 
-/// A table, read row by row.
 pub(super) trait Table: Send {
-    /// Names of the columns.
-    fn names(&self) -> &[String];
-
     /// Appends the fields of the next row, parted by commas; false at the end.
     fn row(&mut self, line: &mut Vec<u8>) -> io::Result<bool>;
 }
 
-/// A table as text.
 pub(in crate::log) struct TableText {
     table: Box<dyn Table>,
     line: Vec<u8>,
@@ -25,12 +20,12 @@ pub(in crate::log) struct TableText {
 }
 
 impl TableText {
-    pub(super) fn new(table: Box<dyn Table>, notes: Vec<String>) -> Self {
-        let names: Vec<String> = table.names().iter().map(|name| quoted(name)).collect();
+    pub(super) fn new(names: &[String], table: impl Table + 'static, notes: Vec<String>) -> Self {
+        let names: Vec<String> = names.iter().map(|name| quoted(name)).collect();
         Self {
             line: (names.join(",") + "\n").into_bytes(),
             taken: 0,
-            table,
+            table: Box::new(table),
             notes,
         }
     }

@@ -3,7 +3,6 @@
 use std::iter::Peekable;
 use std::str::Chars;
 
-/// A value.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Literal {
     Text(String),
@@ -23,7 +22,6 @@ impl Literal {
         value(&mut text.chars().peekable(), DEPTH)
     }
 
-    /// The value of a key.
     pub(super) fn get(&self, key: &str) -> Option<&Self> {
         let Self::Dictionary(entries) = self else {
             return None;

@@ -18,7 +18,6 @@ use super::held_files::OpenFile;
 use super::source::{file_name, shown};
 pub(super) use lines::TableText;
 
-/// Whether a file holds a table, by its first bytes.
 pub(super) fn is_table(head: &[u8]) -> bool {
     [&b"\x93NUMPY"[..], b"PK\x03\x04"]
         .iter()
@@ -27,7 +26,6 @@ pub(super) fn is_table(head: &[u8]) -> bool {
         || json::is_json(head)
 }
 
-/// Whether a file is a Parquet file, by its first bytes.
 fn is_parquet(head: &[u8]) -> bool {
     head.starts_with(b"PAR1")
 }
@@ -44,17 +42,17 @@ pub(super) fn open(
     head: &[u8],
     more: &[PathBuf],
 ) -> Result<TableText, LogError> {
-    let refuse = |problem: String| LogError::Table {
+    let refuse = |problem: io::Error| LogError::Table {
         file: shown(path),
-        problem,
+        problem: problem.to_string(),
     };
     if is_parquet(head) {
         #[cfg(feature = "parquet")]
-        return parquet::open(path, more).map_err(|error| refuse(error.to_string()));
+        return parquet::open(path, more).map_err(refuse);
     }
     let _ = more;
     if json::is_json(head) {
-        return json::open(file).map_err(|error| refuse(error.to_string()));
+        return json::open(file).map_err(refuse);
     }
     let arrays = match head.starts_with(b"PK") {
         false => npy::Array::of_file(file).map(|array| vec![array]),
@@ -67,10 +65,9 @@ pub(super) fn open(
             remedy: "save the sheet as CSV: `python -c \"import pandas; pandas.read_excel('IN').to_csv('OUT.csv', index=False)\"`\nor unpack the archive",
         });
     }
-    let (table, notes) = arrays
-        .and_then(numpy::ArrayTable::new)
-        .map_err(|error| refuse(error.to_string()))?;
-    Ok(TableText::new(Box::new(table), notes))
+    let arrays = arrays.and_then(numpy::ArrayTable::new);
+    let (table, notes) = arrays.map_err(refuse)?;
+    Ok(TableText::new(&table.names.clone(), table, notes))
 }
 
 /// The Parquet files of a dataset of LeRobot, in their order; `None` for any other folder.
@@ -79,10 +76,8 @@ pub(super) fn dataset(folder: &Path) -> io::Result<Option<Vec<PathBuf>>> {
         return Ok(None);
     }
     let inside = |folder: &Path| -> io::Result<Vec<PathBuf>> {
-        let entries = std::fs::read_dir(folder)?;
-        let mut found = entries
-            .map(|entry| Ok(entry?.path()))
-            .collect::<io::Result<Vec<_>>>()?;
+        let entries = std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
+        let mut found = entries.collect::<io::Result<Vec<_>>>()?;
         found.sort_by_cached_key(|path| file_name(path));
         Ok(found)
     };

@@ -10,7 +10,6 @@ use super::zip::{self, Member};
 /// Largest head of an array [bytes].
 const HEAD: usize = 1 << 16;
 
-/// How a number is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Scalar {
     kind: Kind,
@@ -38,17 +37,14 @@ pub(super) struct Field {
     pub(super) scalar: Scalar,
 }
 
-/// The elements of an array.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Element {
     pub(super) fields: Vec<Field>,
-    /// Bytes of one.
     pub(super) size: usize,
     /// Whether its fields have names of their own.
     pub(super) named: bool,
 }
 
-/// Where the bytes of an array lie.
 enum Place {
     File(OpenFile),
     Member(OpenFile, Member),
@@ -61,7 +57,6 @@ pub(super) struct Array {
     place: Place,
     /// Where its numbers begin.
     begin: u64,
-    /// Numbers of elements along each axis.
     pub(super) shape: Vec<u64>,
     /// Whether the first axis runs fastest.
     pub(super) by_columns: bool,
@@ -70,12 +65,10 @@ pub(super) struct Array {
 }
 
 impl Array {
-    /// The array of a `.npy` file.
     pub(super) fn of_file(file: &OpenFile) -> io::Result<Self> {
         Self::new(String::new(), Place::File(file.from(0)))
     }
 
-    /// The arrays of a `.npz` archive.
     pub(super) fn of_members(file: &OpenFile, members: Vec<Member>) -> io::Result<Vec<Self>> {
         let arrays = members.into_iter().filter_map(|member| {
             let name = member.name.strip_suffix(".npy")?.to_owned();
@@ -92,8 +85,8 @@ impl Array {
             return Err(damaged("an array does not begin as numpy writes it"));
         }
         let mut length = [0; 4];
-        let wide = first[6] > 1;
-        file.read_exact(&mut length[..if wide { 4 } else { 2 }])?;
+        let wide = if first[6] > 1 { 4 } else { 2 };
+        file.read_exact(&mut length[..wide])?;
         let count = u32::from_le_bytes(length) as usize;
         if count > HEAD {
             return Err(damaged("the head of an array is longer than any"));
@@ -106,7 +99,7 @@ impl Array {
         let shape = head.get("shape").and_then(Literal::wholes);
         Ok(Self {
             name,
-            begin: 8 + if wide { 4 } else { 2 } + count as u64,
+            begin: (8 + wide + count) as u64,
             place,
             shape: shape.ok_or_else(unread)?,
             by_columns: head.get("fortran_order") == Some(&Literal::Truth(true)),
@@ -134,13 +127,10 @@ impl Element {
     fn of(described: &Literal) -> Option<Self> {
         let fields = match described {
             Literal::Text(text) => {
-                let (scalar, unit) = Scalar::of(text)?;
+                let (scalar, name) = Scalar::of(text)?;
+                let at = 0;
                 return Some(Self {
-                    fields: vec![Field {
-                        name: unit,
-                        at: 0,
-                        scalar,
-                    }],
+                    fields: vec![Field { name, at, scalar }],
                     size: scalar.bytes,
                     named: false,
                 });
@@ -156,19 +146,18 @@ impl Element {
             let Literal::List(parts) = field else {
                 return None;
             };
-            let (name, described) = match (parts.first()?, parts.get(1)?) {
-                (Literal::Text(name), Literal::Text(described)) => (name, described),
-                _ => return None,
+            let [Literal::Text(name), Literal::Text(described), shape @ ..] = &parts[..] else {
+                return None;
             };
-            let count = match parts.get(2) {
+            let count = match shape.first() {
                 None => None,
                 Some(shape) => Some(shape.wholes()?.into_iter().try_fold(1, u64::checked_mul)?),
             };
             let number = Scalar::of(described);
-            let size = number
-                .as_ref()
-                .map(|(scalar, _)| scalar.bytes)
-                .or_else(|| text_bytes(described))?;
+            let size = match &number {
+                Some((scalar, _)) => scalar.bytes,
+                None => text_bytes(described)?,
+            };
             for k in 0..count.unwrap_or(1) {
                 if let Some((scalar, unit)) = &number {
                     let index = count.map_or(String::new(), |_| format!("_{k}"));
@@ -212,16 +201,16 @@ impl Scalar {
             'M' | 'm' => Kind::Time,
             _ => return None,
         };
-        let (bytes, unit) = match signs.as_str().split_once('[') {
-            None => (signs.as_str(), String::new()),
-            Some((bytes, unit)) => (bytes, unit.trim_end_matches(']').to_owned()),
-        };
-        let bytes = bytes.parse().ok()?;
+        let (bytes, unit) = signs
+            .as_str()
+            .split_once('[')
+            .unwrap_or((signs.as_str(), ""));
+        let (bytes, unit) = (bytes.parse().ok()?, unit.trim_end_matches(']'));
         let known = match kind {
             Kind::Float => matches!(bytes, 2 | 4 | 8),
             Kind::Signed | Kind::Unsigned => matches!(bytes, 1 | 2 | 4 | 8),
             Kind::Truth => bytes == 1,
-            Kind::Time => bytes == 8 && ["s", "ms", "us", "ns"].contains(&&*unit),
+            Kind::Time => bytes == 8 && ["s", "ms", "us", "ns"].contains(&unit),
         };
         let unit = match kind {
             Kind::Time => format!(" [{unit}]"),
@@ -235,7 +224,6 @@ impl Scalar {
         known.then_some((scalar, unit))
     }
 
-    /// Appends the number that these bytes are.
     pub(super) fn write(self, line: &mut Vec<u8>, bytes: &[u8]) -> io::Result<()> {
         let mut word = [0; 8];
         word[..self.bytes].copy_from_slice(&bytes[..self.bytes]);

@@ -18,9 +18,8 @@ struct Stream {
     fields: Vec<Field>,
 }
 
-/// Arrays as rows.
 pub(super) struct ArrayTable {
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
     streams: Vec<Stream>,
     left: u64,
 }
@@ -29,9 +28,7 @@ pub(super) struct ArrayTable {
 fn axes(array: &Array) -> Vec<u64> {
     match array.shape.len() {
         0..=2 => array.shape.clone(),
-        _ => (array.shape.iter().copied())
-            .filter(|count| *count != 1)
-            .collect(),
+        _ => (array.shape.iter().copied().filter(|count| *count != 1)).collect(),
     }
 }
 
@@ -48,10 +45,8 @@ fn rows_of(arrays: &[Array]) -> Option<u64> {
             *votes.entry(longest).or_default() += 1;
         }
     }
-    let most = votes
-        .into_iter()
-        .max_by_key(|(rows, votes)| (*votes, *rows));
-    most.map(|(rows, _)| rows)
+    let most = votes.into_iter().map(|(rows, votes)| (votes, rows)).max();
+    most.map(|(_, rows)| rows)
 }
 
 impl ArrayTable {
@@ -104,29 +99,21 @@ impl ArrayTable {
         if count == 0 || wide > room || (apart && count > MAX_COLUMNS_APART) {
             return Ok(false);
         }
-        let base = match array.name.is_empty() {
-            true => "column",
-            false => &array.name,
-        };
-        let name = |k: u64, field: &Field| {
-            let index = if count > 1 {
-                format!("_{k}")
-            } else {
-                String::new()
-            };
-            match element.named {
-                true if array.name.is_empty() => format!("{}{index}", field.name),
-                true => format!("{base}_{}{index}", field.name),
-                false => format!("{base}{index}{}", field.name),
-            }
-        };
         for k in 0..count {
-            let fields = element.fields.iter();
-            self.names.extend(fields.map(|field| name(k, field)));
+            let index = match count {
+                1 => String::new(),
+                _ => format!("_{k}"),
+            };
+            let name = |field: &Field| match (&*array.name, &field.name, element.named) {
+                ("", own, true) => format!("{own}{index}"),
+                (base, own, true) => format!("{base}_{own}{index}"),
+                ("", own, false) => format!("column{index}{own}"),
+                (base, own, false) => format!("{base}{index}{own}"),
+            };
+            self.names.extend(element.fields.iter().map(name));
         }
-        let streams = if apart { 0..count } else { 0..1 };
-        let each = if apart { 1 } else { count };
-        for k in streams {
+        let (streams, each) = if apart { (count, 1) } else { (1, count) };
+        for k in 0..streams {
             let from = k.saturating_mul(rows).saturating_mul(size);
             let shifted = |j: u64| {
                 let moved = move |field: &Field| Field {
@@ -146,10 +133,6 @@ impl ArrayTable {
 }
 
 impl Table for ArrayTable {
-    fn names(&self) -> &[String] {
-        &self.names
-    }
-
     fn row(&mut self, line: &mut Vec<u8>) -> io::Result<bool> {
         if self.left == 0 {
             return Ok(false);

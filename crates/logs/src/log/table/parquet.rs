@@ -28,9 +28,7 @@ struct Column {
     width: usize,
 }
 
-/// The rows of one file or of several.
 struct ParquetTable {
-    names: Vec<String>,
     columns: Vec<Column>,
     rows: RowIter<'static>,
     waiting: VecDeque<PathBuf>,
@@ -50,10 +48,9 @@ struct Clock {
     begins: f64,
 }
 
-/// Opens a file, and those that go on with it.
 pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
     let mut notes = Vec::new();
-    let (mut rows, nanoseconds) = rows_of(path, &mut notes)?;
+    let (mut rows, nanoseconds) = whole(|| rows_of(path, &mut notes))?;
     let first = whole(|| rows.next().transpose().map_err(broken))?;
     let described = described(path);
     let mut columns = Vec::new();
@@ -91,7 +88,6 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
         ));
     }
     let table = ParquetTable {
-        names,
         columns,
         rows,
         waiting: more.iter().cloned().collect(),
@@ -99,16 +95,11 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
         number: 0,
         clock,
     };
-    Ok(TableText::new(Box::new(table), notes))
+    Ok(TableText::new(&names, table, notes))
 }
 
 fn broken(error: parquet::errors::ParquetError) -> io::Error {
     damaged(&format!("the Parquet file is cut off or damaged ({error})"))
-}
-
-/// The rows of the columns of a file that hold numbers, and which of them are nanoseconds.
-fn rows_of(path: &Path, notes: &mut Vec<String>) -> io::Result<(RowIter<'static>, Vec<bool>)> {
-    whole(|| projected(path, notes))
 }
 
 /// What a call into the crate gives: a damaged file must not end the program, whatever the crate makes of it.
@@ -117,7 +108,8 @@ fn whole<T>(call: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
     ended.unwrap_or_else(|_| Err(damaged("the Parquet file is damaged")))
 }
 
-fn projected(path: &Path, notes: &mut Vec<String>) -> io::Result<(RowIter<'static>, Vec<bool>)> {
+/// The rows of the columns of a file that hold numbers, and which of them are nanoseconds.
+fn rows_of(path: &Path, notes: &mut Vec<String>) -> io::Result<(RowIter<'static>, Vec<bool>)> {
     let reader = SerializedFileReader::new(File::open(path)?).map_err(broken)?;
     let about = reader.metadata().file_metadata();
     let root = about.schema_descr().root_schema();
@@ -154,7 +146,6 @@ fn is_nanoseconds(field: &Arc<Type>) -> bool {
     matches!(kind, Some(LogicalType::Timestamp(time)) if matches!(time.unit, TimeUnit::NANOS))
 }
 
-/// Whether a column holds instants.
 fn is_instant(field: &Arc<Type>) -> bool {
     let kind = field.get_basic_info().converted_type();
     let instant = matches!(
@@ -217,11 +208,8 @@ fn numbers(field: &Field, line: &mut Vec<u8>) -> io::Result<usize> {
             return parts.map(|field| numbers(field, line)).sum();
         }
         Field::ListInternal(list) => {
-            return list
-                .elements()
-                .iter()
-                .map(|field| numbers(field, line))
-                .sum();
+            let parts = list.elements().iter();
+            return parts.map(|field| numbers(field, line)).sum();
         }
         Field::Null => {}
         Field::Bool(x) => write!(line, "{}", u8::from(*x))?,
@@ -247,16 +235,12 @@ impl ParquetTable {
             let Some(path) = self.waiting.pop_front() else {
                 return Ok(None);
             };
-            self.rows = rows_of(&path, &mut Vec::new())?.0;
+            self.rows = whole(|| rows_of(&path, &mut Vec::new()))?.0;
         }
     }
 }
 
 impl Table for ParquetTable {
-    fn names(&self) -> &[String] {
-        &self.names
-    }
-
     fn row(&mut self, line: &mut Vec<u8>) -> io::Result<bool> {
         let Some(row) = self.next()? else {
             return Ok(false);
@@ -295,10 +279,8 @@ impl Table for ParquetTable {
 fn described(path: &Path) -> Option<serde_json::Value> {
     let place = path.ancestors().nth(3)?.join("meta").join("info.json");
     let small = std::fs::metadata(&place).is_ok_and(|about| about.len() <= DESCRIPTION);
-    let text = small
-        .then(|| std::fs::read_to_string(&place).ok())
-        .flatten()?;
-    serde_json::from_str(&text).ok()
+    let text = small.then(|| std::fs::read_to_string(&place).ok());
+    serde_json::from_str(&text??).ok()
 }
 
 /// What a list of a dataset holds: `names` is a list, or lists by the kind of what they name.

@@ -10,7 +10,6 @@ const END: u64 = 65_557;
 /// Largest directory that is read [bytes].
 const DIRECTORY: u64 = 1 << 24;
 
-/// A file in an archive.
 #[derive(Debug, Clone)]
 pub(super) struct Member {
     pub(super) name: String,
@@ -20,17 +19,10 @@ pub(super) struct Member {
     size: u64,
 }
 
-fn u16_at(bytes: &[u8], at: usize) -> io::Result<u64> {
-    let found = bytes.get(at..at + 2).ok_or_else(cut)?;
-    Ok(u64::from(u16::from_le_bytes([found[0], found[1]])))
-}
-
-fn u32_at(bytes: &[u8], at: usize) -> io::Result<u64> {
-    Ok(u16_at(bytes, at)? | u16_at(bytes, at + 2)? << 16)
-}
-
-fn u64_at(bytes: &[u8], at: usize) -> io::Result<u64> {
-    Ok(u32_at(bytes, at)? | u32_at(bytes, at + 4)? << 32)
+/// The number of so many bytes at a place, the least byte first.
+fn number<const BYTES: usize>(bytes: &[u8], at: usize) -> io::Result<u64> {
+    let found = bytes.get(at..at + BYTES).ok_or_else(cut)?;
+    Ok((found.iter().rev()).fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
 }
 
 fn cut() -> io::Error {
@@ -55,13 +47,12 @@ pub(super) fn members(file: &OpenFile) -> io::Result<Vec<Member>> {
         .windows(4)
         .rposition(|four| four == b"PK\x05\x06")
         .ok_or_else(cut)?;
-    let (mut size, mut begin) = (u32_at(&tail, end + 12)?, u32_at(&tail, end + 16)?);
-    let large = end
-        .checked_sub(20)
-        .filter(|at| tail[*at..].starts_with(b"PK\x06\x07"));
+    let (mut size, mut begin) = (number::<4>(&tail, end + 12)?, number::<4>(&tail, end + 16)?);
+    let large = end.checked_sub(20);
+    let large = large.filter(|at| tail[*at..].starts_with(b"PK\x06\x07"));
     if let Some(at) = large {
-        let end = piece(file, u64_at(&tail, at + 8)?, 56)?;
-        (size, begin) = (u64_at(&end, 40)?, u64_at(&end, 48)?);
+        let end = piece(file, number::<8>(&tail, at + 8)?, 56)?;
+        (size, begin) = (number::<8>(&end, 40)?, number::<8>(&end, 48)?);
     }
     if size > DIRECTORY {
         return Err(unusable("the archive holds too many files".to_owned()));
@@ -70,7 +61,7 @@ pub(super) fn members(file: &OpenFile) -> io::Result<Vec<Member>> {
     let mut out = Vec::new();
     let mut at = 0;
     while directory[at..].starts_with(b"PK\x01\x02") {
-        let [name, extra, comment] = [28, 30, 32].map(|k| u16_at(&directory, at + k));
+        let [name, extra, comment] = [28, 30, 32].map(|k| number::<2>(&directory, at + k));
         let (name, extra, comment) = (name? as usize, extra? as usize, comment? as usize);
         let next = at + 46 + name + extra + comment;
         if next > directory.len() {
@@ -78,8 +69,8 @@ pub(super) fn members(file: &OpenFile) -> io::Result<Vec<Member>> {
         }
         let text = |from: usize, count| &directory[at + from..at + from + count];
         let [size, header] = sizes(&directory[at..], text(46 + name, extra))?;
-        let encrypted = u16_at(&directory, at + 8)? & 1 == 1;
-        let packed = match u16_at(&directory, at + 10)? {
+        let encrypted = number::<2>(&directory, at + 8)? & 1 == 1;
+        let packed = match number::<2>(&directory, at + 10)? {
             _ if encrypted => return Err(unusable("the archive asks for a password".to_owned())),
             0 => false,
             8 => true,
@@ -103,15 +94,18 @@ pub(super) fn members(file: &OpenFile) -> io::Result<Vec<Member>> {
 /// Packed bytes of a member and the place of its local header; large ones stand in the extra field.
 fn sizes(entry: &[u8], mut extra: &[u8]) -> io::Result<[u64; 2]> {
     const IN_EXTRA_FIELD: u64 = u32::MAX as u64;
-    let plain = [u32_at(entry, 24)?, u32_at(entry, 20)?, u32_at(entry, 42)?];
-    let mut all = plain;
+    let mut all = [
+        number::<4>(entry, 24)?,
+        number::<4>(entry, 20)?,
+        number::<4>(entry, 42)?,
+    ];
     while extra.len() >= 4 {
-        let (kind, count) = (u16_at(extra, 0)?, u16_at(extra, 2)? as usize);
+        let (kind, count) = (number::<2>(extra, 0)?, number::<2>(extra, 2)? as usize);
         let body = extra.get(4..4 + count).ok_or_else(cut)?;
         if kind == 1 {
             let mut from = 0;
             for value in all.iter_mut().filter(|value| **value == IN_EXTRA_FIELD) {
-                *value = u64_at(body, from)?;
+                *value = number::<8>(body, from)?;
                 from += 8;
             }
         }
@@ -132,7 +126,7 @@ pub(super) fn reader(
             "the archive's directory names a place without a file",
         ));
     }
-    let begin = member.header + 30 + u16_at(&local, 26)? + u16_at(&local, 28)?;
+    let begin = member.header + 30 + number::<2>(&local, 26)? + number::<2>(&local, 28)?;
     if !member.packed {
         let place = begin.checked_add(from).ok_or_else(cut)?;
         let rest = file.from(place).take(member.size.saturating_sub(from));

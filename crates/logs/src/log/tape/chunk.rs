@@ -7,8 +7,7 @@ pub(super) const ROWS: usize = 1024;
 /// Numbers of a chunk, but for its last row.
 pub(super) const NUMBERS: usize = 1 << 15;
 
-/// Some consecutive rows.
-#[derive(Debug, Default, Clone, PartialEq)]
+#[derive(Default)]
 pub(super) struct Chunk {
     pub stamps: Vec<Stamped>,
     /// Line or message number of each row.
@@ -35,7 +34,7 @@ impl Chunk {
         for row in 0..rows {
             let (kind, stamp) = match self.stamps[row] {
                 Stamped::Seconds(t) => (0, i128::from(t.to_bits())),
-                Stamped::Exact(instant) => (1, instant.femtoseconds()),
+                Stamped::Exact(instant) => (1, instant.0),
             };
             out.push(kind);
             out.extend(stamp.to_le_bytes());
@@ -56,7 +55,7 @@ impl Chunk {
             let stamp = i128::from_le_bytes(std::array::from_fn(|k| row[1 + k]));
             chunk.stamps.push(match row[0] {
                 0 => Stamped::Seconds(f64::from_bits(stamp as u64)),
-                _ => Stamped::Exact(Instant::of_femtoseconds(stamp)),
+                _ => Stamped::Exact(Instant(stamp)),
             });
             chunk.numbers.push(number(&row[17..]));
             chunk.flags.push((row[25] & 1 != 0, row[25] & 2 != 0));

@@ -4,44 +4,42 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::records::{BUFFER, LONGEST_ROW, Record, Records};
-use super::{head, line, number};
+use super::table::Found;
+use super::{head, number};
 use crate::log::content::Content;
 use crate::log::layout::Layout;
-use crate::log::rows::Strictness;
-use crate::log::stream::Watch;
+use crate::log::rows::{Strictness, counted};
+use crate::log::stream::Hashed;
 use crate::log::time::Instant;
 use crate::log::{LogError, escape, source};
 use cft_ident_core::number::beyond;
 
-/// A text log: its records one by one.
-#[derive(Debug)]
 pub(super) struct TextFile {
     path: PathBuf,
     reader: Records,
     record: Record,
     previous: Record,
-    header: Vec<String>,
-    header_line: u64,
+    /// Names of the columns, trimmed, and the line on which they stand.
+    pub(super) header: Vec<String>,
+    pub(super) header_line: u64,
     /// Columns are parted by runs of spaces: where the fields that are not empty stand.
     runs: Option<Vec<usize>>,
     decimal_comma: bool,
     /// The record is a row that was not handed out yet.
     ahead: bool,
     strictness: Strictness,
-    malformed: u64,
-    /// Rows without any value.
+    /// Rows that were passed over because of their width.
+    pub(super) malformed: u64,
     blank: u64,
     /// Bytes and lines before the table.
     before: (u64, u64),
     notes: Vec<String>,
     /// The rows are those of a table without lines.
     table: bool,
-    /// What is known of a stream.
-    watch: Option<Watch>,
+    watch: Option<Hashed>,
 }
 
 impl TextFile {
-    /// Reads the header of a text log.
     pub(super) fn open(
         path: &Path,
         content: Content,
@@ -50,12 +48,8 @@ impl TextFile {
     ) -> Result<Self, LogError> {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
-        let wanted = line::Wanted {
-            delimiter: layout.section.delimiter,
-            header_line: layout.section.header_line,
-            by_number: layout.by_number(),
-        };
-        let found = head::look_at(path, begin, &wanted)?;
+        let found = head::look_at(path, begin, layout)?;
+        let Found { parting, units, .. } = found.table;
         let watch = content.watch.clone();
         let (table, notes) = (content.table, content.notes.clone());
         let mut inner = content.into_bytes();
@@ -64,26 +58,26 @@ impl TextFile {
         passed.map_err(|error| source::failed(path, error))?;
         let mut rows = Self {
             path: path.to_owned(),
-            reader: Records::new(inner, found.delimiter, found.comment),
+            reader: Records::new(inner, parting.sign, found.comment),
             record: Record::default(),
             previous: Record::default(),
             header: Vec::new(),
             header_line: found.header_line,
-            runs: found.spaces.then(Vec::new),
-            decimal_comma: found.delimiter != b',',
+            runs: parting.runs.then(Vec::new),
+            decimal_comma: parting.sign != b',',
             ahead: found.headerless,
             strictness,
             malformed: 0,
             blank: 0,
             before: found.before,
-            notes: [notes, found.notes].concat(),
+            notes: [notes, found.table.notes].concat(),
             table,
             watch,
         };
-        if let Some((names, _)) = found.header_in_comment {
-            let parts = line::split(&names, found.delimiter, found.spaces);
-            rows.header = parts.into_iter().map(str::to_owned).collect();
-            rows.add_units(&found.units);
+        if let Some(names) = found.header_in_comment {
+            let parts = parting.split(&names).into_iter();
+            rows.header = parts.map(str::to_owned).collect();
+            rows.add_units(&units);
             return Ok(rows);
         }
         while rows.advance()? && rows.is_blank() {}
@@ -99,10 +93,10 @@ impl TextFile {
         if rows.header.last().is_some_and(String::is_empty) {
             rows.header.pop();
         }
-        if found.second_row {
+        if found.table.second_row {
             while rows.advance()? && rows.is_blank() {}
         }
-        rows.add_units(&found.units);
+        rows.add_units(&units);
         Ok(rows)
     }
 
@@ -118,27 +112,9 @@ impl TextFile {
 
     /// What was taken for what, and what was passed over, one sentence each.
     pub(super) fn in_words(&self) -> Vec<String> {
-        let mut out = match self.notes.is_empty() {
-            true => Vec::new(),
-            false => vec![self.notes.join("; ")],
-        };
-        if self.blank > 0 {
-            out.push(format!(
-                "{} rows without any value are passed over",
-                self.blank
-            ));
-        }
-        out
-    }
-
-    /// Column names, trimmed.
-    pub(super) fn header(&self) -> &[String] {
-        &self.header
-    }
-
-    /// Line of the header.
-    pub(super) fn header_line(&self) -> u64 {
-        self.header_line
+        let notes = (!self.notes.is_empty()).then(|| self.notes.join("; "));
+        let blank = counted(self.blank, "rows without any value are passed over");
+        notes.into_iter().chain(blank).collect()
     }
 
     /// Goes on to the next row; false at the end of the file.
@@ -155,7 +131,7 @@ impl TextFile {
                 }
             }
             if let Some(watch) = &self.watch
-                && watch.is_cut_at(self.before.0 + self.reader.byte())
+                && watch.is_cut_at(self.end())
             {
                 return Err(LogError::CutLine { at: self.place() });
             }
@@ -194,19 +170,13 @@ impl TextFile {
         Ok(more)
     }
 
-    /// Reads one record.
     fn advance(&mut self) -> Result<bool, LogError> {
-        let more = match self.reader.read(&mut self.record) {
-            Ok(more) => more,
-            Err(error) => return Err(self.failed(error)),
-        };
+        let read = self.reader.read(&mut self.record);
+        let more = read.map_err(|error| self.failed(error))?;
         if let Some(runs) = &mut self.runs {
             runs.clear();
-            let full = |index: &usize| {
-                self.record
-                    .get(*index)
-                    .is_some_and(|field| !field.is_empty())
-            };
+            let field = |index: usize| self.record.get(index).unwrap_or_default();
+            let full = |index: &usize| !field(*index).is_empty();
             runs.extend((0..self.record.len()).filter(full));
         }
         Ok(more)
@@ -215,8 +185,7 @@ impl TextFile {
     fn failed(&self, error: io::Error) -> LogError {
         match error.kind() {
             io::ErrorKind::FileTooLarge => LogError::LongLine {
-                file: self.file(),
-                line: self.reader.line(),
+                at: format!("{}:{}", self.file(), self.reader.line()),
                 limit: LONGEST_ROW,
             },
             _ => source::failed(&self.path, error),
@@ -236,8 +205,7 @@ impl TextFile {
     fn wrong_width(&self, found: usize, end: u64) -> LogError {
         let expected = self.header.len();
         LogError::Fields {
-            file: self.file(),
-            line: self.line_at(end),
+            at: format!("{}:{}", self.file(), self.line_at(end)),
             found,
             expected,
             remedy: if found > expected {
@@ -262,8 +230,7 @@ impl TextFile {
     pub(super) fn is_blank_field(&self, index: usize) -> bool {
         // what was not written when the power went is zeros
         let nothing = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
-        self.field(index)
-            .is_some_and(|field| field.iter().all(nothing))
+        (self.field(index)).is_some_and(|field| field.iter().all(nothing))
     }
 
     #[inline]
@@ -291,8 +258,8 @@ impl TextFile {
     /// Whether a field of the current row is no number because of its decimal comma.
     #[cold]
     pub(super) fn has_decimal_comma(&self, column: usize) -> bool {
-        let text =
-            String::from_utf8_lossy(self.field(column).unwrap_or_default()).replace(',', ".");
+        let text = String::from_utf8_lossy(self.field(column).unwrap_or_default());
+        let text = text.replace(',', ".");
         self.decimal_comma && number::parse(text.as_bytes()).is_some()
     }
 
@@ -302,9 +269,9 @@ impl TextFile {
         let field = self.field(column).unwrap_or_default();
         let text = String::from_utf8_lossy(field);
         let text = text.trim();
-        let name = self.header.get(column).map(|name| escape(name));
-        let (at, column_index) = (self.place(), column);
-        let column = name.unwrap_or_default();
+        let comma = self.has_decimal_comma(column);
+        let (at, name) = (self.place(), self.header.get(column));
+        let column = name.map_or_else(String::new, |name| escape(name));
         if let Some(value) = number::parse(field) {
             return LogError::NotFinite {
                 at,
@@ -315,7 +282,7 @@ impl TextFile {
         }
         let remedy = if text.is_empty() {
             "delete the rows without a measurement: a gap in time is handled"
-        } else if self.has_decimal_comma(column_index) {
+        } else if comma {
             "write decimal points instead of decimal commas, e.g. `sed 's/,/./g'`"
         } else if text.contains(':') {
             "write the time as seconds from the start, or with its date: 2024-05-01T12:34:56.789Z"
@@ -336,7 +303,6 @@ impl TextFile {
         Instant::parse_decimal(field, power).or_else(|| Instant::parse_iso(field))
     }
 
-    /// Whether a column of the current row holds a date.
     pub(super) fn is_date(&self, column: usize) -> bool {
         self.field(column)
             .is_some_and(|field| Instant::parse_iso(field).is_some())
@@ -347,36 +313,19 @@ impl TextFile {
         self.record == self.previous
     }
 
-    /// Rows that were passed over because of their width.
-    pub(super) fn malformed(&self) -> u64 {
-        self.malformed
-    }
-
-    /// The file for a message.
     pub(super) fn file(&self) -> String {
         source::shown(&self.path)
     }
 
-    /// File and line of the current row, for a message.
     #[cold]
     pub(super) fn place(&self) -> String {
         match self.table {
-            true => format!(
-                "{}, row {}",
-                self.file(),
-                self.line_hint().saturating_sub(1)
-            ),
-            false => format!("{}:{}", self.file(), self.line()),
+            true => {
+                let row = self.line_hint().saturating_sub(1);
+                format!("{}, row {row}", self.file())
+            }
+            false => format!("{}:{}", self.file(), self.line_at(self.end())),
         }
-    }
-
-    /// Line on which the current row ends.
-    ///
-    /// Counted again from the file's beginning: it is asked for once, on the way to an error, and
-    /// costs nothing before.
-    #[cold]
-    pub(super) fn line(&self) -> u64 {
-        self.line_at(self.end())
     }
 
     /// Byte of the file at which the current row ends.
@@ -384,7 +333,8 @@ impl TextFile {
         self.before.0 + self.reader.byte()
     }
 
-    /// Line of the row that ends at a byte.
+    /// Line of the row that ends at a byte, counted anew from the file's beginning: only an error asks for it.
+    #[cold]
     fn line_at(&self, end: u64) -> u64 {
         if self.watch.is_some() {
             // a stream cannot be read again

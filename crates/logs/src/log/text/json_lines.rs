@@ -11,46 +11,32 @@ use crate::log::columns::choose;
 use crate::log::content::{Bytes, Content};
 use crate::log::layout::{Channel, Layout};
 use crate::log::rows::LogRows;
-use crate::log::stream::Watch;
+use crate::log::stream::Hashed;
 use crate::log::time::Stamped;
 use crate::log::{Block, LogError, escape, source};
 use cft_ident_core::number::is_usable;
 
-/// Bytes that one line may take.
 const LONGEST_LINE: usize = 1 << 20;
 
-/// A log of JSON lines.
 pub(in crate::log) struct JsonRows {
     path: PathBuf,
     reader: BufReader<Bytes>,
-    watch: Option<Watch>,
+    watch: Option<Hashed>,
     line: Vec<u8>,
     number: u64,
-    /// Bytes read so far.
     at: u64,
-    names: Vec<String>,
     slots: Slots,
     /// Numbers of the current row: time, positions, torques, velocities; NaN where none stands.
     values: Vec<f64>,
 }
 
-impl fmt::Debug for JsonRows {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("JsonRows")
-    }
-}
-
-/// Where each key's number goes.
 #[derive(Default)]
 struct Slots {
-    /// Key and place.
     keys: Vec<(String, usize)>,
     /// Lists in joint order: key, first place, length.
     lists: [(&'static str, usize, usize); 3],
     /// SI = factor x + offset, of each place.
     scales: Vec<[f64; 2]>,
-    joints: usize,
-    torques: usize,
 }
 
 impl Slots {
@@ -69,8 +55,6 @@ impl Slots {
                 ("dq", 1 + n + k, layout.velocities.len()),
             ],
             scales,
-            joints: n,
-            torques: k,
         }
     }
 }
@@ -89,32 +73,27 @@ impl JsonRows {
             line: Vec::with_capacity(4096),
             number: 0,
             at: 0,
-            names: Vec::new(),
             slots: Slots::default(),
             values: Vec::new(),
         };
-        let head = rows.peek()?;
-        rows.names = keys(&head, layout);
-        let layout = choose(&rows.names, layout);
+        let layout = choose(&keys(rows.peek()?, layout), layout);
         rows.slots = Slots::of(&layout);
         rows.values = vec![f64::NAN; rows.slots.scales.len()];
         Ok((rows, layout))
     }
 
     /// The first line that is not blank; it is read again as the first row.
-    fn peek(&mut self) -> Result<Vec<u8>, LogError> {
+    fn peek(&mut self) -> Result<&[u8], LogError> {
         let text = self.reader.fill_buf();
         let text = text.map_err(|error| source::failed(&self.path, error))?;
         let mut lines = text.split(|byte| *byte == b'\n');
         let first = lines.find(|line| !line.trim_ascii().is_empty());
-        Ok(first.unwrap_or_default().to_vec())
+        Ok(first.unwrap_or_default())
     }
 
-    fn wrong(&self, problem: &str) -> LogError {
-        LogError::JsonLine {
-            at: self.place(),
-            problem: problem.to_owned(),
-        }
+    fn wrong(&self, problem: String) -> LogError {
+        let at = self.place();
+        LogError::JsonLine { at, problem }
     }
 
     /// Reads the next line that is not blank; false at the end.
@@ -131,8 +110,7 @@ impl JsonRows {
             }
             if count > LONGEST_LINE {
                 return Err(LogError::LongLine {
-                    file: source::shown(&self.path),
-                    line: self.number,
+                    at: self.place(),
                     limit: LONGEST_LINE,
                 });
             }
@@ -145,10 +123,6 @@ impl JsonRows {
 }
 
 impl LogRows for JsonRows {
-    fn names(&self) -> &[String] {
-        &self.names
-    }
-
     fn next(&mut self) -> Result<Option<Stamped>, LogError> {
         if !self.advance()? {
             return Ok(None);
@@ -159,37 +133,29 @@ impl LogRows for JsonRows {
             values: &mut self.values,
         };
         let mut parser = serde_json::Deserializer::from_slice(&self.line);
-        let parsed = row
-            .deserialize(&mut parser)
-            .and_then(|()| parser.end())
-            .map_err(|error| error.to_string());
+        let parsed = row.deserialize(&mut parser).and_then(|()| parser.end());
         if let Err(problem) = parsed {
             let cut = self.watch.as_ref().is_some_and(|w| w.is_cut_at(self.at));
             return Err(match cut {
                 true => LogError::CutLine { at: self.place() },
-                false => self.wrong(&problem),
+                false => self.wrong(problem.to_string()),
             });
         }
         let t = self.values[0];
         match is_usable(t) {
             true => Ok(Some(Stamped::Seconds(t))),
-            false => Err(self.wrong(&format!(
-                "has no number `{}`, the time",
-                escape(&self.slots.keys[0].0)
-            ))),
+            false => {
+                let key = escape(&self.slots.keys[0].0);
+                Err(self.wrong(format!("has no number `{key}`, the time")))
+            }
         }
     }
 
-    fn logged(&self, _: usize) -> Option<f64> {
-        None
-    }
-
     fn append(&self, block: &mut Block) -> Result<(), LogError> {
-        let (n, k) = (self.slots.joints, self.slots.torques);
-        let needed = 1..1 + n + k;
-        if let Some(place) = needed.clone().find(|i| !is_usable(self.values[*i])) {
+        let [(_, _, n), (_, _, k), _] = self.slots.lists;
+        if let Some(place) = (1..1 + n + k).find(|i| !is_usable(self.values[*i])) {
             let key = escape(&self.slots.keys[place].0);
-            return Err(self.wrong(&format!("has no number `{key}`")));
+            return Err(self.wrong(format!("has no number `{key}`")));
         }
         block.q.extend_from_slice(&self.values[1..1 + n]);
         block.tau.extend_from_slice(&self.values[1 + n..1 + n + k]);
@@ -213,22 +179,22 @@ impl LogRows for JsonRows {
 fn keys(line: &[u8], layout: &Layout) -> Vec<String> {
     let object: serde_json::Map<String, serde_json::Value> =
         serde_json::from_slice(line).unwrap_or_default();
-    let columns = |channels: &[Channel]| -> Vec<String> {
-        channels.iter().map(|c| c.column.clone()).collect()
-    };
     let mut names = Vec::new();
     for (key, value) in object {
-        match (key.as_str(), value.is_array()) {
-            ("q", true) => names.extend(columns(&layout.positions)),
-            ("tau", true) => names.extend(columns(&layout.torques)),
-            ("dq", true) => names.extend(columns(&layout.velocities)),
-            _ => names.push(key),
-        }
+        let channels = match (key.as_str(), value.is_array()) {
+            ("q", true) => &layout.positions,
+            ("tau", true) => &layout.torques,
+            ("dq", true) => &layout.velocities,
+            _ => {
+                names.push(key);
+                continue;
+            }
+        };
+        names.extend(channels.iter().map(|channel| channel.column.clone()));
     }
     names
 }
 
-/// Fills the numbers of one object.
 struct Row<'a> {
     slots: &'a Slots,
     values: &'a mut [f64],
@@ -267,7 +233,6 @@ impl<'de> Visitor<'de> for Row<'_> {
     }
 }
 
-/// What a key stands for.
 enum Place {
     Number(usize),
     List(usize, usize),
@@ -293,8 +258,8 @@ impl Visitor<'_> for Key<'_> {
 
     fn visit_str<E: Error>(self, key: &str) -> Result<Place, E> {
         let named = self.0.keys.iter().find(|(name, _)| name == key);
-        let listed = || self.0.lists.iter().find(|(name, ..)| *name == key);
-        Ok(match (named, listed()) {
+        let listed = self.0.lists.iter().find(|(name, ..)| *name == key);
+        Ok(match (named, listed) {
             (Some((_, place)), _) => Place::Number(*place),
             (None, Some((_, first, length))) => Place::List(*first, *length),
             (None, None) => Place::None,
@@ -323,7 +288,6 @@ impl<'de> Visitor<'de> for List<'_> {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
-        let expected = self.values.len();
         let mut found = 0;
         while let Some(x) = list.next_element::<f64>()? {
             if let Some(value) = self.values.get_mut(found) {
@@ -332,10 +296,9 @@ impl<'de> Visitor<'de> for List<'_> {
             }
             found += 1;
         }
-        match found == expected {
+        // velocities may be left out, an empty list stands for none
+        match found == 0 || found == self.values.len() {
             true => Ok(()),
-            // velocities may be left out, an empty list stands for none
-            false if found == 0 => Ok(()),
             false => Err(A::Error::invalid_length(found, &self)),
         }
     }

@@ -5,16 +5,6 @@ use std::borrow::Cow;
 use crate::log::content::HEAD;
 use crate::log::section::Delimiter;
 
-/// What the robot file says of the table.
-pub(super) struct Wanted {
-    pub(super) delimiter: Delimiter,
-    /// Line of the header, from 1.
-    pub(super) header_line: Option<u64>,
-    /// Columns are given by number, so that no header is needed.
-    pub(super) by_number: bool,
-}
-
-/// A line of the head.
 pub(super) struct Line<'h> {
     pub(super) text: Cow<'h, str>,
     /// Its number, from 1, and the byte of the file at which it begins.
@@ -44,43 +34,55 @@ pub(super) fn lines_of(head: &[u8]) -> Vec<Line<'_>> {
     out
 }
 
-/// The delimiter byte, and whether runs of it count as one.
-pub(super) fn delimiter_of(line: &str, wanted: Delimiter) -> (u8, bool) {
-    match wanted {
-        Delimiter::Comma => (b',', false),
-        Delimiter::Semicolon => (b';', false),
-        Delimiter::Tab => (b'\t', false),
-        Delimiter::Space => (b' ', true),
-        Delimiter::Auto => {
-            let count = |sign: u8| {
-                let mut quoted = false;
-                let outside = line.bytes().filter(|byte| {
-                    quoted ^= *byte == b'"';
-                    !quoted && *byte == sign
-                });
-                outside.count()
-            };
-            let mut best = (b',', count(b','));
-            for sign in [b';', b'\t'] {
-                if count(sign) > best.1 {
-                    best = (sign, count(sign));
-                }
-            }
-            if best.1 == 0 && line.trim().contains(' ') {
-                (b' ', true)
-            } else {
-                (best.0, false)
-            }
-        }
-    }
+/// How the fields of a line are parted.
+#[derive(Clone, Copy)]
+pub(super) struct Parting {
+    pub(super) sign: u8,
+    /// Runs of it count as one.
+    pub(super) runs: bool,
 }
 
-/// Fields of one line without quotes, trimmed.
-pub(super) fn split(line: &str, delimiter: u8, spaces: bool) -> Vec<&str> {
-    let fields = line.split(char::from(delimiter)).map(str::trim);
-    if spaces {
-        fields.filter(|field| !field.is_empty()).collect()
-    } else {
-        fields.collect()
+impl Parting {
+    /// As it is asked for, else by the signs in the line that names the columns.
+    pub(super) fn of(line: &str, asked: Delimiter) -> Self {
+        let count = |sign: u8| {
+            let mut quoted = false;
+            let outside = line.bytes().filter(|byte| {
+                quoted ^= *byte == b'"';
+                !quoted && *byte == sign
+            });
+            outside.count()
+        };
+        let sign = match asked {
+            Delimiter::Comma => b',',
+            Delimiter::Semicolon => b';',
+            Delimiter::Tab => b'\t',
+            Delimiter::Space => b' ',
+            Delimiter::Auto => {
+                // of signs that stand there as often the first one
+                let most = [b'\t', b';', b',']
+                    .into_iter()
+                    .max_by_key(|sign| count(*sign));
+                let most = most.filter(|sign| count(*sign) > 0);
+                let other = if line.trim().contains(' ') {
+                    b' '
+                } else {
+                    b','
+                };
+                most.unwrap_or(other)
+            }
+        };
+        Self {
+            sign,
+            runs: sign == b' ',
+        }
+    }
+
+    /// Fields of one line without quotes, trimmed.
+    pub(super) fn split(self, line: &str) -> Vec<&str> {
+        let fields = line.split(char::from(self.sign)).map(str::trim);
+        fields
+            .filter(|field| !self.runs || !field.is_empty())
+            .collect()
     }
 }

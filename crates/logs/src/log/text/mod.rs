@@ -21,7 +21,6 @@ use super::two_clocks::rest_of;
 use super::{Block, LogError, escape};
 use cft_ident_core::number::is_usable;
 
-/// The time of a text log.
 #[derive(Debug, Clone, Copy)]
 struct TimeColumn {
     index: usize,
@@ -29,13 +28,10 @@ struct TimeColumn {
     seconds: f64,
     /// Column of what is beyond whole seconds, and the power of ten of a second that it counts.
     rest: Option<(usize, i32)>,
-    /// Read exactly, in units of 10^power s: dates, and numbers far from zero. Known from the first
-    /// row that has a time.
+    /// Dates, and numbers far from zero, are read exactly, in units of 10^power s; known from the first time.
     exact: Option<Option<i32>>,
 }
 
-/// A text log, and which of its columns are read.
-#[derive(Debug)]
 pub(super) struct TextRows {
     file: TextFile,
     columns: ScaledColumns,
@@ -46,8 +42,7 @@ pub(super) struct TextRows {
 }
 
 impl TextRows {
-    /// Reads the header and finds the columns; the layout that the log turns out to have, and what
-    /// keeps a strict reader from it.
+    /// Finds the columns; the layout that the log turns out to have, and what keeps a strict reader from it.
     pub(super) fn open(
         path: &Path,
         content: Content,
@@ -56,9 +51,8 @@ impl TextRows {
     ) -> Result<(Self, Layout, Option<LogError>), LogError> {
         let file = TextFile::open(path, content, layout, strictness)?;
         let header = Header {
-            file: file.file(),
-            line: file.header_line(),
-            names: file.header(),
+            at: format!("{}:{}", file.file(), file.header_line),
+            names: &file.header,
         };
         let layout = choose(header.names, layout);
         let (columns, refused) = match (header.columns(&layout), strictness) {
@@ -79,7 +73,6 @@ impl TextRows {
         Ok((rows, layout, refused))
     }
 
-    /// Time of the current row, where it has one.
     #[inline]
     fn stamp(&mut self) -> Option<Stamped> {
         if let Some((rate, row)) = &mut self.even {
@@ -123,13 +116,13 @@ impl LogRows for TextRows {
         self.time = Some(TimeColumn {
             index,
             seconds,
-            rest: rest_of(self.file.header(), index),
+            rest: rest_of(&self.file.header, index),
             exact: None,
         });
     }
 
     fn names(&self) -> &[String] {
-        self.file.header()
+        &self.file.header
     }
 
     fn next(&mut self) -> Result<Option<Stamped>, LogError> {
@@ -168,9 +161,8 @@ impl LogRows for TextRows {
     }
 
     fn logged(&self, column: usize) -> Option<f64> {
-        self.file
-            .number(column)
-            .or_else(|| self.file.is_blank_field(column).then_some(f64::NAN))
+        let blank = || self.file.is_blank_field(column).then_some(f64::NAN);
+        self.file.number(column).or_else(blank)
     }
 
     fn refuse_comma(&self, column: usize) -> Result<(), LogError> {
@@ -189,17 +181,15 @@ impl LogRows for TextRows {
     }
 
     fn malformed(&self) -> u64 {
-        self.file.malformed()
+        self.file.malformed
     }
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.file.in_words();
         if let Some((time, (rest, _))) = self.time.and_then(|time| Some((time, time.rest?))) {
-            let name = |column: usize| escape(&self.names()[column]);
+            let [seconds, rest] = [time.index, rest].map(|column| escape(&self.names()[column]));
             out.push(format!(
-                "times are those of `{}` and `{}` together",
-                name(time.index),
-                name(rest)
+                "times are those of `{seconds}` and `{rest}` together"
             ));
         }
         out
@@ -220,8 +210,6 @@ impl LogRows for TextRows {
 
 /// Exponent of a power of ten, for those that units of time have.
 fn power_of_ten(factor: f64) -> Option<i32> {
-    [(1.0, 0), (1e-3, -3), (1e-6, -6), (1e-9, -9)]
-        .into_iter()
-        .find(|(unit, _)| *unit == factor)
-        .map(|(_, power)| power)
+    let mut known = [(1.0, 0), (1e-3, -3), (1e-6, -6), (1e-9, -9)].into_iter();
+    known.find_map(|(unit, power)| (unit == factor).then_some(power))
 }

@@ -1,8 +1,6 @@
 //! Decimal numbers from bytes.
 
-/// The nearest f64 to a decimal number, NaN and infinities included; `None` where the field is no number.
-///
-/// Spaces around the number and one pair of quotes are passed over.
+/// The nearest f64 to a number, NaN and infinities included, spaces and one pair of quotes around it passed over.
 #[inline]
 pub(super) fn parse(field: &[u8]) -> Option<f64> {
     fast_float2::parse(field)
@@ -27,31 +25,10 @@ mod tests {
 
     #[test]
     fn numbers_in_every_spelling_equal_the_standard_library() {
-        for text in [
-            "0",
-            "-0",
-            "+1.5",
-            "1.",
-            ".5",
-            "-.5e3",
-            "1e22",
-            "1e23",
-            "1e-22",
-            "9007199254740993",
-            "123456789012345678901234567890",
-            "2.2250738585072014e-308",
-            "4.9e-324",
-            "1.7976931348623157e308",
-            "1e999",
-            "7.67021588343e-06",
-            "0.30000000000000004",
-            "NaN",
-            "inf",
-            "99999999999999999999e-20",
-            "1e+5",
-            "1E5",
-            "0.000000000000000000000000001",
-        ] {
+        let spellings = "0 -0 +1.5 1. .5 -.5e3 1e22 1e23 1e-22 1e999 1e+5 1E5 NaN inf 9007199254740993 \
+            123456789012345678901234567890 2.2250738585072014e-308 4.9e-324 1.7976931348623157e308 \
+            7.67021588343e-06 0.30000000000000004 99999999999999999999e-20 0.000000000000000000000000001";
+        for text in spellings.split_whitespace() {
             let expected: f64 = text.parse().unwrap();
             let found = parse(text.as_bytes()).unwrap();
             assert_eq!(found.to_bits(), expected.to_bits(), "{text}");

@@ -1,6 +1,5 @@
 //! Records of a text, one by one: lines of plain fields are cut where they lie, all others by csv-core.
 
-use std::fmt;
 use std::io::{self, Read};
 
 use csv_core::ReadRecordResult;
@@ -10,7 +9,6 @@ use crate::log::content::Bytes;
 
 /// Bytes that one record may take.
 pub(super) const LONGEST_ROW: usize = 1 << 20;
-/// Bytes read at once.
 pub(super) const BUFFER: usize = 1 << 17;
 /// Fields for which there is room at first.
 const FIELDS: usize = 64;
@@ -34,7 +32,6 @@ impl Record {
         self.bytes.get(begin..end)
     }
 
-    /// Takes a line without quotes.
     #[inline]
     fn take_line(&mut self, line: &[u8], delimiter: u8) {
         self.bytes.clear();
@@ -63,21 +60,12 @@ pub(super) struct Records {
     /// Bytes and line ends that were read.
     bytes: u64,
     line: u64,
-    /// Bytes up to the end of the record.
     end: u64,
-    /// Line at which the record begins.
     begins: u64,
-    /// The last byte that was taken from the file.
     last: u8,
     ends: Vec<usize>,
     /// Nothing was read yet: there may be a byte order mark.
     first: bool,
-}
-
-impl fmt::Debug for Records {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Records")
-    }
 }
 
 impl Records {
@@ -125,7 +113,6 @@ impl Records {
         self.last == b'\n'
     }
 
-    /// Reads the next record; false at the end.
     pub(super) fn read(&mut self, record: &mut Record) -> io::Result<bool> {
         self.begins = self.line;
         if !self.first && self.read_line(record)? {
@@ -178,9 +165,8 @@ impl Records {
                 (self.at, self.filled) = (0, 0);
                 self.fill()?;
             }
-            record
-                .bytes
-                .resize(record.bytes.len().max(size + FIELDS), 0);
+            let room = record.bytes.len().max(size + FIELDS);
+            record.bytes.resize(room, 0);
             let (result, read, written, fields) = self.core.read_record(
                 &self.buffer[self.at..self.filled],
                 &mut record.bytes[size..],
@@ -232,12 +218,7 @@ impl Records {
 
     /// Takes more bytes behind those that are there; how many they are.
     fn fill(&mut self) -> io::Result<usize> {
-        let count = loop {
-            match self.inner.read(&mut self.buffer[self.filled..]) {
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                other => break other?,
-            }
-        };
+        let count = self.inner.read(&mut self.buffer[self.filled..])?;
         self.ended |= count == 0;
         self.filled += count;
         if let Some(last) = self.filled.checked_sub(1).filter(|_| count > 0) {

@@ -1,21 +1,18 @@
 //! Where the table begins in a text: after a preamble, with a row of units, or right away.
 
-use super::line::{Line, Wanted, delimiter_of, split};
+use super::line::{Line, Parting};
 use super::number;
 use crate::log::columns;
+use crate::log::section::{Delimiter, LogSection};
 use crate::log::time::Instant;
 
-/// Where the table begins.
 pub(super) struct Found {
     /// Index of the line that names the columns.
     pub(super) at: usize,
-    /// What parts its fields, and whether runs of it count as one.
-    pub(super) parting: (u8, bool),
+    pub(super) parting: Parting,
     /// Whether the row after it holds no numbers.
     pub(super) second_row: bool,
-    /// Units in that row.
     pub(super) units: Vec<String>,
-    /// What was taken for what.
     pub(super) notes: Vec<String>,
 }
 
@@ -30,18 +27,19 @@ pub(super) fn are_units(fields: &[&str]) -> bool {
     let fields: Vec<String> = fields.iter().map(bare).collect();
     let nothing = |field: &String| matches!(field.as_str(), "" | "-" | "1" | "[]");
     let bracket = |field: &String| {
-        let pairs = [('[', ']'), ('(', ')'), ('<', '>')];
-        pairs
-            .iter()
-            .any(|(open, close)| field.starts_with(*open) && field.ends_with(*close))
+        let mut pairs = ["[]", "()", "<>"].into_iter().map(|pair| pair.split_at(1));
+        pairs.any(|(open, close)| field.starts_with(open) && field.ends_with(close))
     };
     let unit = |field: &String| nothing(field) || bracket(field) || columns::is_unit(field);
     fields.iter().all(unit) && !fields.iter().all(nothing)
 }
 
-/// Finds the line that names the columns: the first one that rows of as many numbers follow, at once or after one
-/// row of units; the first line where there is none.
-pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &Wanted) -> Found {
+/// Finds the line that names the columns: the first one that rows of as many numbers follow, or a row of units and they.
+pub(super) fn find(
+    lines: &[Line<'_>],
+    (first, comment): (usize, u8),
+    wanted: &LogSection,
+) -> Found {
     let sign = char::from(comment);
     let is_row = |line: &Line<'_>| {
         let text = line.text.trim();
@@ -54,26 +52,25 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     let mut parting = None;
     let mut from = 0;
     let separator = lines[first].text.trim().trim_matches('"');
-    if let Some(sign) = separator
-        .strip_prefix("sep=")
-        .or(separator.strip_prefix("SEP="))
-        && let Some(sign) = sign.bytes().next().filter(u8::is_ascii)
+    let separator = ["sep=", "SEP="]
+        .iter()
+        .find_map(|key| separator.strip_prefix(key));
+    if let Some(sign) = separator.and_then(|sign| sign.bytes().next())
+        && sign.is_ascii()
     {
-        parting = Some((sign, sign == b' '));
+        let runs = sign == b' ';
+        parting = Some(Parting { sign, runs });
         from = 1;
     }
-    let asked = wanted.header_line.and_then(|number| {
-        rows.iter()
-            .position(|k| lines[*k].number == number)
-            .or_else(|| rows.iter().position(|k| lines[*k].number > number))
-    });
+    let asked = wanted.header_line;
+    let asked = asked.and_then(|number| rows.iter().position(|k| lines[*k].number >= number));
     // a name in quotes that goes on in the next line: its lines are no rows
     let goes_on = |line: usize| lines[line].text.matches('"').count() % 2 == 1;
-    let table = |row: usize| Table::at(lines, &rows[row..], parting, wanted);
+    let table = |row: usize| Table::at(lines, &rows[row..], parting, wanted.delimiter);
     let plain = |row: usize| {
         let line = rows.get(row).map_or("", |k| &lines[*k].text);
         Table {
-            parting: parting.unwrap_or_else(|| delimiter_of(line, wanted.delimiter)),
+            parting: parting.unwrap_or_else(|| Parting::of(line, wanted.delimiter)),
             second: None,
         }
     };
@@ -81,28 +78,25 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
         Some(row) => (row, table(row).unwrap_or_else(|| plain(row))),
         None => {
             let headless = |row: usize| {
-                let (sign, spaces) = plain(row).parting;
-                let fields = split(&lines[rows[row]].text, sign, spaces);
+                let fields = plain(row).parting.split(&lines[rows[row]].text);
                 row == from && fields.iter().all(|field| is_datum(field))
             };
             // a row of a preamble has others of its kind below it, and most rows are of another
             let lasts = |row: usize| {
-                let (sign, spaces) = table(row).map_or(plain(row).parting, |found| found.parting);
-                let width = |k: &usize| width(&split(&lines[*k].text, sign, spaces));
+                let parting = table(row).unwrap_or_else(|| plain(row)).parting;
+                let width = |k: &usize| width(&parting.split(&lines[*k].text));
                 let below = &rows[row..];
                 let alike = below.iter().filter(|k| width(k) == width(&rows[row]));
                 2 * alike.count() > below.len()
             };
             let begins = |row: &usize| headless(*row) || table(*row).is_some();
             let fits = |row: &usize| begins(row) && lasts(*row);
+            let mut all = from..rows.len();
             let row = match rows.get(from).is_some_and(|k| goes_on(*k)) {
-                true => from,
-                false => (from..rows.len())
-                    .find(fits)
-                    .or_else(|| (from..rows.len()).find(begins))
-                    .unwrap_or(from),
+                true => None,
+                false => all.clone().find(fits).or_else(|| all.find(begins)),
             };
-            let row = row.min(rows.len().saturating_sub(1));
+            let row = row.unwrap_or(from).min(rows.len().saturating_sub(1));
             (row, table(row).unwrap_or_else(|| plain(row)))
         }
     };
@@ -121,17 +115,14 @@ pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &W
     }
     let mut units = Vec::new();
     if let Some(second) = second {
-        let (sign, spaces) = found.parting;
         let below = &lines[rows[row + 1]];
-        let fields = split(&below.text, sign, spaces);
+        let (fields, line) = (found.parting.split(&below.text), below.number);
+        notes.push(match second {
+            Second::Units => format!("units are those of line {line}"),
+            Second::Words => format!("line {line} holds words and is passed over"),
+        });
         if second == Second::Units {
             units = fields.iter().map(|unit| (*unit).to_owned()).collect();
-            notes.push(format!("units are those of line {}", below.number));
-        } else {
-            notes.push(format!(
-                "line {} holds words and is passed over",
-                below.number
-            ));
         }
     }
     Found {
@@ -155,9 +146,8 @@ enum Second {
     Words,
 }
 
-/// A table that begins with a line of names.
 struct Table {
-    parting: (u8, bool),
+    parting: Parting,
     second: Option<Second>,
 }
 
@@ -166,13 +156,12 @@ impl Table {
     fn at(
         lines: &[Line<'_>],
         rows: &[usize],
-        parting: Option<(u8, bool)>,
-        wanted: &Wanted,
+        parting: Option<Parting>,
+        asked: Delimiter,
     ) -> Option<Self> {
         let line = |row: usize| Some(&*lines[*rows.get(row)?].text);
-        let (sign, spaces) =
-            parting.unwrap_or_else(|| delimiter_of(line(0).unwrap_or_default(), wanted.delimiter));
-        let fields = |row: usize| Some(split(line(row)?, sign, spaces));
+        let parting = parting.unwrap_or_else(|| Parting::of(line(0).unwrap_or_default(), asked));
+        let fields = |row: usize| Some(parting.split(line(row)?));
         let names = fields(0)?;
         let n = width(&names);
         if names.iter().any(|name| is_datum(name)) {
@@ -186,7 +175,7 @@ impl Table {
         let is_number = |field: &&str| {
             // a decimal comma is reported later on, with the line
             let point = field.replace(',', ".");
-            is_datum(field) || (sign != b',' && number::parse(point.as_bytes()).is_some())
+            is_datum(field) || (parting.sign != b',' && number::parse(point.as_bytes()).is_some())
         };
         let data = |row: usize| {
             let Some(fields) = fields(row) else {
@@ -196,10 +185,8 @@ impl Table {
             as_wide(&fields) && numbers > 0 && 2 * numbers >= fields.len()
         };
         if data(1) {
-            return Some(Self {
-                parting: (sign, spaces),
-                second: None,
-            });
+            let second = None;
+            return Some(Self { parting, second });
         }
         let below = fields(1)?;
         if !data(2) || !as_wide(&below) || below.iter().any(is_number) {
@@ -217,9 +204,7 @@ impl Table {
             false if distinct(&below) > distinct(&names) => return None,
             false => Second::Words,
         };
-        Some(Self {
-            parting: (sign, spaces),
-            second: Some(second),
-        })
+        let second = Some(second);
+        Some(Self { parting, second })
     }
 }

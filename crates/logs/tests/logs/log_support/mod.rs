@@ -6,6 +6,7 @@ pub mod recording;
 use std::path::{Path, PathBuf};
 
 use cft_ident_logs::log::{Block, Layout, LogSpec, Reader};
+use proptest::prelude::*;
 
 /// A file of the folder with measured logs that lies beside the repository; said aloud where absent.
 pub fn shared(file: &str) -> Option<PathBuf> {
@@ -17,6 +18,31 @@ pub fn shared(file: &str) -> Option<PathBuf> {
     }
     eprintln!("SKIPPED: {} is absent", path.display());
     None
+}
+
+/// A file of `fixtures/logs`.
+pub fn fixture(name: &str) -> PathBuf {
+    Path::new(cft_ident_support::ROOT)
+        .join("fixtures/logs")
+        .join(name)
+}
+
+/// Whether a text holds all of these words.
+#[track_caller]
+pub fn says(text: &str, words: &[&str]) {
+    for word in words {
+        assert!(text.contains(word), "`{word}` is missing in: {text}");
+    }
+}
+
+/// Numbers of every size that a log may hold.
+pub fn finite() -> impl Strategy<Value = f64> {
+    let finite = any::<u64>().prop_map(f64::from_bits);
+    let finite = finite.prop_filter("finite", |value| value.is_finite());
+    finite.prop_map(|value| match value.abs() > 1e30 {
+        true => 1.0 / value,
+        false => value,
+    })
 }
 
 /// Reads a whole log into one block.

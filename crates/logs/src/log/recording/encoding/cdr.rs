@@ -5,23 +5,20 @@
 
 use super::cursor::{ByteSpan, Cursor, Encoding, MalformedMessage};
 use super::leaves;
-use super::msg::{Definition, DefinitionError, ElementType, Field};
+use super::msg::{self, ElementType, Field, Messages};
 use super::plan::{By, Node, Slot, Walkthrough};
-use crate::log::recording::message::{Leaf, MessageReader, Schema, Uneven};
+use crate::log::recording::message::{Leaf, MessageReader, OpenedReader, Schema, Uneven};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
 /// Messages in CDR, and in the packed form of ROS 1, by their `.msg` definitions.
-pub(super) fn open(
-    schema: &Schema,
-    fields: &[Vec<FieldPath>],
-) -> Option<Result<Box<dyn MessageReader>, String>> {
+pub(super) fn open(schema: &Schema, fields: &[Vec<FieldPath>]) -> Option<OpenedReader> {
     let encoding = match (schema.encoding.as_str(), schema.language.as_str()) {
         ("cdr", _) => Encoding::Cdr,
         ("ros1", "ros1msg" | "") => Encoding::Ros1,
         _ => return None,
     };
-    let reader = || -> Result<Box<dyn MessageReader>, String> {
+    let reader = || -> OpenedReader {
         let text = std::str::from_utf8(&schema.text)
             .map_err(|_| "its definition is no text".to_owned())?;
         let other = !matches!(&*schema.language, "ros2msg" | "ros1msg" | "")
@@ -29,14 +26,14 @@ pub(super) fn open(
             || text.starts_with("IDL:");
         // what the type is called says how it is laid out, where it is one that is known here
         let text = if other { "" } else { text };
-        let definition = Definition::parse(&schema.name, text).map_err(|error| match other {
+        let messages = msg::parse(&schema.name, text).map_err(|error| match other {
             true => format!(
                 "its definition is `{}`, which is read for sensor_msgs/msg/JointState alone",
                 schema.language
             ),
-            false => error.to_string(),
+            false => error,
         })?;
-        Ok(Box::new(CdrReader::new(&definition, encoding, fields).0))
+        Ok(Box::new(CdrReader::new(messages, encoding, fields)))
     };
     Some(reader())
 }
@@ -44,15 +41,14 @@ pub(super) fn open(
 /// Reads the numbers of some fields out of the messages of one type.
 #[derive(Debug, Clone)]
 pub struct CdrReader {
-    messages: Vec<Vec<Field>>,
+    messages: Messages,
     encoding: Encoding,
     plan: Walkthrough,
     /// Place and number of the elements of each array that is asked for.
     arrays: Vec<Option<ByteSpan>>,
     /// Places of the texts in each list of names.
     lists: Vec<Vec<ByteSpan>>,
-    outputs: usize,
-    /// Names of the arrays that are asked for by names, by the outputs.
+    /// Of each output the name of the array that is asked for an element by its name.
     labels: Vec<String>,
     uneven: Option<Uneven>,
     order: u64,
@@ -67,57 +63,44 @@ impl CdrReader {
     /// [`Value::Absent`].
     ///
     /// # Errors
-    /// [`DefinitionError`] where the definition cannot be used.
-    pub fn parse(name: &str, definition: &str, paths: &[&str]) -> Result<Self, DefinitionError> {
-        let definition = Definition::parse(name, definition)?;
-        let fields: Vec<Vec<FieldPath>> = paths
-            .iter()
-            .map(|path| vec![FieldPath::parse(path)])
-            .collect();
-        Ok(Self::new(&definition, Encoding::Cdr, &fields).0)
+    /// Why the definition cannot be used.
+    pub fn parse(name: &str, definition: &str, paths: &[&str]) -> Result<Self, String> {
+        let messages = msg::parse(name, definition)?;
+        Ok(Self::new(messages, Encoding::Cdr, &FieldPath::each(paths)))
     }
 
     /// The fields of one message, in the order of their paths.
     ///
     /// # Errors
-    /// [`MalformedMessage`]: the bytes are no message of this type.
-    pub fn values(&mut self, data: &[u8]) -> Result<Vec<Value>, MalformedMessage> {
-        let mut out = vec![Value::Absent; self.outputs];
+    /// Why the bytes are no message of this type.
+    pub fn values(&mut self, data: &[u8]) -> Result<Vec<Value>, String> {
+        let mut out = vec![Value::Absent; self.labels.len()];
         self.read(data, &mut out)?;
         Ok(out)
     }
 
-    /// Plans the reading of `fields`: for each the paths it may have, the first that leads to a
-    /// number is taken. Says for each whether one does.
-    fn new(
-        definition: &Definition,
-        encoding: Encoding,
-        fields: &[Vec<FieldPath>],
-    ) -> (Self, Vec<bool>) {
+    /// Plans the reading of `fields`: of the paths that each may have the first that leads to a number.
+    fn new(messages: Messages, encoding: Encoding, fields: &[Vec<FieldPath>]) -> Self {
         let mut plan = Walkthrough::default();
-        let mut found = Vec::with_capacity(fields.len());
         for (output, paths) in fields.iter().enumerate() {
-            let mut steps = paths.iter().map(|path| &path.steps);
-            found.push(steps.any(|steps| plan.add(&definition.messages, steps, output)));
+            let mut paths = paths.iter();
+            paths.any(|path| plan.add(&messages, &path.steps, output));
         }
-        let reader = Self {
-            messages: definition.messages.clone(),
+        Self {
+            messages,
             encoding,
             arrays: vec![None; plan.arrays.len()],
             lists: vec![Vec::new(); plan.lists],
             plan,
-            outputs: fields.len(),
             labels: fields.iter().map(|paths| label(paths)).collect(),
             uneven: None,
             order: 0,
-        };
-        (reader, found)
+        }
     }
 
-    /// Reads the fields of one message into `out`, one value for each field that was asked for.
-    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), MalformedMessage> {
+    fn take(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), MalformedMessage> {
         out.fill(Value::Absent);
-        if out.len() != self.outputs {
+        if out.len() != self.labels.len() {
             return Ok(());
         }
         self.arrays.fill(None);
@@ -150,13 +133,11 @@ impl CdrReader {
                         }
                         continue;
                     }
-                    match find(cursor.data, names, name, *last) {
-                        Some(index) => {
-                            *last = index;
-                            index
-                        }
-                        None => continue,
-                    }
+                    let Some(index) = find(cursor.data, names, name, *last) else {
+                        continue;
+                    };
+                    *last = index;
+                    index
                 }
             };
             let kind = self.plan.arrays[pick.array];
@@ -167,28 +148,23 @@ impl CdrReader {
         }
         Ok(())
     }
+}
 
-    /// Names in the lists of the message that was read last, for messages to the user.
+impl MessageReader for CdrReader {
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
+        self.take(data, out).map_err(|error| error.to_string())
+    }
+
     fn names(&self, data: &[u8]) -> Vec<String> {
         let body = match self.encoding {
             Encoding::Cdr => data.get(4..).unwrap_or_default(),
             Encoding::Ros1 => data,
         };
         let texts = self.lists.iter().flatten();
+        let texts = texts.filter_map(|span| span.text(body));
         texts
-            .filter_map(|span| body.get(span.start..span.start + span.count))
-            .map(|bytes| String::from_utf8_lossy(bytes).into_owned())
+            .map(|text| String::from_utf8_lossy(text).into_owned())
             .collect()
-    }
-}
-
-impl MessageReader for CdrReader {
-    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
-        self.read(data, out).map_err(|error| error.to_string())
-    }
-
-    fn names(&self, data: &[u8]) -> Vec<String> {
-        self.names(data)
     }
 
     fn order(&self) -> u64 {
@@ -219,7 +195,7 @@ fn label(paths: &[FieldPath]) -> String {
 /// The names of lists and their order as one number (FNV-1a).
 fn order(data: &[u8], lists: &[Vec<ByteSpan>]) -> u64 {
     let spans = lists.iter().flatten();
-    let names = spans.filter_map(|span| data.get(span.start..span.start + span.count));
+    let names = spans.filter_map(|span| span.text(data));
     names.fold(0xcbf2_9ce4_8422_2325, |hash, name| {
         let ended = name.iter().chain(&[0]);
         ended.fold(hash, |hash, byte| {
@@ -230,15 +206,13 @@ fn order(data: &[u8], lists: &[Vec<ByteSpan>]) -> u64 {
 
 /// Index of a name, where it stood before or anywhere else.
 fn find(data: &[u8], names: &[ByteSpan], name: &str, last: usize) -> Option<usize> {
-    let is =
-        |span: &ByteSpan| data.get(span.start..span.start + span.count) == Some(name.as_bytes());
-    if names.get(last).is_some_and(is) {
-        return Some(last);
+    let is = |span: &ByteSpan| span.text(data) == Some(name.as_bytes());
+    match names.get(last).is_some_and(is) {
+        true => Some(last),
+        false => names.iter().position(is),
     }
-    names.iter().position(is)
 }
 
-/// One message being walked, and where its numbers go.
 struct Walk<'w> {
     messages: &'w [Vec<Field>],
     arrays: &'w mut [Option<ByteSpan>],
@@ -302,9 +276,7 @@ impl Walk<'_> {
             }
             ElementType::WideString => {
                 for _ in 0..count {
-                    let length = cursor.length()?;
-                    let bytes = length.checked_mul(2).ok_or_else(|| cursor.short())?;
-                    cursor.pass(bytes)?;
+                    cursor.wide_text()?;
                 }
             }
             ElementType::Message(message) => {

@@ -8,30 +8,16 @@ use thiserror::Error;
 use super::msg::{Count, Primitive};
 use crate::log::recording::value::Value;
 
-/// What is wrong with the bytes of a message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-pub enum MalformedMessage {
-    /// The message ends inside a field.
-    #[error("it ends after {bytes} bytes, inside a field")]
-    Short {
-        /// Length of the message.
-        bytes: usize,
-    },
-    /// An encoding that is not plain CDR.
-    #[error("its encoding {kind:#06x} is not plain CDR")]
-    Encapsulation {
-        /// The identifier in its first two bytes.
-        kind: u16,
-    },
-    /// A count that the message has no bytes for.
-    #[error("it declares {count} elements, for which it has no bytes")]
-    Count {
-        /// The count.
-        count: u64,
-    },
+#[derive(Debug, Error)]
+pub(super) enum MalformedMessage {
+    #[error("it ends after {0} bytes, inside a field")]
+    Short(usize),
+    #[error("its encoding {0:#06x} is not plain CDR")]
+    Encapsulation(u16),
+    #[error("it declares {0} elements, for which it has no bytes")]
+    Count(usize),
 }
 
-/// How numbers and texts are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
     /// CDR with its four bytes of header, as ROS 2 writes it.
@@ -47,7 +33,12 @@ pub(super) struct ByteSpan {
     pub(super) count: usize,
 }
 
-/// The bytes of one message, and how far they are read.
+impl ByteSpan {
+    pub(super) fn text(self, data: &[u8]) -> Option<&[u8]> {
+        data.get(self.start..self.start + self.count)
+    }
+}
+
 pub(super) struct Cursor<'d> {
     pub(super) data: &'d [u8],
     at: usize,
@@ -71,10 +62,10 @@ impl<'d> Cursor<'d> {
                     1 => (body, false, 8),
                     6 => (body, true, 4),
                     7 => (body, false, 4),
-                    _ => return Err(MalformedMessage::Encapsulation { kind }),
+                    _ => return Err(MalformedMessage::Encapsulation(kind)),
                 }
             }
-            (Encoding::Cdr, _) => return Err(MalformedMessage::Short { bytes: total }),
+            (Encoding::Cdr, _) => return Err(MalformedMessage::Short(total)),
         };
         Ok(Self {
             data,
@@ -85,8 +76,8 @@ impl<'d> Cursor<'d> {
         })
     }
 
-    pub(super) fn short(&self) -> MalformedMessage {
-        MalformedMessage::Short { bytes: self.total }
+    fn short(&self) -> MalformedMessage {
+        MalformedMessage::Short(self.total)
     }
 
     #[inline]
@@ -97,7 +88,7 @@ impl<'d> Cursor<'d> {
 
     /// Passes over `count` bytes; where they begin.
     #[inline]
-    pub(super) fn pass(&mut self, count: usize) -> Result<usize, MalformedMessage> {
+    fn pass(&mut self, count: usize) -> Result<usize, MalformedMessage> {
         let start = self.at;
         match start.checked_add(count) {
             Some(end) if end <= self.data.len() => {
@@ -136,7 +127,7 @@ impl<'d> Cursor<'d> {
         })
     }
 
-    pub(super) fn length(&mut self) -> Result<usize, MalformedMessage> {
+    fn length(&mut self) -> Result<usize, MalformedMessage> {
         self.align_to(4);
         let at = self.pass(4)?;
         Ok(u32::from_le_bytes(self.bytes_at(at)?) as usize)
@@ -150,9 +141,7 @@ impl<'d> Cursor<'d> {
             Count::Sequence => self.length()?,
         };
         if count > self.data.len().saturating_sub(self.at) {
-            return Err(MalformedMessage::Count {
-                count: count as u64,
-            });
+            return Err(MalformedMessage::Count(count));
         }
         Ok(count)
     }
@@ -168,20 +157,25 @@ impl<'d> Cursor<'d> {
         })
     }
 
+    pub(super) fn wide_text(&mut self) -> Result<(), MalformedMessage> {
+        let length = self.length()?;
+        self.pass_all(length, 2).map(|_| ())
+    }
+
     pub(super) fn primitives(
         &mut self,
         count: usize,
         kind: Primitive,
     ) -> Result<ByteSpan, MalformedMessage> {
-        if count == 0 {
-            return Ok(ByteSpan {
-                start: self.at,
-                count,
-            });
+        if count > 0 {
+            self.align_to(kind.size());
         }
-        self.align_to(kind.size());
-        let bytes = count.checked_mul(kind.size()).ok_or_else(|| self.short())?;
-        let start = self.pass(bytes)?;
+        let start = self.pass_all(count, kind.size())?;
         Ok(ByteSpan { start, count })
+    }
+
+    /// Passes over elements of so many bytes; where they begin.
+    fn pass_all(&mut self, count: usize, size: usize) -> Result<usize, MalformedMessage> {
+        self.pass(count.checked_mul(size).ok_or_else(|| self.short())?)
     }
 }

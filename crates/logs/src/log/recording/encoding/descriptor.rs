@@ -6,12 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use super::wire::{Broken, Fields, Item};
+use super::wire::{Broken, Fields, Item, elements};
 
 /// Messages inside messages inside ..., deepest.
 const MAX_DEPTH: usize = 64;
 
-/// The types of one set.
 #[derive(Debug, Clone)]
 pub(super) struct Types {
     pub(super) messages: Vec<MessageType>,
@@ -19,7 +18,6 @@ pub(super) struct Types {
     pub(super) root: usize,
 }
 
-/// A type of messages.
 #[derive(Debug, Clone, Default)]
 pub(super) struct MessageType {
     pub(super) fields: Vec<FieldType>,
@@ -27,7 +25,6 @@ pub(super) struct MessageType {
     pub(super) is_map_entry: bool,
 }
 
-/// A field of a type.
 #[derive(Debug, Clone)]
 pub(super) struct FieldType {
     pub(super) name: String,
@@ -38,7 +35,6 @@ pub(super) struct FieldType {
     pub(super) kind: Kind,
 }
 
-/// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Number(Number),
@@ -49,7 +45,6 @@ pub(super) enum Kind {
     Other,
 }
 
-/// A type of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Number {
     Double,
@@ -67,17 +62,8 @@ pub(super) enum Number {
     Bool,
 }
 
-/// Whether fields say that they are there although they are 0.
-#[derive(Clone, Copy)]
-struct Presence {
-    implicit: bool,
-}
-
-/// A field whose type is not looked up yet.
-struct Unresolved {
-    field: FieldType,
-    type_name: Option<String>,
-}
+/// A field with the name of its type, which is not looked up yet.
+type Unresolved = (FieldType, Option<String>);
 
 /// All types of a set, by their full name.
 #[derive(Default)]
@@ -87,7 +73,6 @@ struct Found {
 }
 
 impl Types {
-    /// Finds message type `name` in a descriptor set.
     pub(super) fn parse(name: &str, set: &[u8]) -> Result<Self, String> {
         let damaged = |_: Broken| "its descriptor set is damaged".to_owned();
         let mut found = Found::default();
@@ -100,22 +85,18 @@ impl Types {
         let root = found.names.get(&full).copied();
         let root = root.ok_or_else(|| format!("its descriptor set does not define {name}"))?;
         let Found { names, messages } = found;
-        let resolve = |unresolved: Unresolved| {
-            let mut field = unresolved.field;
-            if let (Kind::Message(index), Some(name)) = (&mut field.kind, &unresolved.type_name) {
-                match names.get(name) {
-                    Some(found) => *index = *found,
-                    None => field.kind = Kind::Other,
-                }
+        let resolve = |(mut field, type_name): Unresolved| {
+            if matches!(field.kind, Kind::Message(_)) {
+                let found = type_name.and_then(|name| names.get(&name).copied());
+                field.kind = found.map_or(Kind::Other, Kind::Message);
             }
             field
         };
-        let messages = messages
-            .into_iter()
-            .map(|(fields, is_map_entry)| MessageType {
-                fields: fields.into_iter().map(resolve).collect(),
-                is_map_entry,
-            });
+        let messages = messages.into_iter();
+        let messages = messages.map(|(fields, is_map_entry)| MessageType {
+            fields: fields.into_iter().map(resolve).collect(),
+            is_map_entry,
+        });
         Ok(Self {
             messages: messages.collect(),
             root,
@@ -127,31 +108,31 @@ impl Found {
     /// `FileDescriptorProto`: package 2, messages 4, options 8, syntax 12, edition 14.
     fn add_file(&mut self, file: &[u8]) -> Result<(), Broken> {
         let mut package = String::new();
-        let mut presence = Presence { implicit: false };
+        // whether fields are left out where they are 0
+        let mut implicit = false;
         for field in Fields::new(file) {
             match field? {
                 (2, Item::Bytes(name)) => package = format!(".{}", text(name)),
-                (12, Item::Bytes(syntax)) => presence.implicit |= syntax == b"proto3",
-                // features 50, field_presence 1
-                (8, Item::Bytes(options)) => presence.ask(options, 50)?,
+                (12, Item::Bytes(syntax)) => implicit |= syntax == b"proto3",
+                (8, Item::Bytes(options)) => ask_presence(options, 50, &mut implicit)?,
                 _ => {}
             }
         }
         let mut waiting: Vec<(String, &[u8], usize)> = Vec::new();
         let messages = |scope: &str, data, tag, depth, to: &mut Vec<_>| -> Result<(), Broken> {
             for field in Fields::new(data) {
-                match field? {
-                    (number, Item::Bytes(message)) if number == tag && depth < MAX_DEPTH => {
-                        to.push((scope.to_owned(), message, depth));
-                    }
-                    _ => {}
+                if let (number, Item::Bytes(message)) = field?
+                    && number == tag
+                    && depth < MAX_DEPTH
+                {
+                    to.push((scope.to_owned(), message, depth));
                 }
             }
             Ok(())
         };
         messages(&package, file, 4, 0, &mut waiting)?;
         while let Some((scope, message, depth)) = waiting.pop() {
-            let full = self.add_message(&scope, message, presence)?;
+            let full = self.add_message(&scope, message, implicit)?;
             messages(&full, message, 3, depth + 1, &mut waiting)?;
         }
         Ok(())
@@ -162,13 +143,13 @@ impl Found {
         &mut self,
         scope: &str,
         message: &[u8],
-        presence: Presence,
+        implicit: bool,
     ) -> Result<String, Broken> {
         let (mut full, mut fields, mut is_map_entry) = (String::new(), Vec::new(), false);
         for field in Fields::new(message) {
             match field? {
                 (1, Item::Bytes(name)) => full = format!("{scope}.{}", text(name)),
-                (2, Item::Bytes(field)) => fields.push(field_type(field, presence)?),
+                (2, Item::Bytes(field)) => fields.push(field_type(field, implicit)?),
                 (7, Item::Bytes(options)) => {
                     for option in Fields::new(options) {
                         is_map_entry |= matches!(option?, (7, Item::Varint(1..)));
@@ -185,28 +166,22 @@ impl Found {
     }
 }
 
-impl Presence {
-    /// Takes what options say of it in their `FeatureSet`: 1 explicit, 2 implicit, 3 required.
-    fn ask(&mut self, options: &[u8], features: u32) -> Result<(), Broken> {
-        for option in Fields::new(options) {
-            let (number, Item::Bytes(set)) = option? else {
-                continue;
-            };
-            if number != features {
-                continue;
-            }
-            for feature in Fields::new(set) {
-                if let (1, Item::Varint(presence)) = feature? {
-                    self.implicit = presence == 2;
+/// Takes from field `features` of options, a `FeatureSet`, its field_presence 1: explicit 1, implicit 2, required 3.
+fn ask_presence(options: &[u8], features: u32, implicit: &mut bool) -> Result<(), Broken> {
+    for set in elements(options, features) {
+        if let Item::Bytes(set) = set? {
+            for presence in elements(set, 1) {
+                if let Item::Varint(presence) = presence? {
+                    *implicit = presence == 2;
                 }
             }
         }
-        Ok(())
     }
+    Ok(())
 }
 
 /// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9, proto3_optional 17.
-fn field_type(field: &[u8], mut presence: Presence) -> Result<Unresolved, Broken> {
+fn field_type(field: &[u8], mut implicit: bool) -> Result<Unresolved, Broken> {
     let (mut name, mut type_name) = (String::new(), None);
     let (mut number, mut label, mut kind, mut chosen) = (0, 1, 0, false);
     for item in Fields::new(field) {
@@ -216,46 +191,39 @@ fn field_type(field: &[u8], mut presence: Presence) -> Result<Unresolved, Broken
             (4, Item::Varint(value)) => label = value,
             (5, Item::Varint(value)) => kind = value,
             (6, Item::Bytes(name)) => type_name = Some(text(name)),
-            // features 21
-            (8, Item::Bytes(options)) => presence.ask(options, 21)?,
+            (8, Item::Bytes(options)) => ask_presence(options, 21, &mut implicit)?,
             (9, Item::Varint(_)) | (17, Item::Varint(1..)) => chosen = true,
             _ => {}
         }
     }
-    let number_of = |kind| match kind {
-        1 => Some(Number::Double),
-        2 => Some(Number::Float),
-        3 => Some(Number::Int64),
-        4 => Some(Number::Uint64),
+    let kind = match kind {
+        1 => Kind::Number(Number::Double),
+        2 => Kind::Number(Number::Float),
+        3 => Kind::Number(Number::Int64),
+        4 => Kind::Number(Number::Uint64),
         // An enumeration is a number too.
-        5 | 14 => Some(Number::Int32),
-        6 => Some(Number::Fixed64),
-        7 => Some(Number::Fixed32),
-        8 => Some(Number::Bool),
-        13 => Some(Number::Uint32),
-        15 => Some(Number::Sfixed32),
-        16 => Some(Number::Sfixed64),
-        17 => Some(Number::Sint32),
-        18 => Some(Number::Sint64),
-        _ => None,
-    };
-    let kind = match (kind, number_of(kind)) {
-        (_, Some(number)) => Kind::Number(number),
-        (9, _) => Kind::Text,
-        (11, _) if type_name.is_some() => Kind::Message(0),
+        5 | 14 => Kind::Number(Number::Int32),
+        6 => Kind::Number(Number::Fixed64),
+        7 => Kind::Number(Number::Fixed32),
+        8 => Kind::Number(Number::Bool),
+        9 => Kind::Text,
+        11 if type_name.is_some() => Kind::Message(0),
+        13 => Kind::Number(Number::Uint32),
+        15 => Kind::Number(Number::Sfixed32),
+        16 => Kind::Number(Number::Sfixed64),
+        17 => Kind::Number(Number::Sint32),
+        18 => Kind::Number(Number::Sint64),
         _ => Kind::Other,
     };
     let repeated = label == 3;
-    Ok(Unresolved {
-        field: FieldType {
-            name,
-            number,
-            repeated,
-            zero_if_absent: presence.implicit && !chosen && !repeated,
-            kind,
-        },
-        type_name,
-    })
+    let field = FieldType {
+        name,
+        number,
+        repeated,
+        zero_if_absent: implicit && !chosen && !repeated,
+        kind,
+    };
+    Ok((field, type_name))
 }
 
 fn text(bytes: &[u8]) -> String {

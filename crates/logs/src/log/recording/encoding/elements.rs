@@ -1,23 +1,13 @@
 //! Items of the fields of a protobuf message: all of one field, how many they are, and their numbers.
 
 use super::descriptor::{FieldType, Kind, MessageType, Number};
-use super::wire::{Broken, Fields, Item, fixed, varint};
+use super::wire::{Broken, Item, elements, fixed, varint};
 use crate::log::recording::value::Value;
 
-/// The field of this name.
 pub(super) fn field<'t>(kind: &'t MessageType, name: &str) -> Option<&'t FieldType> {
     kind.fields.iter().find(|field| field.name == name)
 }
 
-/// All items of one field of a message.
-pub(super) fn elements(data: &[u8], number: u32) -> impl Iterator<Item = Result<Item<'_>, Broken>> {
-    Fields::new(data).filter_map(move |field| match field {
-        Ok((found, item)) => (found == number).then_some(Ok(item)),
-        Err(broken) => Some(Err(broken)),
-    })
-}
-
-/// Whether the text field `name` of a message is `value`.
 pub(super) fn text_is(
     data: &[u8],
     kind: &MessageType,

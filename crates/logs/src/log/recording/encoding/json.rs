@@ -4,36 +4,43 @@ use serde_json::Value as Json;
 
 use super::leaves::{Tree, of_tree};
 use crate::log::json_text::parsed;
-use crate::log::recording::message::{Leaf, MessageReader, Schema, Uneven};
+use crate::log::recording::message::{Leaf, MessageReader, OpenedReader, Schema, Uneven};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
-/// Reads some fields of JSON messages.
 struct JsonReader {
     fields: Vec<Vec<FieldPath>>,
     uneven: Option<Uneven>,
 }
 
 /// Messages in JSON, whatever their schema.
-pub(super) fn open(
-    schema: &Schema,
-    fields: &[Vec<FieldPath>],
-) -> Option<Result<Box<dyn MessageReader>, String>> {
-    let reader = || JsonReader {
-        fields: fields.to_vec(),
-        uneven: None,
-    };
-    (schema.encoding == "json").then(|| Ok(Box::new(reader()) as Box<_>))
+pub(super) fn open(schema: &Schema, fields: &[Vec<FieldPath>]) -> Option<OpenedReader> {
+    let (fields, uneven) = (fields.to_vec(), None);
+    (schema.encoding == "json").then(|| Ok(Box::new(JsonReader { fields, uneven }) as Box<_>))
 }
 
 impl MessageReader for JsonReader {
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
         self.uneven = None;
-        read(data, &self.fields, out, &mut self.uneven).map_err(|error| error.to_string())
+        let root = parsed(data).map_err(|error| error.to_string())?;
+        for (paths, out) in self.fields.iter().zip(out) {
+            let found = |path: &FieldPath| find(&root, &path.steps, &mut self.uneven);
+            let mut numbers = paths.iter().filter_map(found).map(number);
+            let there = numbers.find(|number| *number != Value::Absent);
+            *out = there.unwrap_or_default();
+        }
+        Ok(())
     }
 
     fn names(&self, data: &[u8]) -> Vec<String> {
-        names(data)
+        let Ok(Json::Object(fields)) = parsed(data) else {
+            return Vec::new();
+        };
+        let text = |name: &Json| name.as_str().map(str::to_owned);
+        match fields.get("name").and_then(Json::as_array) {
+            Some(names) => names.iter().filter_map(text).collect(),
+            None => fields.into_iter().map(|(name, _)| name).collect(),
+        }
     }
 
     fn uneven(&self) -> Option<Uneven> {
@@ -45,16 +52,13 @@ impl MessageReader for JsonReader {
     }
 }
 
-/// What a JSON value holds.
 fn tree(value: &Json) -> Tree {
     match value {
         Json::Null | Json::Bool(_) | Json::Number(_) => Tree::Number,
         Json::String(text) => Tree::Text(text.clone()),
         Json::Object(fields) => {
-            let fields = fields
-                .iter()
-                .map(|(name, value)| (name.clone(), tree(value)));
-            Tree::Fields(fields.collect())
+            let field = |(name, value): (&String, &Json)| (name.clone(), tree(value));
+            Tree::Fields(fields.iter().map(field).collect())
         }
         Json::Array(all) => {
             let texts = all.iter().map(|x| x.as_str().map(str::to_owned));
@@ -67,42 +71,13 @@ fn tree(value: &Json) -> Tree {
     }
 }
 
-/// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
-fn read(
-    data: &[u8],
-    fields: &[Vec<FieldPath>],
-    out: &mut [Value],
-    uneven: &mut Option<Uneven>,
-) -> Result<(), serde_json::Error> {
-    let root = parsed(data)?;
-    for (paths, out) in fields.iter().zip(out) {
-        let numbers = paths
-            .iter()
-            .filter_map(|path| find(&root, &path.steps, uneven));
-        let mut numbers = numbers.map(number);
-        *out = numbers.find(is_there).unwrap_or_default();
-    }
-    Ok(())
-}
-
-fn is_there(value: &Value) -> bool {
-    *value != Value::Absent
-}
-
 fn number(value: &Json) -> Value {
-    match value {
-        Json::Bool(value) => Value::Int((*value).into()),
-        Json::Number(number) => {
-            if let Some(value) = number.as_i64() {
-                Value::Int(value)
-            } else if let Some(value) = number.as_u64() {
-                Value::Unsigned(value)
-            } else {
-                number.as_f64().map_or(Value::Absent, Value::Float)
-            }
-        }
-        _ => Value::Absent,
-    }
+    let whole = value.as_bool().map(i64::from).or_else(|| value.as_i64());
+    let whole = whole
+        .map(Value::Int)
+        .or_else(|| value.as_u64().map(Value::Unsigned));
+    let number = whole.or_else(|| value.as_f64().map(Value::Float));
+    number.unwrap_or_default()
 }
 
 /// Follows a path; elements that are named are looked up beside their array, then further out.
@@ -126,8 +101,8 @@ fn find<'j>(root: &'j Json, steps: &[PathStep], uneven: &mut Option<Uneven>) -> 
                         let names = outer.iter().rev().find_map(|o| o.get(list)?.as_array())?;
                         if names.len() != elements.len() {
                             let field = place.checked_sub(1).and_then(|before| steps.get(before));
-                            if let (Some(PathStep::Field(array)), false) =
-                                (field, elements.is_empty())
+                            if let Some(PathStep::Field(array)) = field
+                                && !elements.is_empty()
                             {
                                 *uneven = Some(Uneven {
                                     array: array.clone(),
@@ -147,20 +122,6 @@ fn find<'j>(root: &'j Json, steps: &[PathStep], uneven: &mut Option<Uneven>) -> 
     Some(at)
 }
 
-/// Names under which a message lists its parts, for messages to the user.
-fn names(data: &[u8]) -> Vec<String> {
-    let Ok(Json::Object(fields)) = parsed(data) else {
-        return Vec::new();
-    };
-    match fields.get("name").and_then(Json::as_array) {
-        Some(names) => names
-            .iter()
-            .filter_map(|name| Some(name.as_str()?.to_owned()))
-            .collect(),
-        None => fields.into_iter().map(|(name, _)| name).collect(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,20 +130,25 @@ mod tests {
         "name": ["a", "b"], "arm": {"position": [1, 2.5]},
         "joints": [{"id": "x", "q": -1}, {"id": "y", "q": 7}], "deep/key": {"~": [[4]]}}"#;
 
+    fn read<const N: usize>(text: &[u8], fields: [&[&str]; N]) -> ([Value; N], Option<Uneven>) {
+        let parse = |paths: &[&str]| paths.iter().map(|path| FieldPath::parse(path)).collect();
+        let mut reader = JsonReader {
+            fields: fields.map(parse).to_vec(),
+            uneven: None,
+        };
+        let mut out = [Value::Absent; N];
+        reader.read(text, &mut out).unwrap();
+        (out, reader.uneven)
+    }
+
     fn value(paths: &[&str]) -> Value {
-        let fields = [paths.iter().map(|path| FieldPath::parse(path)).collect()];
-        let mut out = [Value::Absent];
-        read(MESSAGE, &fields, &mut out, &mut None).unwrap();
-        out[0]
+        read(MESSAGE, [paths]).0[0]
     }
 
     #[test]
     fn numbers_that_json_does_not_have_are_no_numbers() {
         let text = br#"{"name": ["NaN", "b\""], "position": [NaN, -Infinity], "x": 2}"#;
-        let fields = ["position[0]", "position[name=NaN]", "x"];
-        let fields = fields.map(|path| vec![FieldPath::parse(path)]);
-        let mut out = [Value::Absent; 3];
-        read(text, &fields, &mut out, &mut None).unwrap();
+        let (out, _) = read(text, [&["position[0]"], &["position[name=NaN]"], &["x"]]);
         assert_eq!(out, [Value::Absent, Value::Absent, Value::Int(2)]);
         assert!(parsed(br#"{"a": None}"#).is_err());
     }
@@ -190,9 +156,7 @@ mod tests {
     #[test]
     fn an_array_of_another_length_than_its_names_is_given_to_no_name() {
         let text = br#"{"name": ["a", "b"], "effort": [1.0]}"#;
-        let fields = [vec![FieldPath::named("effort", "name", "a")]];
-        let (mut out, mut uneven) = ([Value::Absent], None);
-        read(text, &fields, &mut out, &mut uneven).unwrap();
+        let (out, uneven) = read(text, [&["effort[name=a]"]]);
         let said = uneven.unwrap();
         assert_eq!(out, [Value::Absent]);
         assert_eq!((&*said.array, said.numbers, said.names), ("effort", 1, 2));
@@ -200,25 +164,30 @@ mod tests {
 
     #[test]
     fn every_number_is_listed_with_its_path_and_the_names_beside_it() {
-        let listed: Vec<(String, String)> = of_tree(&tree(&parsed(MESSAGE).unwrap()))
-            .into_iter()
-            .map(|leaf| (leaf.path, leaf.label))
-            .collect();
-        let has = |path: &str, label: &str| listed.contains(&(path.into(), label.into()));
-        assert!(has("arm.position[name=b]", "arm.position.b"), "{listed:?}");
-        assert!(has("joints[1].q", "joints.y.q"), "{listed:?}");
+        let listed = of_tree(&tree(&parsed(MESSAGE).unwrap()));
+        for pair in [
+            ("arm.position[name=b]", "arm.position.b"),
+            ("joints[1].q", "joints.y.q"),
+        ] {
+            let mut pairs = listed.iter().map(|leaf| (&*leaf.path, &*leaf.label));
+            assert!(pairs.any(|leaf| leaf == pair), "{listed:?}");
+        }
     }
 
     #[test]
     fn pointers_paths_and_names_lead_to_numbers() {
-        assert_eq!(value(&["/t"]), Value::Float(1.5));
-        assert_eq!(value(&["t"]), Value::Float(1.5));
-        assert_eq!(value(&["/on"]), Value::Int(1));
-        assert_eq!(value(&["big"]), Value::Unsigned(u64::MAX));
-        assert_eq!(value(&["/arm/position/1"]), Value::Float(2.5));
-        assert_eq!(value(&["arm.position[name=b]"]), Value::Float(2.5));
-        assert_eq!(value(&["joints[id=y].q"]), Value::Int(7));
-        assert_eq!(value(&["/deep~1key/~0/0/0"]), Value::Int(4));
+        for (path, expected) in [
+            ("/t", Value::Float(1.5)),
+            ("t", Value::Float(1.5)),
+            ("/on", Value::Int(1)),
+            ("big", Value::Unsigned(u64::MAX)),
+            ("/arm/position/1", Value::Float(2.5)),
+            ("arm.position[name=b]", Value::Float(2.5)),
+            ("joints[id=y].q", Value::Int(7)),
+            ("/deep~1key/~0/0/0", Value::Int(4)),
+        ] {
+            assert_eq!(value(&[path]), expected, "{path}");
+        }
     }
 
     #[test]

@@ -18,7 +18,6 @@ pub(super) enum Tree {
 /// Fields that are a time and no channel.
 const TIMES: [&str; 4] = ["header", "stamp", "timestamp", "layout"];
 
-/// The numbers of a tree.
 pub(super) fn of_tree(tree: &Tree) -> Vec<Leaf> {
     let mut out = Vec::new();
     collect(tree, ("", ""), &mut Vec::new(), &mut out);
@@ -98,7 +97,6 @@ fn named<'t>(lists: &[(&'t str, &'t [String])], count: usize) -> Option<(&'t str
         .copied()
 }
 
-/// The name that an element has in itself.
 fn own_name(element: &Tree) -> Option<&str> {
     let Tree::Fields(fields) = element else {
         return None;
@@ -140,22 +138,17 @@ fn message(
                 let mut texts = Vec::new();
                 for _ in 0..count {
                     let span = cursor.text()?;
-                    let bytes = cursor.data.get(span.start..span.start + span.count);
-                    texts.push(String::from_utf8_lossy(bytes.unwrap_or_default()).into_owned());
+                    let text = span.text(cursor.data).unwrap_or_default();
+                    texts.push(String::from_utf8_lossy(text).into_owned());
                 }
-                match (one, texts.pop()) {
-                    (true, Some(text)) => Tree::Text(text),
-                    (_, last) => {
-                        texts.extend(last);
-                        Tree::Texts(texts)
-                    }
+                match one {
+                    true => Tree::Text(texts.pop().unwrap_or_default()),
+                    false => Tree::Texts(texts),
                 }
             }
             ElementType::WideString => {
                 for _ in 0..count {
-                    let length = cursor.length()?;
-                    let bytes = length.checked_mul(2).ok_or_else(|| cursor.short())?;
-                    cursor.pass(bytes)?;
+                    cursor.wide_text()?;
                 }
                 Tree::Nothing
             }
@@ -168,12 +161,9 @@ fn message(
                         elements.push(Tree::Fields(fields));
                     }
                 }
-                match (one, elements.pop()) {
-                    (true, Some(only)) => only,
-                    (_, last) => {
-                        elements.extend(last);
-                        Tree::Elements(elements)
-                    }
+                match one {
+                    true => elements.pop().unwrap_or(Tree::Nothing),
+                    false => Tree::Elements(elements),
                 }
             }
         };

@@ -13,23 +13,19 @@ mod proto;
 mod wire;
 
 pub use cdr::CdrReader;
-pub use cursor::MalformedMessage;
-pub use msg::DefinitionError;
 
-use super::message::{MessageReader, Schema};
+use std::sync::Arc;
+
+use super::message::{OpenedReader, Schema};
 use super::path::FieldPath;
 
-/// Makes a reader of some fields, for each the paths that it may have; `None` for a schema of another
-/// encoding, else why its messages cannot be read.
-type Open = fn(&Schema, &[Vec<FieldPath>]) -> Option<Result<Box<dyn MessageReader>, String>>;
+/// Makes a reader of some fields, for each the paths that it may have; `None` for a schema of another encoding.
+type Open = fn(&Schema, &[Vec<FieldPath>]) -> Option<OpenedReader>;
 
 const ENCODINGS: [Open; 3] = [cdr::open, json::open, proto::open];
 
 /// Makes a reader for `fields` of messages: for each the paths that it may have.
-pub(super) fn reader_of(
-    schema: &Schema,
-    fields: &[Vec<FieldPath>],
-) -> Result<Box<dyn MessageReader>, String> {
+pub(super) fn reader_of(schema: &Schema, fields: &[Vec<FieldPath>]) -> OpenedReader {
     let opened = ENCODINGS.iter().find_map(|open| open(schema, fields));
     opened.unwrap_or_else(|| {
         let (encoding, language) = (&schema.encoding, &schema.language);
@@ -37,4 +33,23 @@ pub(super) fn reader_of(
             "its encoding `{encoding}` with a `{language}` definition is not read"
         ))
     })
+}
+
+/// Readers of some fields, one for each schema that was met.
+#[derive(Default)]
+pub(super) struct Readers(Vec<(Arc<Schema>, OpenedReader)>);
+
+impl Readers {
+    pub(super) fn of(
+        &mut self,
+        schema: &Arc<Schema>,
+        fields: &[Vec<FieldPath>],
+    ) -> &mut OpenedReader {
+        let known = self.0.iter().position(|(known, _)| known == schema);
+        let at = known.unwrap_or_else(|| {
+            self.0.push((Arc::clone(schema), reader_of(schema, fields)));
+            self.0.len() - 1
+        });
+        &mut self.0[at].1
+    }
 }

@@ -2,49 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use thiserror::Error;
-
 /// Levels of messages in messages that are followed.
 const MAX_DEPTH: usize = 32;
 /// Bytes of definition text that are read.
 const MAX_DEFINITION_BYTES: usize = 1 << 20;
 
-/// Why a message definition cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum DefinitionError {
-    /// The text is no `.msg` definition.
-    #[error("invalid field at line {line} of {message}: `{text}`")]
-    Line {
-        /// Message in which it stands.
-        message: String,
-        /// Line in the whole text, from 1.
-        line: usize,
-        /// The line.
-        text: String,
-    },
-    /// A type that the text does not define.
-    #[error("the definition of {message} needs {name}, which is not defined with it")]
-    Undefined {
-        /// Message that needs it.
-        message: String,
-        /// The type.
-        name: String,
-    },
-    /// Messages in messages without an end.
-    #[error("{message} holds messages in messages, more than {MAX_DEPTH} levels deep")]
-    Deep {
-        /// The outermost message.
-        message: String,
-    },
-    /// A text that no real message has.
-    #[error("the definition is {bytes} bytes long, more than {MAX_DEFINITION_BYTES}")]
-    Long {
-        /// Its length.
-        bytes: usize,
-    },
-}
-
-/// A type of fixed size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Primitive {
     Bool,
@@ -90,18 +52,15 @@ impl Primitive {
     }
 }
 
-/// Type of one element of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ElementType {
     Primitive(Primitive),
     String,
-    /// Text of two-byte characters.
     WideString,
-    /// Index into [`Definition::messages`].
+    /// Index into [`Messages`].
     Message(usize),
 }
 
-/// How many elements a field has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Count {
     One,
@@ -109,7 +68,6 @@ pub(super) enum Count {
     Sequence,
 }
 
-/// A field of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Field {
     pub(super) name: String,
@@ -117,11 +75,8 @@ pub(super) struct Field {
     pub(super) count: Count,
 }
 
-/// A message type with every type that it needs; the first one is the message itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Definition {
-    pub(super) messages: Vec<Vec<Field>>,
-}
+/// The fields of a message type and of every type that it needs; the first one is the message itself.
+pub(super) type Messages = Vec<Vec<Field>>;
 
 /// Definitions that recordings may leave out: some recorders store type names alone.
 const KNOWN: [(&str, &str); 9] = [
@@ -159,56 +114,52 @@ struct UnresolvedField<'t> {
     count: Count,
 }
 
-impl Definition {
-    /// Parses the definition of message `name` (`package/msg/Type`) and resolves every type in it.
-    ///
-    /// `text` may be empty where the type is one that is known here.
-    pub(super) fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
-        if text.len() > MAX_DEFINITION_BYTES {
-            return Err(DefinitionError::Long { bytes: text.len() });
-        }
-        let root = short(name);
-        let mut sections: BTreeMap<String, Vec<UnresolvedField<'_>>> = BTreeMap::new();
-        for (name, known) in KNOWN {
-            sections.insert(name.to_owned(), section(name, known)?);
-        }
-        if !text.trim().is_empty() {
-            let mut current = root.clone();
-            sections.insert(current.clone(), Vec::new());
-            for (index, line) in text.lines().enumerate() {
-                let line = line.trim();
-                if line.len() >= 3 && line.bytes().all(|byte| byte == b'=') {
-                    continue;
-                }
-                if let Some(name) = line.strip_prefix("MSG:") {
-                    current = short(name.trim());
-                    sections.insert(current.clone(), Vec::new());
-                    continue;
-                }
-                let fields = sections.entry(current.clone()).or_default();
-                if let Some(field) = field(line, &current, index + 1)? {
-                    fields.push(field);
-                }
-            }
-        }
-        if !sections.contains_key(&root) {
-            return Err(DefinitionError::Undefined {
-                message: name.to_owned(),
-                name: root,
-            });
-        }
-        let mut numbers = BTreeMap::new();
-        let mut messages = Vec::new();
-        resolve(&root, &root, &sections, &mut numbers, &mut messages, 0)?;
-        Ok(Self { messages })
+/// The fields of each type, by its name.
+type Sections<'t> = BTreeMap<String, Vec<UnresolvedField<'t>>>;
+
+/// Parses the definition of message `name` (`package/msg/Type`), empty for a known type, and resolves every type in it.
+pub(super) fn parse(name: &str, text: &str) -> Result<Messages, String> {
+    if text.len() > MAX_DEFINITION_BYTES {
+        return Err(format!(
+            "the definition is {} bytes long, more than {MAX_DEFINITION_BYTES}",
+            text.len()
+        ));
     }
+    let root = short(name);
+    let mut sections = Sections::new();
+    for (name, known) in KNOWN {
+        read_sections(name, known, &mut sections)?;
+    }
+    if !text.trim().is_empty() {
+        read_sections(&root, text, &mut sections)?;
+    }
+    if !sections.contains_key(&root) {
+        return Err(undefined(name, &root));
+    }
+    let mut messages = Vec::new();
+    let mut numbers = BTreeMap::new();
+    resolve(&root, &root, &sections, &mut numbers, &mut messages, 0)?;
+    Ok(messages)
 }
 
-fn section<'t>(name: &str, text: &'t str) -> Result<Vec<UnresolvedField<'t>>, DefinitionError> {
-    let lines = text.lines().enumerate();
-    lines
-        .filter_map(|(index, line)| field(line, name, index + 1).transpose())
-        .collect()
+/// Reads the fields of message `name`, and of the messages that follow it in the text.
+fn read_sections<'t>(name: &str, text: &'t str, sections: &mut Sections<'t>) -> Result<(), String> {
+    let mut current = name.to_owned();
+    sections.insert(current.clone(), Vec::new());
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.len() >= 3 && line.bytes().all(|byte| byte == b'=') {
+            continue;
+        }
+        if let Some(name) = line.strip_prefix("MSG:") {
+            current = short(name.trim());
+            sections.insert(current.clone(), Vec::new());
+            continue;
+        }
+        let field = field(line, &current, index + 1)?;
+        sections.entry(current.clone()).or_default().extend(field);
+    }
+    Ok(())
 }
 
 /// `package/msg/Type` as `package/Type`, as definitions name it.
@@ -216,20 +167,23 @@ fn short(name: &str) -> String {
     name.replacen("/msg/", "/", 1)
 }
 
+fn undefined(message: &str, name: &str) -> String {
+    format!("the definition of {message} needs {name}, which is not defined with it")
+}
+
 /// The field of one line; `None` for a comment, a constant or an empty line.
 fn field<'t>(
     line: &'t str,
     message: &str,
     number: usize,
-) -> Result<Option<UnresolvedField<'t>>, DefinitionError> {
+) -> Result<Option<UnresolvedField<'t>>, String> {
     let code = line.split('#').next().unwrap_or_default().trim();
     if code.is_empty() {
         return Ok(None);
     }
-    let refuse = || DefinitionError::Line {
-        message: message.to_owned(),
-        line: number,
-        text: line.chars().take(80).collect(),
+    let refuse = || {
+        let text: String = line.chars().take(80).collect();
+        format!("invalid field at line {number} of {message}: `{text}`")
     };
     let (of, rest) = code.split_once(char::is_whitespace).ok_or_else(refuse)?;
     let rest = rest.trim_start();
@@ -247,14 +201,11 @@ fn field<'t>(
         None => (of, Count::One),
         Some((of, size)) => {
             let size = size.strip_suffix(']').ok_or_else(refuse)?;
-            let count = if size.is_empty() || size.starts_with("<=") {
-                Count::Sequence
-            } else {
-                match size.parse() {
-                    // An element takes bytes, so that no count outlasts the message; none would not.
-                    Ok(count) if count > 0 => Count::Fixed(count),
-                    _ => return Err(refuse()),
-                }
+            let count = match size.parse() {
+                _ if size.is_empty() || size.starts_with("<=") => Count::Sequence,
+                // An element takes bytes, so that no count outlasts the message; none would not.
+                Ok(count) if count > 0 => Count::Fixed(count),
+                _ => return Err(refuse()),
             };
             (of, count)
         }
@@ -271,24 +222,20 @@ fn field<'t>(
 fn resolve(
     name: &str,
     root: &str,
-    sections: &BTreeMap<String, Vec<UnresolvedField<'_>>>,
+    sections: &Sections<'_>,
     numbers: &mut BTreeMap<String, usize>,
-    messages: &mut Vec<Vec<Field>>,
+    messages: &mut Messages,
     depth: usize,
-) -> Result<usize, DefinitionError> {
-    if depth > MAX_DEPTH {
-        return Err(DefinitionError::Deep {
-            message: root.to_owned(),
-        });
+) -> Result<usize, String> {
+    let known = numbers.get(name).copied();
+    // A number without fields yet is a message inside itself.
+    if depth > MAX_DEPTH || known.is_some_and(|number| messages[number].is_empty()) {
+        return Err(format!(
+            "{root} holds messages in messages, more than {MAX_DEPTH} levels deep"
+        ));
     }
-    if let Some(number) = numbers.get(name) {
-        // A number without fields yet is a message inside itself.
-        return match messages.get(*number) {
-            Some(fields) if !fields.is_empty() => Ok(*number),
-            _ => Err(DefinitionError::Deep {
-                message: root.to_owned(),
-            }),
-        };
+    if let Some(number) = known {
+        return Ok(number);
     }
     let number = messages.len();
     numbers.insert(name.to_owned(), number);
@@ -301,12 +248,8 @@ fn resolve(
             other => match Primitive::named(other) {
                 Some(primitive) => ElementType::Primitive(primitive),
                 None => {
-                    let full = full_name(other, name, sections).ok_or_else(|| {
-                        DefinitionError::Undefined {
-                            message: name.to_owned(),
-                            name: other.to_owned(),
-                        }
-                    })?;
+                    let full = full_name(other, name, sections);
+                    let full = full.ok_or_else(|| undefined(name, other))?;
                     let inner = resolve(&full, root, sections, numbers, messages, depth + 1)?;
                     ElementType::Message(inner)
                 }
@@ -331,11 +274,7 @@ fn resolve(
 }
 
 /// Name under which a type is defined: as it stands, in the package of the message, or the header.
-fn full_name(
-    name: &str,
-    inside: &str,
-    sections: &BTreeMap<String, Vec<UnresolvedField<'_>>>,
-) -> Option<String> {
+fn full_name(name: &str, inside: &str, sections: &Sections<'_>) -> Option<String> {
     let package = inside.split_once('/').map(|(package, _)| package);
     let candidates = [
         Some(short(name)),
@@ -355,53 +294,50 @@ mod tests {
         let text = "# a comment\nstd_msgs/Header header\n\nstring[] name # joints\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n\
             ================================================================================\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
             ================================================================================\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec";
-        let written = Definition::parse("sensor_msgs/msg/JointState", text).unwrap();
-        let known = Definition::parse("sensor_msgs/msg/JointState", "").unwrap();
-        assert_eq!(written, known);
-        let names: Vec<&str> = written.messages[0]
-            .iter()
-            .map(|f| f.name.as_str())
-            .collect();
+        let written = parse("sensor_msgs/msg/JointState", text).unwrap();
+        assert_eq!(
+            Ok(&written),
+            parse("sensor_msgs/msg/JointState", "").as_ref()
+        );
+        let names: Vec<&str> = written[0].iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names, ["header", "name", "position", "velocity", "effort"]);
     }
 
     #[test]
     fn constants_defaults_bounds_and_arrays_are_told_apart() {
         let text = "uint8 A=1\nstring B = \"x # y\"\nint32 count 7\nstring<=5 label\nfloat32[3] v\nfloat64[<=4] w\nInner[] list\nwstring wide\n===\nMSG: p/Inner\nbyte b\n";
-        let definition = Definition::parse("p/msg/Outer", text).unwrap();
-        let fields = &definition.messages[0];
-        let kinds: Vec<_> = fields
-            .iter()
-            .map(|f| (f.name.as_str(), f.kind, f.count))
-            .collect();
-        assert_eq!(
-            kinds,
-            [
-                ("count", ElementType::Primitive(Primitive::I32), Count::One),
-                ("label", ElementType::String, Count::One),
-                ("v", ElementType::Primitive(Primitive::F32), Count::Fixed(3)),
-                ("w", ElementType::Primitive(Primitive::F64), Count::Sequence),
-                ("list", ElementType::Message(1), Count::Sequence),
-                ("wide", ElementType::WideString, Count::One),
-            ]
-        );
+        let outer = &parse("p/msg/Outer", text).unwrap()[0];
+        let kinds: Vec<_> = (outer.iter().map(|f| (&*f.name, f.kind, f.count))).collect();
+        let expected = [
+            ("count", ElementType::Primitive(Primitive::I32), Count::One),
+            ("label", ElementType::String, Count::One),
+            ("v", ElementType::Primitive(Primitive::F32), Count::Fixed(3)),
+            ("w", ElementType::Primitive(Primitive::F64), Count::Sequence),
+            ("list", ElementType::Message(1), Count::Sequence),
+            ("wide", ElementType::WideString, Count::One),
+        ];
+        assert_eq!(kinds, expected);
     }
 
     #[test]
     fn what_is_no_definition_is_refused_with_the_reason() {
-        let parse = |text: &str| Definition::parse("p/M", text).unwrap_err().to_string();
-        assert!(
-            parse("float64\n").contains("line 1"),
-            "{}",
-            parse("float64\n")
-        );
-        assert!(parse("float64[x] y").contains("float64[x] y"));
-        assert!(parse("float64[0] y").contains("invalid field"));
-        assert!(parse("Other o").contains("needs Other"));
-        assert!(parse("M m").contains("levels deep"));
-        assert!(parse("A a\n===\nMSG: p/A\nB b\n===\nMSG: p/B\nA a\n").contains("levels deep"));
-        let unknown = Definition::parse("unknown/msg/Type", "").unwrap_err();
-        assert!(unknown.to_string().contains("not defined"), "{unknown}");
-        assert!(parse(&"#".repeat(MAX_DEFINITION_BYTES + 1)).contains("bytes long"));
+        let long = "#".repeat(MAX_DEFINITION_BYTES + 1);
+        for (name, text, word) in [
+            ("p/M", "float64\n", "line 1"),
+            ("p/M", "float64[x] y", "float64[x] y"),
+            ("p/M", "float64[0] y", "invalid field"),
+            ("p/M", "Other o", "needs Other"),
+            ("p/M", "M m", "levels deep"),
+            (
+                "p/M",
+                "A a\n===\nMSG: p/A\nB b\n===\nMSG: p/B\nA a\n",
+                "levels deep",
+            ),
+            ("unknown/msg/Type", "", "not defined"),
+            ("p/M", &long, "bytes long"),
+        ] {
+            let problem = parse(name, text).unwrap_err();
+            assert!(problem.contains(word), "{problem}");
+        }
     }
 }

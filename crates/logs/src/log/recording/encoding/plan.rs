@@ -3,7 +3,6 @@
 use super::msg::{Count, ElementType, Field, Primitive};
 use crate::log::recording::path::PathStep;
 
-/// What is taken from a message, and where it goes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Walkthrough {
     pub(super) root: Node,
@@ -28,7 +27,6 @@ pub(super) enum Slot {
     Array(usize),
     /// A list of texts, remembered under this index.
     List(usize),
-    /// A message.
     Inner(Node),
     /// Some elements of an array of messages.
     Elements(Vec<(usize, Node)>),
@@ -53,13 +51,7 @@ pub(super) enum By {
     },
 }
 
-/// Where a path leads, before it becomes part of the plan.
-struct Route {
-    /// Field indices and, between them, indices of elements.
-    hops: Vec<Hop>,
-    end: End,
-}
-
+/// A step on the way to a number: into a field, or into an element of an array of messages.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Hop {
     Field(usize),
@@ -81,57 +73,41 @@ impl Walkthrough {
         steps: &[PathStep],
         output: usize,
     ) -> bool {
-        match route(messages, steps) {
-            Some(route) => {
-                self.follow(output, route);
-                true
-            }
-            None => false,
-        }
-    }
-
-    fn follow(&mut self, output: usize, route: Route) {
-        let by = match route.end {
+        let Some((hops, end)) = route(messages, steps) else {
+            return false;
+        };
+        let (by, kind) = match end {
             End::Number => {
-                if let Slot::Number(outputs) =
-                    slot(&mut self.root, &route.hops, || Slot::Number(Vec::new()))
-                {
+                let slot = slot(&mut self.root, &hops, || Slot::Number(Vec::new()));
+                if let Slot::Number(outputs) = slot {
                     outputs.push(output);
                 }
-                return;
+                return true;
             }
-            End::Element(index, _) => By::Index(index),
-            End::Named(ref list, ref name, _) => {
+            End::Element(index, kind) => (By::Index(index), kind),
+            End::Named(list, name, kind) => {
                 let next = self.lists;
-                let list = match slot(&mut self.root, list, || Slot::List(next)) {
-                    Slot::List(list) => *list,
-                    _ => return,
+                let Slot::List(list) = slot(&mut self.root, &list, || Slot::List(next)) else {
+                    return true;
                 };
+                let (list, last) = (*list, 0);
                 self.lists += usize::from(list == next);
-                By::Name {
-                    list,
-                    name: name.clone(),
-                    last: 0,
-                }
+                (By::Name { list, name, last }, kind)
             }
-        };
-        let (End::Element(_, kind) | End::Named(_, _, kind)) = route.end else {
-            return;
         };
         let next = self.arrays.len();
-        let Slot::Array(array) = slot(&mut self.root, &route.hops, || Slot::Array(next)) else {
-            return;
-        };
-        let array = *array;
-        if array == next {
-            self.arrays.push(kind);
+        if let Slot::Array(array) = slot(&mut self.root, &hops, || Slot::Array(next)) {
+            let array = *array;
+            if array == next {
+                self.arrays.push(kind);
+            }
+            self.picks.push(Pick { output, array, by });
         }
-        self.picks.push(Pick { output, array, by });
+        true
     }
 }
 
-/// Follows a path through the types.
-fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<Route> {
+fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<(Vec<Hop>, End)> {
     let mut hops = Vec::new();
     let mut inside = 0;
     let mut steps = steps.iter().peekable();
@@ -160,10 +136,8 @@ fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<Route> {
                     let texts = field.kind == ElementType::String && field.count != Count::One;
                     texts.then(|| [&hops[..*depth], &[Hop::Field(index)]].concat())
                 })?;
-                return steps.next().is_none().then(|| Route {
-                    hops,
-                    end: End::Named(list, value.clone(), kind),
-                });
+                let end = End::Named(list, value.clone(), kind);
+                return steps.next().is_none().then_some((hops, end));
             }
         };
         match field.kind {
@@ -173,7 +147,7 @@ fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<Route> {
                     None => End::Number,
                     Some(number) => End::Element(number, kind),
                 };
-                return steps.next().is_none().then_some(Route { hops, end });
+                return steps.next().is_none().then_some((hops, end));
             }
             ElementType::Message(message) => {
                 hops.extend(number.map(Hop::Element));
@@ -189,36 +163,28 @@ fn find_field<'f>(fields: &'f [Field], name: &str) -> Option<(usize, &'f Field)>
 }
 
 /// The slot at the end of some hops, made where there is none.
-fn slot<'n>(mut node: &'n mut Node, hops: &[Hop], new: impl FnOnce() -> Slot) -> &'n mut Slot {
-    let mut rest = hops;
-    loop {
-        let (field, tail) = match rest.split_first() {
-            Some((Hop::Field(field), tail)) => (*field, tail),
-            // Hops begin with a field, and an element is followed by one.
-            _ => (0, &[][..]),
-        };
-        if tail.is_empty() {
-            return node.entry(field, new);
-        }
-        rest = tail;
-        node = match tail[0] {
-            Hop::Field(_) => match node.entry(field, || Slot::Inner(Node::default())) {
-                Slot::Inner(inner) => inner,
+fn slot<'n>(node: &'n mut Node, hops: &[Hop], new: impl FnOnce() -> Slot) -> &'n mut Slot {
+    let [Hop::Field(field), rest @ ..] = hops else {
+        // hops begin with a field, and an element is followed by one
+        return node.entry(0, new);
+    };
+    match rest {
+        [] => node.entry(*field, new),
+        [Hop::Element(element), rest @ ..] => {
+            let elements = match node.entry(*field, || Slot::Elements(Vec::new())) {
+                Slot::Elements(elements) => elements,
                 other => return other,
-            },
-            Hop::Element(element) => {
-                rest = &tail[1..];
-                let elements = match node.entry(field, || Slot::Elements(Vec::new())) {
-                    Slot::Elements(elements) => elements,
-                    other => return other,
-                };
-                let at = elements.partition_point(|(index, _)| *index < element);
-                if elements.get(at).is_none_or(|(index, _)| *index != element) {
-                    elements.insert(at, (element, Node::default()));
-                }
-                &mut elements[at].1
+            };
+            let at = elements.partition_point(|(index, _)| index < element);
+            if elements.get(at).is_none_or(|(index, _)| index != element) {
+                elements.insert(at, (*element, Node::default()));
             }
-        };
+            slot(&mut elements[at].1, rest, new)
+        }
+        rest => match node.entry(*field, || Slot::Inner(Node::default())) {
+            Slot::Inner(inner) => slot(inner, rest, new),
+            other => other,
+        },
     }
 }
 

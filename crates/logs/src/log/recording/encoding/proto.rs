@@ -6,10 +6,12 @@
 use std::cell::RefCell;
 
 use super::descriptor::{FieldType, Kind, MessageType, Number, Types};
-use super::elements::{count, elements, field, number_of, packed_number, text_is};
+use super::elements::{count, field, number_of, packed_number, text_is};
 use super::leaves::{Tree, of_tree};
-use super::wire::{Broken, Fields, Item};
-use crate::log::recording::message::{Leaf, MOST_LEAVES, MessageReader, Schema, Uneven};
+use super::wire::{Broken, Fields, Item, elements};
+use crate::log::recording::message::{
+    Leaf, MOST_LEAVES, MessageReader, OpenedReader, Schema, Uneven,
+};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
@@ -17,48 +19,18 @@ use crate::log::recording::value::Value;
 const MAX_PATH_STEPS: usize = 16;
 
 /// Messages in protobuf, by the descriptor set that is their schema.
-pub(super) fn open(
-    schema: &Schema,
-    fields: &[Vec<FieldPath>],
-) -> Option<Result<Box<dyn MessageReader>, String>> {
+pub(super) fn open(schema: &Schema, fields: &[Vec<FieldPath>]) -> Option<OpenedReader> {
     if (&*schema.encoding, &*schema.language) != ("protobuf", "protobuf") {
         return None;
     }
-    let reader = ProtoReader::new(&schema.name, &schema.text);
-    let fields = fields.to_vec();
-    Some(reader.map(|reader| Box::new(FieldReader { reader, fields }) as Box<_>))
+    let reader = ProtoReader::new(&schema.name, &schema.text, fields);
+    Some(reader.map(|reader| Box::new(reader) as Box<_>))
 }
 
-/// Reads some fields of messages of one type.
-struct FieldReader {
-    reader: ProtoReader,
-    fields: Vec<Vec<FieldPath>>,
-}
-
-impl MessageReader for FieldReader {
-    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
-        self.reader.uneven.replace(None);
-        self.reader.read(data, &self.fields, out)
-    }
-
-    fn names(&self, _: &[u8]) -> Vec<String> {
-        self.reader.names()
-    }
-
-    fn uneven(&self) -> Option<Uneven> {
-        self.reader.uneven.borrow().clone()
-    }
-
-    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
-        let root = self.reader.types.root;
-        of_tree(&self.reader.tree(data, root, 0))
-    }
-}
-
-/// Reads messages of one type.
-#[derive(Debug, Clone)]
-pub(super) struct ProtoReader {
+#[derive(Debug)]
+struct ProtoReader {
     types: Types,
+    fields: Vec<Vec<FieldPath>>,
     /// An array of the last message that does not fit its list of names.
     uneven: RefCell<Option<Uneven>>,
 }
@@ -73,28 +45,14 @@ enum Place<'m> {
     Nothing,
 }
 
-impl ProtoReader {
-    /// A reader for message type `name` of the descriptor set that a recording carries.
-    pub(super) fn new(name: &str, set: &[u8]) -> Result<Self, String> {
-        let types = Types::parse(name, set)?;
-        Ok(Self {
-            types,
-            uneven: RefCell::default(),
-        })
-    }
-
-    /// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
-    pub(super) fn read(
-        &self,
-        data: &[u8],
-        fields: &[Vec<FieldPath>],
-        out: &mut [Value],
-    ) -> Result<(), String> {
+impl MessageReader for ProtoReader {
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
+        self.uneven.replace(None);
         let broken = |_: Broken| "it is no protobuf message, or is cut off".to_owned();
         for field in Fields::new(data) {
             field.map_err(broken)?;
         }
-        for (paths, out) in fields.iter().zip(out) {
+        for (paths, out) in self.fields.iter().zip(out) {
             *out = Value::Absent;
             for path in paths {
                 *out = self.find(data, &path.steps).map_err(broken)?;
@@ -106,30 +64,40 @@ impl ProtoReader {
         Ok(())
     }
 
-    /// Names of the type's fields, for messages to the user.
-    pub(super) fn names(&self) -> Vec<String> {
-        let fields = self.types.messages.get(self.types.root);
-        let fields = fields.map_or(&[][..], |root| &root.fields);
-        fields.iter().map(|field| field.name.clone()).collect()
+    fn names(&self, _: &[u8]) -> Vec<String> {
+        let root = &self.types.messages[self.types.root];
+        root.fields.iter().map(|field| field.name.clone()).collect()
+    }
+
+    fn uneven(&self) -> Option<Uneven> {
+        self.uneven.borrow().clone()
+    }
+
+    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
+        of_tree(&self.tree(data, self.types.root, 0))
+    }
+}
+
+impl ProtoReader {
+    fn new(name: &str, set: &[u8], fields: &[Vec<FieldPath>]) -> Result<Self, String> {
+        Ok(Self {
+            types: Types::parse(name, set)?,
+            fields: fields.to_vec(),
+            uneven: RefCell::default(),
+        })
     }
 
     /// Follows a path; elements that are named are looked up beside their array, then further out.
     fn find(&self, data: &[u8], steps: &[PathStep]) -> Result<Value, Broken> {
-        let Some(root) = self.types.messages.get(self.types.root) else {
-            return Ok(Value::Absent);
-        };
-        // Places on the way.
-        let mut way = [Place::Nothing; MAX_PATH_STEPS + 1];
-        way[0] = Place::Message(data, root);
         if steps.len() > MAX_PATH_STEPS {
             return Ok(Value::Absent);
         }
+        // Places on the way.
+        let mut way = [Place::Nothing; MAX_PATH_STEPS + 1];
+        way[0] = Place::Message(data, &self.types.messages[self.types.root]);
         for (index, step) in steps.iter().enumerate() {
-            let next = self.go(&way[..=index], step)?;
-            if matches!(next, Place::Nothing) {
-                return Ok(Value::Absent);
-            }
-            way[index + 1] = next;
+            // from nowhere every step leads nowhere
+            way[index + 1] = self.go(&way[..=index], step)?;
         }
         Ok(match way[steps.len()] {
             Place::Number(value) => value,
@@ -143,15 +111,11 @@ impl ProtoReader {
             return Ok(Place::Nothing);
         };
         match (at, step) {
-            (Place::Message(data, kind), PathStep::Field(name)) => {
-                let Some(field) = field(kind, name) else {
-                    return Ok(Place::Nothing);
-                };
-                if field.repeated {
-                    return Ok(Place::Elements(data, field));
-                }
-                self.last(data, field)
-            }
+            (Place::Message(data, kind), PathStep::Field(name)) => match field(kind, name) {
+                None => Ok(Place::Nothing),
+                Some(field) if field.repeated => Ok(Place::Elements(data, field)),
+                Some(field) => self.last(data, field),
+            },
             (Place::Elements(data, field), PathStep::Index(index)) => {
                 self.element(data, field, *index)
             }
@@ -215,7 +179,6 @@ impl ProtoReader {
         Ok(found)
     }
 
-    /// What one item of a field is.
     fn place<'m>(&'m self, kind: Kind, item: Item<'m>) -> Place<'m> {
         match (kind, item) {
             (Kind::Number(number), item) => {
@@ -254,14 +217,9 @@ impl ProtoReader {
 
     /// What a message of a type holds, as far as it can be read.
     fn tree(&self, data: &[u8], number: usize, depth: usize) -> Tree {
-        let Some(kind) = self
-            .types
-            .messages
-            .get(number)
-            .filter(|_| depth < MAX_PATH_STEPS)
-        else {
+        if depth >= MAX_PATH_STEPS {
             return Tree::Nothing;
-        };
+        }
         let of_field = |field: &FieldType| {
             let items = || elements(data, field.number).map_while(Result::ok);
             match (field.kind, field.repeated) {
@@ -292,18 +250,16 @@ impl ProtoReader {
                 (Kind::Other, _) => Tree::Nothing,
             }
         };
-        let fields = kind.fields.iter();
+        let fields = self.types.messages[number].fields.iter();
         Tree::Fields(fields.map(|f| (f.name.clone(), of_field(f))).collect())
     }
 
     /// The type of a map's entries; `None` for a field that is no map.
     fn map_entry(&self, field: &FieldType) -> Option<&MessageType> {
-        match field.kind {
-            Kind::Message(kind) => {
-                Some(&self.types.messages[kind]).filter(|kind| kind.is_map_entry)
-            }
-            _ => None,
-        }
+        let Kind::Message(kind) = field.kind else {
+            return None;
+        };
+        Some(&self.types.messages[kind]).filter(|kind| kind.is_map_entry)
     }
 
     /// The value of a key that is a text.
@@ -329,8 +285,7 @@ impl ProtoReader {
     }
 }
 
-/// Where `value` stands in the list of texts `list` of a message, and how many texts that has; the outer
-/// option says whether there is such a list.
+/// Where `value` stands in the list of texts `list` of a message, and how many it has; `None` without such a list.
 fn named(
     place: &Place<'_>,
     list: &str,

@@ -4,7 +4,6 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Broken;
 
-/// What a field holds on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Item<'m> {
     Varint(u64),
@@ -14,9 +13,7 @@ pub(super) enum Item<'m> {
     Bytes(&'m [u8]),
 }
 
-/// The fields of a message: number and what it holds; groups are passed over.
-///
-/// Ends after the first broken field.
+/// The fields of a message, groups passed over, up to the first that is broken.
 #[derive(Debug, Clone)]
 pub(super) struct Fields<'m> {
     rest: &'m [u8],
@@ -71,6 +68,13 @@ impl<'m> Iterator for Fields<'m> {
         }
         read
     }
+}
+
+pub(super) fn elements(data: &[u8], number: u32) -> impl Iterator<Item = Result<Item<'_>, Broken>> {
+    Fields::new(data).filter_map(move |field| match field {
+        Ok((found, item)) => (found == number).then_some(Ok(item)),
+        Err(broken) => Some(Err(broken)),
+    })
 }
 
 /// Takes a number of changing length off the bytes: seven bits a byte, lowest first.

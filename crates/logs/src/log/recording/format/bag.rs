@@ -14,7 +14,7 @@ use rusqlite::{Connection, OpenFlags, params};
 use tempfile::TempDir;
 
 use crate::log::content::{Compression, Content};
-use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, Wanted};
+use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, is_wanted};
 use crate::log::{LogError, escape_whole, source};
 
 /// Messages that are asked of the database at once, and their bytes at which a page ends earlier.
@@ -24,12 +24,10 @@ const PAGE_BYTES: usize = 4 << 20;
 const LARGEST_MESSAGE: i32 = 64 << 20;
 /// Why a database with a journal ends early.
 const UNCLOSED: &str = "the recorder did not close it: what it had not committed is lost";
-/// Name of a copy in its folder.
 const COPY: &str = "copy.db3";
 /// Bytes that a database may take once it is decompressed, per byte that it takes compressed.
 const LARGEST_RATIO: u64 = 256;
 
-/// A rosbag2 database that is being read.
 struct BagFile {
     connection: Connection,
     /// Folder of the copy that is read instead of the file, removed when reading ends.
@@ -40,7 +38,7 @@ struct BagFile {
     /// The wanted ones, as SQL lists them.
     filter: String,
     /// Messages that were asked for, the next one last.
-    page: Vec<Stored>,
+    page: Vec<(MessageHead, Vec<u8>)>,
     /// Time and number of the last message of the page.
     last: (i64, i64),
     ended: bool,
@@ -48,93 +46,76 @@ struct BagFile {
     messages: u64,
 }
 
-struct Stored {
-    topic: usize,
-    ns: i64,
-    data: Vec<u8>,
-}
-
-/// Opens a database, to read the wanted topics.
 pub(super) fn open(
     path: &Path,
     content: Content,
-    wanted: &Wanted,
+    wanted: &[String],
 ) -> Result<Box<dyn MessageFile>, LogError> {
-    Ok(Box::new(BagFile::open(path, content, wanted)?))
+    let refuse = |reason: String| LogError::Database {
+        file: source::shown(path),
+        reason: escape_whole(&reason.replace('\n', " ")),
+    };
+    let journal = match content.compression {
+        Compression::None => journal_of(path),
+        _ => None,
+    };
+    let copy = match (&journal, content.compression) {
+        (None, Compression::None) => None,
+        _ => Some(copy_of(path, content, journal.as_ref())?),
+    };
+    let place = match &copy {
+        None => path.to_owned(),
+        Some(folder) => folder.path().join(COPY),
+    };
+    let failed = |error: rusqlite::Error| refuse(error.to_string());
+    let thread = OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let (place, how) = match &journal {
+        None => (
+            unwritten(&place).into(),
+            OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI,
+        ),
+        Some(_) => (place, OpenFlags::SQLITE_OPEN_READ_WRITE),
+    };
+    let connection = Connection::open_with_flags(place, thread | how).map_err(failed)?;
+    connection
+        .set_limit(Limit::SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
+        .map_err(failed)?;
+    // A database from elsewhere: its views and functions are not trusted.
+    connection
+        .execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON;")
+        .map_err(failed)?;
+    let sql = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?1";
+    for table in ["topics", "messages"] {
+        let exists = connection
+            .prepare(sql)
+            .and_then(|mut sql| sql.exists([table]));
+        if !exists.map_err(failed)? {
+            return Err(refuse(format!("it has no table `{table}`")));
+        }
+    }
+    let (topics, numbers) = read_topics(&connection).map_err(failed)?;
+    let listed = numbers
+        .iter()
+        .filter(|(_, topic)| is_wanted(&topics[**topic].name, wanted));
+    let filter: Vec<String> = listed.map(|(number, _)| number.to_string()).collect();
+    Ok(Box::new(BagFile {
+        connection,
+        _copy: copy,
+        topics,
+        numbers,
+        filter: filter.join(","),
+        page: Vec::new(),
+        last: (i64::MIN, i64::MIN),
+        ended: false,
+        broken: journal.map(|_| Break {
+            reason: UNCLOSED.to_owned(),
+            place: "after its last commit".to_owned(),
+        }),
+        messages: 0,
+    }))
 }
 
 impl BagFile {
-    fn open(path: &Path, content: Content, wanted: &Wanted) -> Result<Self, LogError> {
-        let refuse = |reason: String| LogError::Database {
-            file: source::shown(path),
-            reason: escape_whole(&reason.replace('\n', " ")),
-        };
-        let journal = match content.compression {
-            Compression::None => journal_of(path),
-            _ => None,
-        };
-        let copy = match (&journal, content.compression) {
-            (None, Compression::None) => None,
-            _ => Some(copy_of(path, content, journal.as_ref())?),
-        };
-        let place = match &copy {
-            None => path.to_owned(),
-            Some(folder) => folder.path().join(COPY),
-        };
-        let failed = |error: rusqlite::Error| refuse(error.to_string());
-        let thread = OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection = match &journal {
-            None => Connection::open_with_flags(
-                unwritten(&place),
-                thread | OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI,
-            ),
-            Some(_) => {
-                Connection::open_with_flags(&place, thread | OpenFlags::SQLITE_OPEN_READ_WRITE)
-            }
-        };
-        let connection = connection.map_err(failed)?;
-        connection
-            .set_limit(Limit::SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
-            .map_err(failed)?;
-        // A database from elsewhere: its views and functions are not trusted.
-        connection
-            .execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON;")
-            .map_err(failed)?;
-        for table in ["topics", "messages"] {
-            let count: i64 = connection
-                .query_row(
-                    "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?1",
-                    params![table],
-                    |row| row.get(0),
-                )
-                .map_err(failed)?;
-            if count == 0 {
-                return Err(refuse(format!("it has no table `{table}`")));
-            }
-        }
-        let (topics, numbers) = read_topics(&connection).map_err(failed)?;
-        let listed = numbers
-            .iter()
-            .filter(|(_, topic)| wanted.includes(&topics[**topic].name));
-        let filter: Vec<String> = listed.map(|(number, _)| number.to_string()).collect();
-        Ok(Self {
-            connection,
-            _copy: copy,
-            topics,
-            numbers,
-            filter: filter.join(","),
-            page: Vec::new(),
-            last: (i64::MIN, i64::MIN),
-            ended: false,
-            broken: journal.map(|_| Break {
-                reason: UNCLOSED.to_owned(),
-                place: "after its last commit".to_owned(),
-            }),
-            messages: 0,
-        })
-    }
-
-    /// Reads the next page.
     fn turn(&mut self) -> Result<(), rusqlite::Error> {
         let sql = format!(
             "SELECT topic_id, timestamp, data, rowid FROM messages \
@@ -156,11 +137,15 @@ impl BagFile {
             if let Some(topic) = self.numbers.get(&number) {
                 let data = row.get_ref(2)?.as_bytes()?.to_vec();
                 bytes += data.len();
-                self.page.push(Stored {
-                    topic: *topic,
-                    ns,
-                    data,
-                });
+                let (topic, ns) = (*topic, u64::try_from(ns).unwrap_or_default());
+                let head = MessageHead {
+                    topic,
+                    channel: 0,
+                    log_ns: ns,
+                    publish_ns: ns,
+                    number: 0,
+                };
+                self.page.push((head, data));
             }
         }
         Ok(())
@@ -188,19 +173,13 @@ impl MessageFile for BagFile {
             }
             self.page.reverse();
         }
-        let Some(message) = self.page.pop() else {
+        let Some((head, stored)) = self.page.pop() else {
             return Ok(None);
         };
         self.messages += 1;
-        *data = message.data;
-        let ns = u64::try_from(message.ns).unwrap_or_default();
-        Ok(Some(MessageHead {
-            topic: message.topic,
-            channel: 0,
-            log_ns: ns,
-            publish_ns: ns,
-            number: self.messages,
-        }))
+        *data = stored;
+        let number = self.messages;
+        Ok(Some(MessageHead { number, ..head }))
     }
 }
 
@@ -239,18 +218,14 @@ fn read_topics(connection: &Connection) -> Result<Topics, rusqlite::Error> {
     Ok((topics, numbers))
 }
 
-/// What a recorder left beside a database that it did not close: the end of its name, and the bytes
-/// with which it begins where it holds anything.
+/// What a recorder leaves beside a database that it did not close: the end of its name, and its first bytes in use.
 const JOURNALS: [(&str, &[u8]); 2] = [
     ("-wal", b"\x37\x7f\x06"),
     ("-journal", b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"),
 ];
 
-/// A journal in use beside a database.
-struct Journal {
-    path: PathBuf,
-    ending: &'static str,
-}
+/// A journal in use beside a database, and the end of its name.
+type Journal = (PathBuf, &'static str);
 
 fn journal_of(database: &Path) -> Option<Journal> {
     JOURNALS.into_iter().find_map(|(ending, magic)| {
@@ -258,7 +233,7 @@ fn journal_of(database: &Path) -> Option<Journal> {
         let mut first = Vec::new();
         let file = File::open(&path).ok()?;
         file.take(magic.len() as u64).read_to_end(&mut first).ok()?;
-        (first == magic).then_some(Journal { path, ending })
+        (first == magic).then_some((path, ending))
     })
 }
 
@@ -283,10 +258,10 @@ fn copy_of(path: &Path, content: Content, journal: Option<&Journal>) -> Result<T
             reason: format!("it is more than {largest} bytes long once it is decompressed"),
         });
     }
-    if let Some(journal) = journal {
-        let failed = |error: io::Error| source::failed(&journal.path, error);
-        let mut from = File::open(&journal.path).map_err(failed)?;
-        let mut to = File::create(beside(&place, journal.ending)).map_err(failed)?;
+    if let Some((path, ending)) = journal {
+        let failed = |error: io::Error| source::failed(path, error);
+        let mut from = File::open(path).map_err(failed)?;
+        let mut to = File::create(beside(&place, ending)).map_err(failed)?;
         io::copy(&mut from, &mut to).map_err(failed)?;
     }
     Ok(folder)

@@ -15,20 +15,25 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::record::{CUT, ChannelRecord, MessageRecord, SchemaRecord};
 use crate::log::content::{Bytes, Compression, Content};
-use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, Wanted};
+use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, is_wanted};
 use crate::log::{LogError, source};
 
 /// Bytes that are asked of the disk at once.
 const PIECE: usize = 1 << 16;
 /// The largest record that is read [bytes].
 const LARGEST_RECORD: u64 = 256 << 20;
+/// Errors of a decoder whose input is cut off or damaged.
+const CUT_OFF: [io::ErrorKind; 4] = [
+    io::ErrorKind::UnexpectedEof,
+    io::ErrorKind::InvalidData,
+    io::ErrorKind::InvalidInput,
+    io::ErrorKind::Other,
+];
 /// Bytes of definitions that are kept.
 const LARGEST_SCHEMAS: usize = 64 << 20;
 
-/// Why a file ends before its end.
 const UNCLOSED: &str = "the recorder did not close it, or the copy was cut off";
 
-/// An MCAP file that is being read.
 struct McapFile {
     path: PathBuf,
     input: Bytes,
@@ -41,24 +46,21 @@ struct McapFile {
     broken: Option<Break>,
 }
 
-/// What the records of the file said so far.
 struct Contents {
-    wanted: Wanted,
+    wanted: Vec<String>,
     topics: Vec<Topic>,
     /// Channel by its number in the file: index of the topic, and whether it is wanted.
     channels: BTreeMap<u16, (usize, bool)>,
     /// Definition by its number in the file, its encoding not known yet.
     schemas: BTreeMap<u16, Schema>,
-    /// Bytes of all definitions.
     bytes: usize,
     messages: u64,
 }
 
-/// Opens a file, to read the wanted topics.
 pub(super) fn open(
     path: &Path,
     content: Content,
-    wanted: &Wanted,
+    wanted: &[String],
 ) -> Result<Box<dyn MessageFile>, LogError> {
     // No record can hold much more than the whole file does, however well it is compressed.
     let largest = (content.size.saturating_mul(1024) + (1 << 20)).min(LARGEST_RECORD);
@@ -72,7 +74,7 @@ pub(super) fn open(
         input: content.into_bytes(),
         reader: LinearReader::new_with_options(options),
         contents: Contents {
-            wanted: wanted.clone(),
+            wanted: wanted.to_vec(),
             topics: Vec::new(),
             channels: BTreeMap::new(),
             schemas: BTreeMap::new(),
@@ -142,34 +144,23 @@ impl McapFile {
     /// Hands the next bytes of the file to the reader; else why there are none.
     fn fill(&mut self) -> Result<Option<String>, LogError> {
         let buffer = self.reader.insert(PIECE);
-        let count = loop {
-            match self.input.read(buffer) {
-                Ok(count) => break count,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                // A compressed file that is cut off, or damaged.
-                Err(error)
-                    if matches!(
-                        error.kind(),
-                        io::ErrorKind::UnexpectedEof
-                            | io::ErrorKind::InvalidData
-                            | io::ErrorKind::InvalidInput
-                            | io::ErrorKind::Other
-                    ) =>
-                {
-                    return Ok(Some(format!("its compression ends there: {error}")));
-                }
-                Err(error) => return Err(source::failed(&self.path, error)),
+        match self.input.read(buffer) {
+            Ok(count) => {
+                self.reader.notify_read(count);
+                self.bytes += count as u64;
+                Ok(None)
             }
-        };
-        self.reader.notify_read(count);
-        self.bytes += count as u64;
-        Ok(None)
+            // A compressed file that is cut off, or damaged.
+            Err(error) if CUT_OFF.contains(&error.kind()) => {
+                Ok(Some(format!("its compression ends there: {error}")))
+            }
+            Err(error) => Err(source::failed(&self.path, error)),
+        }
     }
 }
 
 impl Contents {
-    /// Takes a record; a message of a wanted topic is handed out, its bytes in `data`. The error is
-    /// why the file cannot be read any further.
+    /// Takes a record; a message of a wanted topic is handed out, its bytes in `data`.
     #[inline]
     fn take(
         &mut self,
@@ -241,7 +232,7 @@ impl Contents {
                 schema: Arc::new(schema),
             });
         }
-        let wanted = self.wanted.includes(channel.topic);
+        let wanted = is_wanted(channel.topic, &self.wanted);
         self.channels.insert(channel.id, (topic, wanted));
         Ok(())
     }

@@ -7,23 +7,19 @@ mod record;
 
 use std::path::Path;
 
-use super::message::{MessageFile, Wanted};
+use super::message::MessageFile;
 use crate::log::LogError;
 use crate::log::content::Content;
 
-/// Opens a file, to read the wanted topics.
-type Open = fn(&Path, Content, &Wanted) -> Result<Box<dyn MessageFile>, LogError>;
+type Open = fn(&Path, Content, &[String]) -> Result<Box<dyn MessageFile>, LogError>;
 
-/// A format of recordings.
 pub(in crate::log) struct Format {
-    /// First bytes of a file.
     magic: &'static [u8],
     /// End of a file's name, compression aside.
     pub(in crate::log) ending: &'static str,
     pub(super) open: Open,
 }
 
-/// The formats that are read.
 pub(in crate::log) const FORMATS: [Format; 2] = [
     Format {
         magic: b"\x89MCAP",

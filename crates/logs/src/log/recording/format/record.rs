@@ -6,7 +6,6 @@
 /// A record that ends inside a field, or whose text is no UTF-8.
 pub(super) const CUT: &str = "a record ends inside one of its fields";
 
-/// A definition of a message type.
 pub(super) struct SchemaRecord<'r> {
     pub(super) id: u16,
     pub(super) name: &'r str,
@@ -14,7 +13,6 @@ pub(super) struct SchemaRecord<'r> {
     pub(super) text: &'r [u8],
 }
 
-/// A topic.
 pub(super) struct ChannelRecord<'r> {
     pub(super) id: u16,
     /// 0 for none.
@@ -23,7 +21,6 @@ pub(super) struct ChannelRecord<'r> {
     pub(super) encoding: &'r str,
 }
 
-/// A message.
 pub(super) struct MessageRecord<'r> {
     pub(super) channel: u16,
     pub(super) log_ns: u64,

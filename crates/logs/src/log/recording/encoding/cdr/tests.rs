@@ -53,13 +53,11 @@ struct State {
 fn states() -> impl Strategy<Value = State> {
     let joints = prop::collection::btree_map("[a-z]{1,9}", (any::<f64>(), any::<f64>()), 0..6);
     let joints = joints.prop_map(|joints| {
-        let joints = joints.into_iter();
-        joints
-            .map(|(name, (q, tau))| (name, q, tau))
-            .collect::<Vec<_>>()
+        let joints = joints.into_iter().map(|(name, (q, tau))| (name, q, tau));
+        joints.collect::<Vec<_>>()
     });
-    let joints = joints.prop_shuffle();
-    (any::<(i32, u32)>(), "\\PC{0,9}", joints).prop_map(|(stamp, frame, joints)| State {
+    let parts = (any::<(i32, u32)>(), "\\PC{0,9}", joints.prop_shuffle());
+    parts.prop_map(|(stamp, frame, joints)| State {
         stamp,
         frame,
         joints,
@@ -81,41 +79,49 @@ fn written(state: &State, kind: u8) -> Vec<u8> {
     out.bytes
 }
 
-fn reader(paths: &[&str]) -> (CdrReader, Vec<bool>) {
-    let definition = Definition::parse("sensor_msgs/msg/JointState", "").unwrap();
-    let fields: Vec<Vec<FieldPath>> = paths
-        .iter()
-        .map(|path| vec![FieldPath::parse(path)])
-        .collect();
-    CdrReader::new(&definition, Encoding::Cdr, &fields)
+fn reader(paths: &[&str]) -> CdrReader {
+    CdrReader::parse("sensor_msgs/msg/JointState", "", paths).unwrap()
 }
 
 #[test]
-fn paths_that_lead_to_no_number_are_told() {
-    let paths = [
-        "header.stamp.sec",
-        "position[3]",
-        "/effort/0",
-        "position[name=a]",
-        "position",
-        "name[0]",
-        "header",
-        "header.frame_id",
-        "position[frame=a]",
-        "header.stamp.sec[0]",
-        "none",
-    ];
-    let (_, found) = reader(&paths);
-    let expected = [
-        true, true, true, true, false, false, false, false, false, false, false,
-    ];
-    assert_eq!(found, expected);
+fn paths_that_lead_to_no_number_are_absent() {
+    let state = State {
+        stamp: (1, 2),
+        frame: "world".to_owned(),
+        joints: vec![("a".to_owned(), 1.0, 2.0)],
+    };
+    for (paths, leads) in [
+        (
+            &[
+                "header.stamp.sec",
+                "position[0]",
+                "/effort/0",
+                "position[name=a]",
+            ][..],
+            true,
+        ),
+        (
+            &[
+                "position",
+                "name[0]",
+                "header",
+                "header.frame_id",
+                "position[frame=a]",
+            ],
+            false,
+        ),
+        (&["header.stamp.sec[0]", "none"], false),
+    ] {
+        let values = reader(paths).values(&written(&state, 1)).unwrap();
+        for (path, value) in paths.iter().zip(values) {
+            assert_eq!(value != Value::Absent, leads, "{path}");
+        }
+    }
 }
 
 #[test]
 fn arrays_of_messages_are_read_by_index_past_fields_of_changing_size() {
     let text = "Drive[] drives\nint8 last\n===\nMSG: p/Drive\nstring[] notes\nint16 code\nfloat64[2] pair\nbool on\n";
-    let definition = Definition::parse("p/msg/Drives", text).unwrap();
     let paths = [
         "drives[1].pair[1]",
         "drives[0].code",
@@ -123,12 +129,7 @@ fn arrays_of_messages_are_read_by_index_past_fields_of_changing_size() {
         "last",
         "drives[2].code",
     ];
-    let fields: Vec<Vec<FieldPath>> = paths
-        .iter()
-        .map(|path| vec![FieldPath::parse(path)])
-        .collect();
-    let (mut reader, found) = CdrReader::new(&definition, Encoding::Cdr, &fields);
-    assert_eq!(found, [true; 5]);
+    let mut reader = CdrReader::parse("p/msg/Drives", text, &paths).unwrap();
     let mut out = Writer::new(1);
     out.put(&2u32.to_le_bytes());
     for (notes, code, pair) in [
@@ -146,50 +147,42 @@ fn arrays_of_messages_are_read_by_index_past_fields_of_changing_size() {
         out.put(&[1]);
     }
     out.put(&[0xff]);
-    let mut values = [Value::Absent; 5];
-    reader.read(&out.bytes, &mut values).unwrap();
-    let expected = [
+    let numbers = [
         Value::Float(4.0),
         Value::Int(-7),
         Value::Int(1),
         Value::Int(-1),
-        Value::Absent,
     ];
-    assert_eq!(values, expected);
+    let expected = [&numbers[..], &[Value::Absent]].concat();
+    assert_eq!(reader.values(&out.bytes), Ok(expected));
 }
 
 #[test]
 fn packed_messages_of_the_first_ros_are_read_without_padding() {
     let text = "Header header\nfloat64[] position\n===\nMSG: std_msgs/Header\nuint32 seq\nuint8 odd\ntime stamp\n";
-    let definition = Definition::parse("p/M", text).unwrap();
-    let fields = [
-        vec![FieldPath::parse("header.stamp.nsecs")],
-        vec![FieldPath::parse("position[1]")],
-    ];
-    let (mut reader, _) = CdrReader::new(&definition, Encoding::Ros1, &fields);
+    let messages = msg::parse("p/M", text).unwrap();
+    let fields = FieldPath::each(&["header.stamp.nsecs", "position[1]"]);
+    let mut reader = CdrReader::new(messages, Encoding::Ros1, &fields);
     let mut bytes = vec![1, 0, 0, 0, 5];
     bytes.extend([3u32, 250].map(u32::to_le_bytes).concat());
     bytes.extend(2u32.to_le_bytes());
     bytes.extend([7.0f64, 8.0].map(f64::to_le_bytes).concat());
-    let mut values = [Value::Absent; 2];
-    reader.read(&bytes, &mut values).unwrap();
-    assert_eq!(values, [Value::Int(250), Value::Float(8.0)]);
+    let expected = vec![Value::Int(250), Value::Float(8.0)];
+    assert_eq!(reader.values(&bytes), Ok(expected));
 }
 
 #[test]
 fn other_encodings_and_short_messages_are_refused() {
-    let (mut reader, _) = reader(&["position[0]"]);
-    let mut out = [Value::Absent];
-    let mut refused = |data: &[u8]| reader.read(data, &mut out).unwrap_err().to_string();
-    assert!(refused(&[0, 3, 0, 0, 1]).contains("0x0003"));
-    assert!(refused(&[0, 1]).contains("ends after 2 bytes"));
-    assert!(refused(&[0, 1, 0, 0, 1, 2]).contains("inside a field"));
     let long = [&[0, 1, 0, 0][..], &[0; 12], &[0xff; 4], &[0; 8]].concat();
-    assert!(
-        refused(&long).contains("4294967295 elements"),
-        "{}",
-        refused(&long)
-    );
+    for (data, word) in [
+        (&[0, 3, 0, 0, 1][..], "0x0003"),
+        (&[0, 1], "ends after 2 bytes"),
+        (&[0, 1, 0, 0, 1, 2], "inside a field"),
+        (&long, "4294967295 elements"),
+    ] {
+        let refused = reader(&["position[0]"]).values(data).unwrap_err();
+        assert!(refused.contains(word), "{refused}");
+    }
 }
 
 proptest! {
@@ -209,10 +202,9 @@ proptest! {
             "position[1]".to_owned(),
         ];
         let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
-        let (mut reader, _) = reader(&paths);
-        let mut out = [Value::Absent; 6];
+        let mut reader = reader(&paths);
         for state in &states {
-            reader.read(&written(state, kind), &mut out).unwrap();
+            let out = reader.values(&written(state, kind)).unwrap();
             let joint = state.joints.iter().find(|joint| joint.0 == named);
             let float = |number: Option<f64>| number.map_or(Value::Absent, Value::Float);
             let bits = |value: Value| value.number().map(f64::to_bits);
@@ -235,15 +227,13 @@ proptest! {
         data in prop::collection::vec(any::<u8>(), 0..80),
         kind in prop::sample::select(vec![0u8, 1, 7]),
     ) {
-        let Ok(definition) = Definition::parse("p/R", &text) else {
+        let Ok(messages) = msg::parse("p/R", &text) else {
             return Ok(());
         };
-        let fields = [vec![FieldPath::parse(&path)]];
+        let message = [&[0, kind, 0, 0][..], &data].concat();
         for encoding in [Encoding::Cdr, Encoding::Ros1] {
-            let (mut reader, _) = CdrReader::new(&definition, encoding, &fields);
-            let message = [&[0, kind, 0, 0][..], &data].concat();
-            let mut out = [Value::Absent];
-            let _ = reader.read(&message, &mut out);
+            let mut reader = CdrReader::new(messages.clone(), encoding, &FieldPath::each(&[&path]));
+            let _ = reader.values(&message);
             reader.names(&message);
         }
     }

@@ -115,9 +115,9 @@ fn arm() -> Vec<u8> {
 }
 
 fn value(syntax: &str, data: &[u8], path: &str) -> Result<Value, String> {
-    let reader = ProtoReader::new("lab.Arm", &set(syntax)).unwrap();
+    let mut reader = ProtoReader::new("lab.Arm", &set(syntax), &FieldPath::each(&[path])).unwrap();
     let mut out = [Value::Absent];
-    reader.read(data, &[vec![FieldPath::parse(path)]], &mut out)?;
+    reader.read(data, &mut out)?;
     Ok(out[0])
 }
 
@@ -139,54 +139,37 @@ fn paths_lead_to_numbers_in_messages_arrays_and_maps() {
     ] {
         assert_eq!(value("proto3", &arm(), path), Ok(expected), "{path}");
     }
-    for path in [
-        "joints",
-        "joints[2].q",
-        "joints[name=c].q",
-        "joints[0]",
-        "joints[0].name",
-        "name[0]",
-        "speeds[3]",
-        "counts[3]",
-        "gains.i",
-        "gains",
-        "none",
-        "lost.q",
-        "big.q",
-        "speeds[name=up]",
-        // three speeds of two names: whose they are is not known
-        "speeds[name=right]",
-        "joints[0].parent.q",
-        "joints[0].q[0]",
-    ] {
+    // three speeds of two names: whose they are is not known
+    let to_none = "speeds[name=right] joints joints[2].q joints[name=c].q joints[0] joints[0].name name[0] speeds[3] \
+        counts[3] gains.i gains none lost.q big.q speeds[name=up] joints[0].parent.q joints[0].q[0]";
+    for path in to_none.split_whitespace() {
         assert_eq!(value("proto3", &arm(), path), Ok(Value::Absent), "{path}");
     }
 }
 
 #[test]
 fn a_number_that_is_left_out_is_0_where_the_language_says_so() {
-    for (path, expected) in [("on", Value::Int(0)), ("big", Value::Int(0))] {
-        assert_eq!(value("proto3", &[], path), Ok(expected));
-        assert_eq!(value("proto2", &[], path), Ok(Value::Absent));
+    let joint = bytes(1, &bytes(1, b"a"));
+    for (syntax, data, path, expected) in [
+        ("proto3", &[][..], "on", Value::Int(0)),
+        ("proto3", &[], "big", Value::Int(0)),
+        ("proto2", &[], "on", Value::Absent),
+        ("proto2", &[], "big", Value::Absent),
+        ("proto3", &joint, "joints[name=a].q", Value::Float(0.0)),
+        ("proto3", &joint, "joints[name=a].parent.q", Value::Absent),
+    ] {
+        assert_eq!(value(syntax, data, path), Ok(expected), "{syntax} {path}");
     }
-    let data = bytes(1, &bytes(1, b"a"));
-    assert_eq!(
-        value("proto3", &data, "joints[name=a].q"),
-        Ok(Value::Float(0.0))
-    );
-    assert_eq!(
-        value("proto3", &data, "joints[name=a].parent.q"),
-        Ok(Value::Absent)
-    );
 }
 
 #[test]
 fn broken_messages_and_sets_without_the_type_are_refused() {
     let cut = &arm()[..arm().len() - 1];
     assert!(value("proto3", cut, "big").unwrap_err().contains("cut off"));
-    let missing = ProtoReader::new("lab.Leg", &set("proto3")).unwrap_err();
+    let set = set("proto3");
+    let missing = ProtoReader::new("lab.Leg", &set, &[]).unwrap_err();
     assert!(missing.contains("does not define lab.Leg"), "{missing}");
-    let damaged = ProtoReader::new("lab.Arm", &set("proto3")[..50]).unwrap_err();
+    let damaged = ProtoReader::new("lab.Arm", &set[..50], &[]).unwrap_err();
     assert!(damaged.contains("damaged"), "{damaged}");
 }
 
@@ -202,10 +185,9 @@ proptest! {
             let length = set.len();
             set[usize::from(at) % length] = byte;
         }
-        if let Ok(reader) = ProtoReader::new("lab.Arm", &set) {
-            let mut out = [Value::Absent];
-            let _ = reader.read(&data, &[vec![FieldPath::parse(&path)]], &mut out);
-            reader.names();
+        if let Ok(mut reader) = ProtoReader::new("lab.Arm", &set, &FieldPath::each(&[&path])) {
+            let _ = reader.read(&data, &mut [Value::Absent]);
+            reader.names(&data);
         }
     }
 }
