@@ -1,8 +1,8 @@
 //! One parameter of one robot over its logs.
 
 use super::changes::{ChangeKind, ParameterChange, least_seen, seek};
-use super::local_level::{Variances, smooth};
-use super::together::{About, Member};
+use super::local_level::smooth;
+use super::together::{About, Signal};
 use super::walk::{Sizes, median};
 
 /// What one log says of a parameter.
@@ -63,15 +63,8 @@ pub fn follow_together(
     let times: Vec<f64> = first.iter().map(|e| e.time).collect();
     let spacings = spacings(&times);
     let signals: Vec<Signal> = parameters.iter().map(|own| Signal::of(own)).collect();
-    let members: Vec<Member> = (signals.iter())
-        .map(|own| Member {
-            signal: &own.values,
-            estimate: &own.variances,
-            alone: &own.outliers,
-        })
-        .collect();
     let about = About {
-        members: &members,
+        members: &signals,
         spacings: &spacings,
         times: &times,
         correlation,
@@ -93,14 +86,6 @@ pub fn follow_together(
         }
     })
     .collect()
-}
-
-/// Estimates of one parameter, as they are followed.
-struct Signal {
-    values: Vec<f64>,
-    /// Infinite where a log says nothing, or stands alone.
-    variances: Vec<f64>,
-    outliers: Vec<usize>,
 }
 
 impl Signal {
@@ -126,7 +111,7 @@ impl Signal {
 
     /// Its course with these changes.
     fn course(&self, sizes: &Sizes, spacings: &[f64], changes: Vec<ParameterChange>) -> Course {
-        let mut all: Variances = sizes.variances(&self.variances, spacings);
+        let mut all = sizes.variances(&self.variances, spacings);
         for change in &changes {
             match change.kind {
                 ChangeKind::Step => all.walk[change.at] += FORGETTING * change.size * change.size,
@@ -134,19 +119,12 @@ impl Signal {
                 ChangeKind::Ramp => {
                     let logs = (self.values.len() - change.at).max(1) as f64;
                     let slope = change.size / logs;
-                    all.walk[change.at..]
-                        .iter_mut()
-                        .for_each(|q| *q += slope * slope);
+                    let walks = all.walk[change.at..].iter_mut();
+                    walks.for_each(|q| *q += slope * slope);
                 }
             }
         }
-        let mut rest = self.values.clone();
-        for (y, r) in rest.iter_mut().zip(&all.estimate) {
-            if !r.is_finite() {
-                *y = 0.0;
-            }
-        }
-        let (values, variance) = smooth(&rest, &all);
+        let (values, variance) = smooth(&self.determined(&self.values), &all);
         Course {
             values,
             std: variance.into_iter().map(f64::sqrt).collect(),
@@ -170,8 +148,7 @@ fn spacings(times: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Estimates that stand alone: far from the median of those before them and of those after them. So is a log in which the robot carried
-/// something; a change is one when as many logs show it as do not.
+/// Estimates far from the median of those before them and of those after: so is a log in which the robot carried something.
 fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
     let known: Vec<usize> = (0..signal.len())
         .filter(|k| variances[*k].is_finite())
@@ -193,8 +170,8 @@ fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
         match place - from < 2 || to - place < 3 {
             true => x - middle(from..to, place),
             false => {
-                let sides = [from..place, place + 1..to].map(|side| x - middle(side, place));
-                let [before, after] = sides;
+                let [before, after] =
+                    [from..place, place + 1..to].map(|side| x - middle(side, place));
                 if before.abs() < after.abs() {
                     before
                 } else {
