@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 
 use super::ExportError;
-use cft_ident_core::robot::model::{JointFriction, Model};
+use super::dissipative::damping_and_friction;
+use cft_ident_core::robot::model::Model;
 
 /// A joint as the controller knows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,12 +62,7 @@ pub fn parameters(
                 inertia,
             });
         }
-        let viscous = match &model.friction[j] {
-            JointFriction::None => 0.0,
-            JointFriction::ViscousCoulomb(law) => law.viscous,
-            JointFriction::DoubleTanh(law) => law.viscous,
-        }
-        .max(0.0);
+        let [viscous, _] = damping_and_friction(&model.friction[j]).map(|x| x.max(0.0));
         let gains = [
             ("p", inertia * w * w),
             ("i", 0.0),
