@@ -252,7 +252,7 @@ impl Episodes {
 
     /// Rows in all of them.
     pub(super) fn rows(&self) -> u64 {
-        self.list.iter().map(|episode| episode.rows).sum()
+        self.iter().map(|episode| episode.rows).sum()
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &FaultEpisode> {
@@ -262,13 +262,10 @@ impl Episodes {
     /// As they are reported: one by one, or all as one where there are many.
     pub(super) fn merged(&self) -> Vec<(FaultEpisode, usize)> {
         let (Some(first), true) = (self.list.first(), self.list.len() > LISTED) else {
-            return self.list.iter().map(|episode| (*episode, 1)).collect();
+            return self.iter().map(|episode| (*episode, 1)).collect();
         };
-        let to = self.list.iter().fold(first.to, |to, e| to.max(e.to));
-        let from = self
-            .list
-            .iter()
-            .fold(first.from, |from, e| from.min(e.from));
+        let to = self.iter().fold(first.to, |to, e| to.max(e.to));
+        let from = self.iter().fold(first.from, |from, e| from.min(e.from));
         let rows = self.rows();
         vec![(FaultEpisode { from, to, rows }, self.list.len())]
     }
@@ -279,26 +276,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_stretches_are_joined_and_many_are_told_as_one() {
+    fn near_stretches_are_joined_and_many_are_reported_as_one() {
+        let first =
+            |found: &[(FaultEpisode, usize)]| (found[0].0.from, found[0].0.to, found[0].0.rows);
         let mut episodes = Episodes::default();
         episodes.add(1.0, 1.1, 2, 0.05);
         episodes.add(1.14, 1.2, 1, 0.05);
         episodes.add(2.0, 2.0, 1, 0.05);
         let found = episodes.merged();
-        assert_eq!(found.len(), 2);
-        assert_eq!(
-            (found[0].0.from, found[0].0.to, found[0].0.rows),
-            (1.0, 1.2, 3)
-        );
+        assert_eq!((found.len(), first(&found)), (2, (1.0, 1.2, 3)));
         for k in 0..20 {
             episodes.add(3.0 + f64::from(k), 3.5 + f64::from(k), 4, 0.0);
         }
         let found = episodes.merged();
         assert_eq!((found.len(), found[0].1), (1, 22));
-        assert_eq!(
-            (found[0].0.from, found[0].0.to, found[0].0.rows),
-            (1.0, 22.5, 84)
-        );
+        assert_eq!(first(&found), (1.0, 22.5, 84));
     }
 
     #[test]

@@ -71,11 +71,8 @@ pub(super) struct Track {
 
 impl Track {
     fn new(channel: InspectedChannel, position: Option<usize>) -> Self {
-        let shaped = matches!(
-            channel.role,
-            ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
-        );
         Self {
+            shaped: channel.role.has_shape(),
             channel,
             rows: 0,
             low: f64::INFINITY,
@@ -95,7 +92,6 @@ impl Track {
             before: f64::NAN,
             leaps_of_heat: Episodes::default(),
             highest: 0.0,
-            shaped,
         }
     }
 
@@ -232,20 +228,15 @@ pub struct LogJudge {
 impl LogJudge {
     /// For a log of these channels, time aside.
     pub fn new(mut channels: Vec<InspectedChannel>, depth: Depth) -> Self {
-        let of_motion = channels.iter_mut().filter(|channel| {
-            matches!(
-                channel.role,
-                ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
-            )
-        });
-        for channel in of_motion.skip(SHAPED) {
+        let shaped = channels
+            .iter_mut()
+            .filter(|channel| channel.role.has_shape());
+        for channel in shaped.skip(SHAPED) {
             channel.role = ChannelRole::Other;
         }
         let of_role = |role: ChannelRole| -> Vec<usize> {
-            let all = channels.iter().enumerate();
-            all.filter(|(_, channel)| channel.role == role)
-                .map(|(index, _)| index)
-                .collect()
+            let all = 0..channels.len();
+            all.filter(|index| channels[*index].role == role).collect()
         };
         let positions = of_role(ChannelRole::Position);
         let position_of = |channel: &InspectedChannel| {
@@ -259,26 +250,24 @@ impl LogJudge {
             let found = positions.iter().find(of_joint).copied().or(only);
             found.filter(|_| channel.role != ChannelRole::Position)
         };
-        let tracks: Vec<Track> = channels
-            .iter()
+        let tracks = (channels.iter())
             .map(|channel| Track::new(channel.clone(), position_of(channel)))
             .collect();
-        let mut compared = Vec::new();
-        for role in [
-            ChannelRole::Position,
-            ChannelRole::Velocity,
-            ChannelRole::Torque,
-            ChannelRole::Command,
-        ] {
-            if depth == Depth::Whole || role == ChannelRole::Position || role == ChannelRole::Torque
-            {
-                compared.extend(of_role(role));
-            }
-        }
+        let roles = match depth {
+            Depth::Gate => &[ChannelRole::Position, ChannelRole::Torque][..],
+            Depth::Whole => &[
+                ChannelRole::Position,
+                ChannelRole::Velocity,
+                ChannelRole::Torque,
+                ChannelRole::Command,
+            ],
+        };
+        let mut compared: Vec<usize> = roles.iter().flat_map(|role| of_role(*role)).collect();
         compared.sort_unstable();
         compared.truncate(COMPARED);
-        let mut others = of_role(ChannelRole::Torque);
-        others.extend(of_role(ChannelRole::Velocity));
+        let others = [ChannelRole::Torque, ChannelRole::Velocity]
+            .map(of_role)
+            .concat();
         Self {
             depth,
             clock: LogClock::default(),
@@ -299,24 +288,6 @@ impl LogJudge {
             windows: Windows::default(),
             steps: Vec::new(),
         }
-    }
-
-    /// The same, with kinds of findings that are reported but not acted upon.
-    pub fn keeping(mut self, keep: &[RowFault]) -> Self {
-        self.keep = keep.to_vec();
-        self
-    }
-
-    /// The same, with the band that a fit keeps \[Hz\], where it is known.
-    pub fn within(mut self, band_hz: Option<f64>) -> Self {
-        self.band_hz = band_hz.unwrap_or(NOISE_BAND_HZ);
-        self
-    }
-
-    /// The same for a recording of messages.
-    pub fn of_messages(mut self, messages: bool) -> Self {
-        self.messages = messages;
-        self
     }
 
     /// Takes consecutive rows: times [s], and one column per channel.
@@ -350,10 +321,8 @@ impl LogJudge {
         self.watch_repeats(times, &steps, columns);
         let whole = steps.iter().skip(1).all(|step| *step == RowStep::Next);
         let finite = || {
-            columns
-                .iter()
-                .zip(&self.tracks)
-                .all(|(column, track)| !track.shaped || column.iter().all(|x| x.is_finite()))
+            let mut pairs = columns.iter().zip(&self.tracks);
+            pairs.all(|(column, track)| !track.shaped || column.iter().all(|x| x.is_finite()))
         };
         if self.depth == Depth::Whole && whole && finite() {
             self.windows.offer(times, columns);
@@ -366,9 +335,7 @@ impl LogJudge {
         self.fresh.clear();
         let row = &mut self.row[0];
         for (k, &t) in times.iter().enumerate() {
-            for (value, index) in row.iter_mut().zip(&self.positions) {
-                *value = columns[*index][k];
-            }
+            gather(row, columns, &self.positions, k);
             self.fresh.push(self.fresh_rows.look(t, row));
         }
     }
@@ -401,13 +368,8 @@ impl LogJudge {
                 continue;
             }
             let [positions, others] = &mut self.row;
-            let gather = |row: &mut [f64], indices: &[usize]| {
-                for (value, index) in row.iter_mut().zip(indices) {
-                    *value = columns[*index][k];
-                }
-            };
-            gather(positions, &self.positions);
-            gather(others, &self.others);
+            gather(positions, columns, &self.positions, k);
+            gather(others, columns, &self.others, k);
             if *step == RowStep::Apart || positions.iter().any(|x| !x.is_finite()) {
                 self.repeats.part();
             }
@@ -418,12 +380,17 @@ impl LogJudge {
 
     /// Whether a position channel moves: further than its grain, and not far less than the others.
     pub(super) fn moves(&self, track: &Track) -> bool {
-        let travels = self
-            .positions
-            .iter()
-            .map(|index| self.tracks[*index].travel());
+        let positions = self.positions.iter();
+        let travels = positions.map(|index| self.tracks[*index].travel());
         let farthest = travels.fold(0.0, f64::max);
         let step = track.flat.steps.quantile_not_zero(0.05);
         track.travel() > (30.0 * step).max(MIN_TRAVEL_SHARE * farthest)
+    }
+}
+
+/// Row `k` of some columns.
+fn gather(row: &mut [f64], columns: &[&[f64]], indices: &[usize], k: usize) {
+    for (value, index) in row.iter_mut().zip(indices) {
+        *value = columns[*index][k];
     }
 }

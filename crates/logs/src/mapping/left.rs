@@ -35,12 +35,6 @@ pub(super) fn left<'a>(columns: &'a [LogColumn], joints: &[&str]) -> Option<Take
     // another reading of the same columns is no other family
     let same = |other: &Family| other.members.iter().all(|(_, column)| of_only(column));
     let (_, columns) = fit(only, joints).filter(|_| others.iter().all(same))?;
-    Some(Taken {
-        pattern: only.pattern.clone(),
-        // what is said of it says the order too
-        how: How::Fits,
-        columns,
-        others: Vec::new(),
-        tie: false,
-    })
+    // what is said of it says the order too
+    Some(Taken::new(only.pattern.clone(), How::Fits, columns))
 }

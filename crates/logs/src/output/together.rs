@@ -84,12 +84,10 @@ impl Together {
     /// # Errors
     /// What the system says.
     pub fn make_folder(&self, path: &Path) -> std::io::Result<()> {
-        let missing: Vec<PathBuf> = path
-            .ancestors()
-            .filter(|folder| !folder.as_os_str().is_empty())
-            .take_while(|folder| !folder.exists())
-            .map(Path::to_owned)
-            .collect();
+        let named = path.ancestors();
+        let named = named.filter(|folder| !folder.as_os_str().is_empty());
+        let missing = named.take_while(|folder| !folder.exists());
+        let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         unfinished().extend(missing.iter().cloned());
         // the deepest first, as they are removed
         self.lock().folders.splice(0..0, missing);
@@ -115,8 +113,9 @@ impl Together {
             };
             if let Err(error) = file.persist(&path) {
                 // what stands under the other name is the same file
-                old.iter()
-                    .for_each(|old| drop(std::fs::remove_file(&old.name)));
+                if let Some(old) = old {
+                    let _ = std::fs::remove_file(old.name);
+                }
                 renamed.into_iter().rev().for_each(Renamed::undo);
                 return Err(OutputError::new(&named, error.error));
             }
@@ -144,11 +143,11 @@ impl Renamed {
     }
 }
 
-/// A second name for the file at `path`, where there is one and the disk knows second names. It is held before it is
-/// named, so that no other run takes it for abandoned.
+/// A second name for the file at `path`, where there is one and the disk knows second names.
 fn kept(path: &Path, temporary: &Path) -> Option<SecondName> {
     let own = temporary.file_name()?.to_str()?.strip_suffix(SUFFIX)?;
     let name = temporary.with_file_name(format!("{own}_old{SUFFIX}"));
+    // held before it is named, so that no other run takes it for abandoned
     let held = File::open(path).ok();
     let _ = held.as_ref().map(File::try_lock);
     std::fs::hard_link(path, &name).ok()?;
@@ -230,16 +229,16 @@ mod tests {
     fn what_is_dropped_leaves_neither_files_nor_folders() {
         let folder = tempfile::tempdir().unwrap();
         let inside = folder.path().join("runs").join("monday");
-        let files = Together::default();
-        files.make_folder(&inside).unwrap();
-        files.write(&inside.join("a"), b"new").unwrap();
-        drop(files);
-        assert!(names(folder.path()).is_empty());
-        let files = Together::default();
-        files.make_folder(&inside).unwrap();
-        files.write(&inside.join("a"), b"new").unwrap();
-        files.commit().unwrap();
-        drop(files);
+        for commits in [false, true] {
+            let files = Together::default();
+            files.make_folder(&inside).unwrap();
+            files.write(&inside.join("a"), b"new").unwrap();
+            if commits {
+                files.commit().unwrap();
+            }
+            drop(files);
+            assert_eq!(names(folder.path()).is_empty(), !commits);
+        }
         assert_eq!(names(&inside), ["a"]);
     }
 }
