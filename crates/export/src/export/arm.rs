@@ -37,8 +37,8 @@ pub struct Arm {
     pub couplings: Vec<(Coupling, [f64; 3])>,
     /// Where the inertials come from.
     pub of_inertials: &'static [&'static str],
-    /// Effects that are in bodies, gravity and armatures, by their place in the model.
-    pub held: Vec<(usize, Property)>,
+    /// Places in the model of the effects that are in bodies, gravity and armatures.
+    pub held: Vec<usize>,
 }
 
 /// A link and the joint before it.
@@ -105,7 +105,7 @@ impl Arm {
         for (i, effect) in refined.effects.iter().enumerate() {
             if let Some(property) = effect.property() {
                 fold(property, &mut bodies, &mut drives, &mut gravity);
-                held.push((i, property));
+                held.push(i);
             }
         }
         let couplings = robot.transmission().couplings().iter().copied();
@@ -271,11 +271,9 @@ mod tests {
         let (moments, axes) = principal(&body);
         let r = Matrix3::from_fn(|i, j| axes[i][j]);
         let back = r * Matrix3::from_diagonal(&moments.into()) * r.transpose();
-        for (k, (i, j)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
-            .into_iter()
-            .enumerate()
-        {
-            assert!((back[(i, j)] - body.inertia[k]).abs() < 1e-15);
+        let places = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        for (place, inertia) in places.into_iter().zip(body.inertia) {
+            assert!((back[place] - inertia).abs() < 1e-15);
         }
     }
 }

@@ -10,7 +10,6 @@ use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_core::robot::tree::{Coordinate, Coupling};
 
-/// The words of a language.
 pub(super) struct Language {
     /// A table: type, name with its sizes, values; `$` stands for each.
     table: fn(kind: &str, name: &str, sizes: &[usize], values: &str) -> String,
@@ -62,12 +61,10 @@ impl Language {
         format!("{}{}{}", self.open, parts.join(between), self.close)
     }
 
-    /// Whether it is C.
     pub(super) fn is_c(&self) -> bool {
         self.open == '{'
     }
 
-    /// A table of numbers.
     pub(super) fn numbers(
         &self,
         name: &str,
@@ -141,18 +138,15 @@ impl Language {
         (self.table)(kind, name, &sizes, &self.nested(&values, &sizes))
     }
 
-    /// The standard parameters of every link.
     pub(super) fn bodies(&self, name: &str, bodies: &[[f64; STANDARD]]) -> String {
         let sizes = [bodies.len(), STANDARD];
         self.numbers(name, &sizes, bodies.iter().flatten().copied())
     }
 
-    /// A vector.
     pub(super) fn vector(&self, name: &str, x: &[f64]) -> String {
         self.numbers(name, &[x.len()], x.iter().copied())
     }
 
-    /// Numbers between brackets.
     pub(super) fn list(&self, x: &[f64]) -> String {
         let all: Vec<String> = x.iter().copied().map(exact).collect();
         self.nested(&all, &[x.len()])
@@ -184,7 +178,6 @@ impl Language {
             .replace("@TO_STEP@", of(added || steps, ", temperature"))
     }
 
-    /// What the file is, line by line.
     pub(super) fn header(&self, program: &Program, note: &Note) -> String {
         let mut lines = note.lines.clone();
         lines.push(String::new());

@@ -24,7 +24,6 @@ pub struct LeftOut {
     pub percent_of_torque: Option<f64>,
 }
 
-/// One of them.
 struct Part<'a> {
     what: String,
     torque: Box<Torque<'a>>,
@@ -130,7 +129,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
     }
     for (i, effect) in refined.effects.iter().enumerate() {
         // a drive's inertia is named with that of its joint
-        if arm.held.iter().any(|(held, _)| *held == i) {
+        if arm.held.contains(&i) {
             continue;
         }
         let late = (0..n).any(|j| effect.shift(j) != 0.0);

@@ -130,7 +130,6 @@ fn tendons(out: &mut String, arm: &Arm) {
     out.push_str("  </tendon>\n");
 }
 
-/// Links that follow a joint.
 fn followers(out: &mut String, arm: &Arm) {
     let mut lines = String::new();
     for link in &arm.links {

@@ -103,7 +103,6 @@ pub fn module(program: &Program, note: &Note) -> String {
         .replace("@HEADER@", &RUST.header(program, note))
 }
 
-/// The time by which each torque is late.
 fn lead(program: &Program) -> String {
     let late = &program.effects.lead_s;
     if late.iter().all(|d| *d == 0.0) {

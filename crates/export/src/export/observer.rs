@@ -61,7 +61,6 @@ const LATE_IN_RUST: &str = "\
         }";
 
 impl Recipe {
-    /// Type, functions and tables in C.
     pub(super) fn in_c(&self, program: &Program) -> String {
         let plain = "    for (j = 0; j < N; j++) y[j] = r[2][N + j] - model[j];";
         let fields = "    double measured[@D@][@N@], modelled[@D@][@N@];\n    int late;\n";
@@ -69,7 +68,6 @@ impl Recipe {
         self.text(program, (IN_C, &C), (plain, LATE_IN_C), of_late)
     }
 
-    /// The same in Rust.
     pub(super) fn in_rust(&self, program: &Program) -> String {
         let plain = "        for j in 0..JOINTS {\n            y[j] = r[2][JOINTS + j] - model[j];\n        }";
         let fields = "    measured: [[f64; JOINTS]; @D@],\n    modelled: [[f64; JOINTS]; @D@],\n    late: usize,\n";

@@ -87,7 +87,6 @@ pub(super) fn placed(link: &Link, drive: &Drive) -> (Rotation, Vector) {
     }
 }
 
-/// Name of the joint before a link.
 pub(super) fn joint_name(robot: &Robot, link: &Link, drive: &Drive) -> String {
     let names = robot.joint_names();
     if let Drive::Joint(j) = drive {
@@ -135,9 +134,8 @@ pub(super) fn drive(robot: &Robot, link: &Link) -> Result<Drive, ExportError> {
 pub(super) fn root(robot: &Robot, file: &ModelFile) -> String {
     let mut name = "base".to_owned();
     let frames = &file.robot.robot.frame;
-    while robot.tree().links().iter().any(|l| l.name == name)
-        || frames.iter().any(|f| f.name == name)
-    {
+    let links = robot.tree().links();
+    while links.iter().any(|l| l.name == name) || frames.iter().any(|f| f.name == name) {
         name.push_str("_frame");
     }
     name
@@ -222,10 +220,8 @@ pub(super) fn dynamics([damping, friction]: [f64; 2]) -> String {
 
 /// A text inside an attribute.
 pub(super) fn quoted(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Numbers that are read back bit for bit.

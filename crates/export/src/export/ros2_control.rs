@@ -109,9 +109,7 @@ mod tests {
     #[test]
     fn numbers_are_doubles_to_every_reader() {
         let shown = [0.0, 12.0, 0.000_123_456_7, 123_456.7, -1.5].map(decimal);
-        assert_eq!(
-            shown,
-            ["0.0", "12.0000", "0.000123457", "123456.7", "-1.50000"]
-        );
+        let doubles = ["0.0", "12.0000", "0.000123457", "123456.7", "-1.50000"];
+        assert_eq!(shown, doubles);
     }
 }

@@ -109,7 +109,6 @@ fn placement(file: &ModelFile, i: usize, link: &Link, drive: &Drive) -> [Vector;
     }
 }
 
-/// The joint before a link.
 fn joint(
     out: &mut String,
     model: &Model,
@@ -235,12 +234,8 @@ fn side_file(
     side.covariance = None;
     side.estimate_covariance = None;
     // base parameters come out of the URDF; what the drives add to them stands here
-    let base: Vec<&str> = robot
-        .parameters()
-        .iter()
-        .take(robot.groupings().len())
-        .map(|p| &*p.name)
-        .collect();
+    let base = robot.parameters().iter().take(robot.groupings().len());
+    let base: Vec<&str> = base.map(|p| &*p.name).collect();
     side.parameters
         .retain(|p| p.joint.is_some() || !base.contains(&p.name.as_str()));
     let first = robot.tree().links().len() * STANDARD;

@@ -69,12 +69,6 @@ fn shape(kind: ChangeKind, at: usize, times: &[f64]) -> Vec<f64> {
     times.iter().enumerate().map(of).collect()
 }
 
-impl Found {
-    fn shape(&self, times: &[f64]) -> Vec<f64> {
-        shape(self.kind, self.at, times)
-    }
-}
-
 /// Of the ratio that is tested for another change besides `known` ones, where there is none.
 fn law(about: About, known: usize) -> Option<FisherSnedecor> {
     let freedom = about.freedom(known + 1).max(1);
@@ -163,7 +157,7 @@ fn rests(about: About, changes: &[Found]) -> Vec<Vec<f64>> {
         .map(|member| member.values.clone())
         .collect();
     for change in changes {
-        let shape = change.shape(about.times);
+        let shape = shape(change.kind, change.at, about.times);
         for (rest, [size, _]) in rests.iter_mut().zip(&change.sizes) {
             let pairs = rest.iter_mut().zip(&shape);
             pairs.for_each(|(x, shape)| *x -= size * shape);
@@ -175,7 +169,7 @@ fn rests(about: About, changes: &[Found]) -> Vec<Vec<f64>> {
 /// What changes add, white.
 fn columns(about: About, white: &White, changes: &[Found]) -> Vec<Vec<f64>> {
     let each = changes.iter();
-    each.flat_map(|c| white.columns(&c.shape(about.times)))
+    each.flat_map(|c| white.columns(&shape(c.kind, c.at, about.times)))
         .collect()
 }
 
@@ -224,7 +218,7 @@ fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Found> {
 fn carries(about: About, sizes: &[Sizes], found: &[Found], change: &Found) -> bool {
     let all = [found, std::slice::from_ref(change)].concat();
     let rests = rests(about, &all);
-    let shape = change.shape(about.times);
+    let shape = shape(change.kind, change.at, about.times);
     let members = about.members.iter().zip(sizes).zip(&rests).enumerate();
     members.into_iter().any(|(i, ((member, own), rest))| {
         let variances = own.variances(&member.variances, about.spacings);

@@ -92,12 +92,11 @@ impl Signal {
     fn of(estimates: &[LogEstimate]) -> Self {
         let known =
             |e: &LogEstimate| e.variance.is_finite() && e.variance > 0.0 && e.value.is_finite();
-        let mut variances: Vec<f64> = (estimates.iter())
-            .map(|e| if known(e) { e.variance } else { f64::INFINITY })
-            .collect();
-        let values: Vec<f64> = (estimates.iter())
-            .map(|e| if known(e) { e.value } else { 0.0 })
-            .collect();
+        let pair = |e: &LogEstimate| match known(e) {
+            true => (e.value, e.variance),
+            false => (0.0, f64::INFINITY),
+        };
+        let (values, mut variances): (Vec<f64>, Vec<f64>) = estimates.iter().map(pair).unzip();
         let outliers = alone(&values, &variances);
         for k in &outliers {
             variances[*k] = f64::INFINITY;
@@ -141,11 +140,9 @@ impl Signal {
 fn spacings(times: &[f64]) -> Vec<f64> {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let usual = median(steps().filter(|s| *s > 0.0)).unwrap_or(1.0);
-    let spacing = |s: f64| (s / usual).clamp(0.0, 100.0);
-    std::iter::once(1.0)
-        .chain(steps().map(spacing))
-        .take(times.len())
-        .collect()
+    let spacings = steps().map(|s| (s / usual).clamp(0.0, 100.0));
+    let all = std::iter::once(1.0).chain(spacings);
+    all.take(times.len()).collect()
 }
 
 /// Estimates far from the median of those before them and of those after: so is a log in which the robot carried something.
@@ -188,10 +185,8 @@ fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
         let std = (1.4826 * scale).max(variances[known[place]].sqrt());
         off[place].abs() > OUTLIER_DEVIATIONS * std
     };
-    (0..known.len())
-        .filter(|p| far(*p))
-        .map(|p| known[p])
-        .collect()
+    let alone = (0..known.len()).filter(|place| far(*place));
+    alone.map(|place| known[place]).collect()
 }
 
 #[cfg(test)]
@@ -230,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_step_that_is_seen_is_told_in_about_one_course_of_two() {
+    fn the_least_step_that_is_seen_is_reported_in_about_one_course_of_two() {
         let (mut known, mut sizes) = ([0; 3], Vec::new());
         for seed in 0..60 {
             let least = follow(&course(seed, |_| 0.0), 1e-3).least_seen.unwrap();
@@ -244,17 +239,15 @@ mod tests {
         // comes by chance at 1e-3 among 78 places and kinds
         sizes.sort_by(f64::total_cmp);
         assert!((0.3..0.5).contains(&sizes[30]), "{sizes:?}");
-        assert!(
-            known[0] <= 6 && (18..=45).contains(&known[1]) && known[2] >= 54,
-            "{known:?}"
-        );
+        let half = (18..=45).contains(&known[1]);
+        assert!(known[0] <= 6 && half && known[2] >= 54, "{known:?}");
         let few = course(0, |_| 0.0);
         assert_eq!(follow(&few[..11], 1e-3).least_seen, None);
         assert!(follow(&few[..12], 1e-3).least_seen.is_some());
     }
 
     #[test]
-    fn a_ramp_is_told_from_a_step() {
+    fn a_ramp_is_no_step() {
         let mut found = 0;
         for seed in 0..20 {
             let ramp = |k: usize| if k < 20 { 0.0 } else { 0.2 * (k as f64 - 19.0) };
@@ -337,16 +330,13 @@ mod tests {
             };
             let found = follow(&course(seed, again)[..38], 1e-4);
             assert!(found.changes.is_empty(), "{seed}: {:?}", found.changes);
-            let first = follow(
-                &course(seed, |k| if k < 31 { 0.0 } else { 4.0 })[..38],
-                1e-4,
-            );
-            assert_eq!(first.changes.len(), 1, "{seed}");
+            let stays = course(seed, |k| if k < 31 { 0.0 } else { 4.0 });
+            assert_eq!(follow(&stays[..38], 1e-4).changes.len(), 1, "{seed}");
         }
     }
 
     #[test]
-    fn bands_cover_and_logs_that_tell_nothing_are_bridged() {
+    fn bands_cover_and_logs_that_say_nothing_are_bridged() {
         let (mut inside, mut all) = (0, 0);
         for seed in 0..40 {
             let mut estimates = course(seed, |_| 0.0);

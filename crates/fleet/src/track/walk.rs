@@ -7,7 +7,6 @@ pub(super) const TRIED: [f64; 9] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 1
 /// Degrees of freedom of the innovations: a step and a log with a payload are no walk.
 const FREEDOM: f64 = 4.0;
 
-/// Sizes of both.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Sizes {
     /// Variance of the walk over a usual time between two logs.
@@ -76,7 +75,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn walk_and_scatter_are_told_apart() {
+    fn walk_and_scatter_are_not_confused() {
         let mut chance = ChaCha8Rng::seed_from_u64(5);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
         let n = 200;

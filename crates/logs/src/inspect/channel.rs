@@ -165,9 +165,9 @@ mod tests {
             ("q_dot_1", Velocity, Some("1")),
             ("v", Other, None),
         ] {
-            let found = InspectedChannel::guessed(name);
+            let (found_role, found_joint) = guess(name);
             assert_eq!(
-                (found.role, found.joint.as_deref()),
+                (found_role, found_joint.as_deref()),
                 (role, joint),
                 "{name}"
             );

@@ -89,7 +89,7 @@ impl FaultList {
     /// Leaves the rows of some stretches out, which were reported as this fault, unless the robot file keeps them.
     pub(super) fn cut(&mut self, fault: Fault, episodes: &Episodes) {
         if self.acts(fault) {
-            let spans = episodes.iter().map(|e| ([e.from, e.to], fault.1));
+            let spans = episodes.list.iter().map(|e| ([e.from, e.to], fault.1));
             self.cuts.extend(spans);
         }
     }

@@ -217,7 +217,7 @@ impl LogFault {
 /// Stretches of a log, in the order of time, few enough to be listed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Episodes {
-    list: Vec<FaultEpisode>,
+    pub(super) list: Vec<FaultEpisode>,
 }
 
 /// One stretch: times of its first and last row [s], and how many rows of it are concerned.
@@ -246,26 +246,20 @@ impl Episodes {
         }
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.list.is_empty()
-    }
-
-    /// Rows in all of them.
     pub(super) fn rows(&self) -> u64 {
-        self.iter().map(|episode| episode.rows).sum()
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = &FaultEpisode> {
-        self.list.iter()
+        self.list.iter().map(|episode| episode.rows).sum()
     }
 
     /// As they are reported: one by one, or all as one where there are many.
     pub(super) fn merged(&self) -> Vec<(FaultEpisode, usize)> {
         let (Some(first), true) = (self.list.first(), self.list.len() > LISTED) else {
-            return self.iter().map(|episode| (*episode, 1)).collect();
+            return self.list.iter().map(|episode| (*episode, 1)).collect();
         };
-        let to = self.iter().fold(first.to, |to, e| to.max(e.to));
-        let from = self.iter().fold(first.from, |from, e| from.min(e.from));
+        let to = self.list.iter().fold(first.to, |to, e| to.max(e.to));
+        let from = self
+            .list
+            .iter()
+            .fold(first.from, |from, e| from.min(e.from));
         let rows = self.rows();
         vec![(FaultEpisode { from, to, rows }, self.list.len())]
     }

@@ -65,14 +65,14 @@ fn together<T: Clone>(
     logs: &[(String, Findings)],
     list: impl Fn(&Findings) -> &[T],
 ) -> Vec<OfLog<T>> {
-    let of = |(log, findings): &(String, Findings)| {
-        let entry = |found: &T| OfLog {
+    let mut out = Vec::new();
+    for (log, findings) in logs {
+        out.extend(list(findings).iter().map(|found| OfLog {
             found: found.clone(),
             log: log.clone(),
-        };
-        list(findings).iter().map(entry).collect::<Vec<_>>()
-    };
-    logs.iter().flat_map(of).collect()
+        }));
+    }
+    out
 }
 
 /// A log as it was found.

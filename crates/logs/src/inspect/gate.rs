@@ -31,7 +31,6 @@ pub struct Gate {
     /// What is reported of them, and whether the robot moves as without its motors there, once known.
     faults_of_off: Vec<LogFault>,
     freely: Option<bool>,
-    /// Median step of the log [s].
     dt: f64,
     /// The instant from which the log's times are counted.
     origin: Instant,
@@ -336,10 +335,9 @@ pub struct Cutter {
 impl Cutter {
     /// Removes the rows that lie in a span.
     pub fn cut(&mut self, block: &mut Block) {
-        let (Some(first), Some(last)) = (block.t.first(), block.t.last()) else {
+        let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else {
             return;
         };
-        let (first, last) = (*first, *last);
         while self.spans.get(self.next).is_some_and(|[_, to]| *to < first) {
             self.next += 1;
         }
@@ -392,10 +390,8 @@ mod tests {
             assert!(pairs.all(|(q, tau)| q[1] == *tau));
             kept.extend(block.tau);
         }
-        let expected: Vec<f64> = (0..30u32)
-            .filter(|k| ![4, 5, 6, 10, 11, 12, 13, 14].contains(k))
-            .map(f64::from)
-            .collect();
+        let rows = (0..30).filter(|k| ![4, 5, 6, 10, 11, 12, 13, 14].contains(k));
+        let expected: Vec<f64> = rows.map(f64::from).collect();
         assert_eq!(kept, expected);
         assert_eq!(cutter.removed(), 8);
         let steps = kept.windows(2).map(|pair| pair[1] - pair[0]);

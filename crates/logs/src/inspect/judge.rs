@@ -23,7 +23,6 @@ const MIN_TRAVEL_SHARE: f64 = 0.02;
 const NOISE_BAND_HZ: f64 = 20.0;
 /// Channels whose shape is looked at; of more only the numbers are.
 const SHAPED: usize = 512;
-/// Channels that are compared with each other.
 const COMPARED: usize = 64;
 
 /// What no drive warms up by within so short a time: 5 degC, 1 s.
@@ -207,7 +206,6 @@ pub struct LogJudge {
     pub(super) copies: Copies,
     /// Channels whose copies are looked for.
     pub(super) compared: Vec<usize>,
-    /// Channels that hold positions.
     pub(super) positions: Vec<usize>,
     pub(super) windows: Windows,
     /// Kinds of findings that are not acted upon.
@@ -216,9 +214,6 @@ pub struct LogJudge {
     pub(super) band_hz: f64,
     /// Rows are messages, of which those without a number are left out.
     pub(super) messages: bool,
-    steps: Vec<RowStep>,
-    /// Which rows repeat the positions of the row before.
-    fresh: Vec<Freshness>,
     fresh_rows: FreshRows,
     /// Channels with torques and velocities.
     others: Vec<usize>,
@@ -228,9 +223,8 @@ pub struct LogJudge {
 impl LogJudge {
     /// For a log of these channels, time aside.
     pub fn new(mut channels: Vec<InspectedChannel>, depth: Depth) -> Self {
-        let shaped = channels
-            .iter_mut()
-            .filter(|channel| channel.role.has_shape());
+        let all = channels.iter_mut();
+        let shaped = all.filter(|channel| channel.role.has_shape());
         for channel in shaped.skip(SHAPED) {
             channel.role = ChannelRole::Other;
         }
@@ -242,36 +236,26 @@ impl LogJudge {
         let position_of = |channel: &InspectedChannel| {
             let joint = channel.joint.as_deref()?;
             let of_joint = |index: &&usize| channels[**index].joint.as_deref() == Some(joint);
-            let only = match positions[..] {
-                // A name without a joint means the only one there is.
-                [only] if joint.is_empty() => Some(only),
-                _ => None,
-            };
-            let found = positions.iter().find(of_joint).copied().or(only);
+            // A name without a joint means the only one there is.
+            let alone = positions.len() == 1 && joint.is_empty();
+            let only = positions.first().filter(|_| alone);
+            let found = positions.iter().find(of_joint).or(only).copied();
             found.filter(|_| channel.role != ChannelRole::Position)
         };
         let tracks = (channels.iter())
             .map(|channel| Track::new(channel.clone(), position_of(channel)))
             .collect();
-        let roles = match depth {
-            Depth::Gate => &[ChannelRole::Position, ChannelRole::Torque][..],
-            Depth::Whole => &[
-                ChannelRole::Position,
-                ChannelRole::Velocity,
-                ChannelRole::Torque,
-                ChannelRole::Command,
-            ],
+        let is_compared = |index: &usize| match (depth, channels[*index].role) {
+            (Depth::Gate, role) => role.is_fitted(),
+            (Depth::Whole, role) => role.has_shape() || role == ChannelRole::Command,
         };
-        let mut compared: Vec<usize> = roles.iter().flat_map(|role| of_role(*role)).collect();
-        compared.sort_unstable();
+        let mut compared: Vec<usize> = (0..channels.len()).filter(is_compared).collect();
         compared.truncate(COMPARED);
-        let others = [ChannelRole::Torque, ChannelRole::Velocity]
-            .map(of_role)
-            .concat();
+        let mut others = of_role(ChannelRole::Torque);
+        others.extend(of_role(ChannelRole::Velocity));
         Self {
             depth,
             clock: LogClock::default(),
-            fresh: Vec::new(),
             fresh_rows: FreshRows::new(positions.len()),
             keep: Vec::new(),
             band_hz: NOISE_BAND_HZ,
@@ -286,7 +270,6 @@ impl LogJudge {
             positions,
             tracks,
             windows: Windows::default(),
-            steps: Vec::new(),
         }
     }
 
@@ -302,15 +285,14 @@ impl LogJudge {
                 track.excitation = Some(Excitation::new(dt, track.channel.speed));
             }
         }
-        let mut steps = std::mem::take(&mut self.steps);
-        self.clock.take(times, &mut steps);
+        let mut steps = self.clock.take(times);
         self.leave_out_failed(times, &mut steps, columns);
         // What happens again within a few rows is one event.
         let join = 10.5 * self.clock.step_so_far();
-        self.look_for_fresh(times, columns);
+        let fresh = self.look_for_fresh(times, columns);
         for (track, values) in self.tracks.iter_mut().zip(columns) {
             let positions = track.position.map(|index| columns[index]);
-            track.take(times, (&steps, &self.fresh), values, positions, join);
+            track.take(times, (&steps, &fresh), values, positions, join);
         }
         let compared: Vec<&[f64]> = self.compared.iter().map(|index| columns[*index]).collect();
         for (k, step) in steps.iter().enumerate() {
@@ -327,17 +309,16 @@ impl LogJudge {
         if self.depth == Depth::Whole && whole && finite() {
             self.windows.offer(times, columns);
         }
-        self.steps = steps;
     }
 
     /// Says of each row whether it repeats the positions of the row before.
-    fn look_for_fresh(&mut self, times: &[f64], columns: &[&[f64]]) {
-        self.fresh.clear();
+    fn look_for_fresh(&mut self, times: &[f64], columns: &[&[f64]]) -> Vec<Freshness> {
         let row = &mut self.row[0];
-        for (k, &t) in times.iter().enumerate() {
+        let each = times.iter().enumerate().map(|(k, t)| {
             gather(row, columns, &self.positions, k);
-            self.fresh.push(self.fresh_rows.look(t, row));
-        }
+            self.fresh_rows.look(*t, row)
+        });
+        each.collect()
     }
 
     /// Marks rows that were not read.

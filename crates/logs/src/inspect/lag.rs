@@ -47,7 +47,6 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
     draft.of_log(fault, judge.clock.rows, effect, REMEDY);
 }
 
-/// The delay that all stretches have in common.
 fn delay(judge: &LogJudge, pairs: &[(usize, usize)]) -> Option<DelayEstimate> {
     let mut delay = DelayEstimator::default();
     let (mut q, mut tau) = (Vec::new(), Vec::new());

@@ -27,10 +27,10 @@ pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
 /// The largest acceleration in which no leap and no spike took part.
 fn acceleration(track: &Track) -> f64 {
     let usual = track.spikes.usual(track.deviation());
-    let spikes = track.spikes.found().iter();
+    let spikes = track.spikes.found.iter();
     let spikes = spikes.filter(|spike| spike.height.abs() > EVENT_FACTOR * usual);
     let spikes = spikes.map(|spike| spike.t);
-    let leaps = track.leaps.found().iter().map(|leap| leap.at);
+    let leaps = track.leaps.found.iter().map(|leap| leap.at);
     let events: Vec<f64> = spikes.chain(leaps).collect();
     let motion = track.excitation.as_ref();
     motion.map_or(0.0, |motion| motion.highest_apart(&events))
@@ -44,7 +44,7 @@ fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
     // Rows that were left out leave the drive more time.
     let least = |step: f64| noise.max(DRIVE_FACTOR * acceleration * step * step);
     let high = |leap: &&Leap| leap.height.abs() > least(leap.at - leap.before);
-    let found = track.leaps.found().iter().filter(high).copied();
+    let found = track.leaps.found.iter().filter(high).copied();
     (found.collect(), least(clock.dt))
 }
 

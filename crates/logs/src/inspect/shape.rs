@@ -28,7 +28,6 @@ const COARSE_ACCELERATION_SHARE: f64 = 0.1;
 /// Grain of a torque over its deviation that spoils a fit.
 const COARSE_TORQUE_SHARE: f64 = 0.1;
 
-/// The faults of one channel.
 pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
     let track = &judge.tracks[place];
     if track.channel.role == ChannelRole::Temperature {
@@ -69,7 +68,6 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     }
 }
 
-/// A temperature that never changes, or that leaps.
 fn heat(track: &Track, draft: &mut FaultList) {
     if track.rows > 0 && track.travel() == 0.0 {
         let effect = format!(
@@ -89,7 +87,6 @@ fn heat(track: &Track, draft: &mut FaultList) {
     draft.stretches(fault, &track.leaps_of_heat, &effect, remedy);
 }
 
-/// A channel that never changes.
 fn constant(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     let value = track.low;
     let joint_moves = track.position.is_some_and(|index| {
@@ -190,7 +187,7 @@ impl<'a> Flatness<'a> {
             if !levels.piles_up() {
                 continue;
             }
-            let runs = flat.runs().iter().filter(|run| run.value == value);
+            let runs = flat.runs.iter().filter(|run| run.value == value);
             let runs: Vec<FlatRun> = runs.copied().collect();
             let position = self.track.channel.role == ChannelRole::Position;
             let longest = runs.iter().map(|run| run.rows).max().unwrap_or(0);
@@ -209,7 +206,7 @@ impl<'a> Flatness<'a> {
     /// Runs at any other value.
     fn stuck(&mut self) {
         let position = self.track.channel.role == ChannelRole::Position;
-        for run in self.track.flat.runs() {
+        for run in &self.track.flat.runs {
             let long = run.rows >= STUCK_ROWS
                 && run.rows as f64 >= 5.0 * self.usual.min(STUCK_ROWS as f64);
             if !long || self.tops.iter().any(|top| top.is(run)) {
@@ -282,7 +279,7 @@ impl<'a> Flatness<'a> {
         let tops = gathered(&self.tops);
         let of_tops = (if applied { Info } else { severity }, kind, Some(track));
         // Reported as reaching the limit of the robot file where that is known.
-        if track.at_limit.is_empty() {
+        if track.at_limit.list.is_empty() {
             draft.rows(of_tops, &tops, &effect, remedy);
         }
         let then = match used {
@@ -325,7 +322,7 @@ fn spikes(
     };
     let least = (SPIKE * usual).max(ABRUPT_STEPS * grain).max(of_motion);
     let shown = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
-    let mut high: Vec<_> = track.spikes.found().iter().collect();
+    let mut high: Vec<_> = track.spikes.found.iter().collect();
     high.retain(|spike| spike.height.abs() > least && !shown(spike.t));
     let mut episodes = Episodes::default();
     let mut highest = 0.0f64;
@@ -333,7 +330,7 @@ fn spikes(
         episodes.add(spike.t, spike.t, 1, 3.5 * clock.dt);
         highest = highest.max(spike.height.abs());
     }
-    if episodes.is_empty() {
+    if high.is_empty() {
         return;
     }
     let used = track.channel.role.is_fitted();
@@ -365,7 +362,7 @@ fn spikes(
 
 fn coarse(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
     let track = &judge.tracks[place];
-    let Some(step) = grain::step(judge.windows.kept(), place) else {
+    let Some(step) = grain::step(&judge.windows.kept, place) else {
         return;
     };
     let levels = track.travel() / step;
@@ -384,7 +381,7 @@ fn coarse(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultL
             let band = judge.band_hz;
             let w = std::f64::consts::TAU * band;
             let noise = step * (clock.dt * band / 30.0).sqrt() * w * w;
-            let share = noise / excitation.acceleration_rms();
+            let share = noise / excitation.rms(0);
             if share > COARSE_ACCELERATION_SHARE {
                 let effect = format!(
                     "steps of {step:.3e}: below {band} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",

@@ -24,7 +24,6 @@ const SCALE_TOLERANCE: f64 = 0.1;
 /// Noise over range below which a position is no measurement.
 const NOISELESS_SHARE_OF_RANGE: f64 = 1e-8;
 
-/// The faults between channels.
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     copies(judge, draft);
     repeated_parts(judge, draft);
@@ -46,7 +45,7 @@ fn flats(judge: &LogJudge) -> Vec<&Flat> {
 /// Stretches in which everything is frozen.
 pub(super) fn stalls(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     let mut episodes = Episodes::default();
-    for stall in judge.repeats.stalls(&flats(judge)).iter() {
+    for stall in &judge.repeats.stalls(&flats(judge)).list {
         // The robot leaps on from the last frozen row to the next.
         episodes.add(stall.from, stall.to + clock.dt, stall.rows, 0.0);
     }
@@ -54,7 +53,7 @@ pub(super) fn stalls(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
     let remedy = "look for what held the controller up: a full disk, a blocked bus, another program; record again if much is lost";
     let fault = (Warning, FaultKind::Stall, None);
     draft.rows(fault, &episodes, effect, remedy);
-    draft.stalls = episodes.iter().map(|e| [e.from, e.to]).collect();
+    draft.stalls = episodes.list.iter().map(|e| [e.from, e.to]).collect();
     draft.cut(fault, &episodes);
 }
 
@@ -106,7 +105,6 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     }
 }
 
-/// Stretches that stand in the log before.
 fn repeated_parts(judge: &LogJudge, draft: &mut FaultList) {
     let effect = "that stand in the log before, number for number: a file was appended to itself, or a buffer written twice. Counted twice, they make intervals too narrow";
     let remedy = "leave them out of a fit: `--leave-out FROM..TOs`; a simulation without noise repeats itself rightly";
@@ -169,7 +167,7 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
         let (ChannelRole::Velocity, Some(position)) = (track.channel.role, track.position) else {
             continue;
         };
-        let Some(found) = velocity::follows(judge.windows.kept(), position, index) else {
+        let Some(found) = velocity::follows(&judge.windows.kept, position, index) else {
             continue;
         };
         let of = escape(&judge.tracks[position].channel.name);
@@ -236,7 +234,7 @@ fn named_ratio(times: f64) -> Option<&'static str> {
 /// Names the joint whose velocity a channel really is.
 fn other_joint(judge: &LogJudge, (index, own): (usize, usize), draft: &mut FaultList) {
     let follows = |position: &&usize| {
-        let found = velocity::follows(judge.windows.kept(), **position, index);
+        let found = velocity::follows(&judge.windows.kept, **position, index);
         **position != own && found.is_some_and(|found| found.best.abs() > MIN_CORRELATION)
     };
     let Some(other) = judge.positions.iter().find(follows) else {
@@ -257,9 +255,9 @@ fn other_joint(judge: &LogJudge, (index, own): (usize, usize), draft: &mut Fault
 fn noiseless(judge: &LogJudge, draft: &mut FaultList) {
     for &index in &judge.positions {
         let track = &judge.tracks[index];
-        let noise = match grain::step(judge.windows.kept(), index) {
+        let noise = match grain::step(&judge.windows.kept, index) {
             Some(_) => continue,
-            None => grain::noise(judge.windows.kept(), index),
+            None => grain::noise(&judge.windows.kept, index),
         };
         let shown = draft.found.faults.iter().any(|fault| {
             fault.kind == FaultKind::CommandAsMeasurement

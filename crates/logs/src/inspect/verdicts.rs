@@ -29,7 +29,6 @@ impl LogJudge {
     }
 }
 
-/// Everything there is to say.
 fn conclude(judge: &LogJudge) -> Findings {
     let clock = judge.clock.facts();
     let first = judge.clock.first.unwrap_or(0.0);
@@ -111,7 +110,7 @@ fn costs(draft: &FaultList, clock: &ClockFacts) -> Vec<RowCost> {
 
 /// Rows in which every channel reads one number.
 fn failed_reads(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
-    let (times, value) = (judge.failed.times(), judge.failed.value());
+    let (times, value) = (&judge.failed.times, judge.failed.value);
     let mut episodes = Episodes::default();
     for t in times {
         episodes.add(*t, *t, 1, 1.5 * clock.dt);
@@ -133,7 +132,7 @@ fn channel_facts(judge: &LogJudge, place: usize, rate: Option<f64>) -> ChannelFa
     let share = track.rows as f64 / judge.clock.rows.max(1) as f64;
     let step = match judge.depth {
         Depth::Gate => None,
-        Depth::Whole => grain::step(judge.windows.kept(), place),
+        Depth::Whole => grain::step(&judge.windows.kept, place),
     };
     ChannelFacts {
         name: track.channel.name.clone(),
@@ -228,7 +227,6 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     }
 }
 
-/// How often, where it is more than once.
 fn often(times: usize, what: &str) -> String {
     match times {
         0 | 1 => String::new(),

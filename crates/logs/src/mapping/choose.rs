@@ -5,8 +5,7 @@ use serde::Serialize;
 
 use super::column::LogColumn;
 use super::family::{How, temperatures};
-use super::fitting::{Taken, best, without_common_head};
-use super::left::{left, offered};
+use super::fitting::{Taken, best, left, offered, without_common_head};
 use super::look::{ClockSource, SeenColumns};
 use super::shown::{Known, shown};
 use super::units::{of_positions, of_torques, other_velocity, stated_position};

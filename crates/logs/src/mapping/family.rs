@@ -227,58 +227,51 @@ pub(super) fn fit<'a>(
         let base = own[0];
         let from_start = in_a_row(&own) && base <= 1;
         let of_joints = numbers(joints);
-        let from_one = |of: &[u32]| {
-            let mut sorted = of.to_vec();
-            sorted.sort_unstable();
-            sorted.first().copied().filter(|_| in_a_row(&sorted))
-        };
+        let in_order = of_joints.clone().map(|mut of| {
+            of.sort_unstable();
+            of
+        });
+        let in_order = in_order.filter(|sorted| in_a_row(sorted));
+        let first = in_order.and_then(|sorted| sorted.first().copied());
         let whole = from_start && own.len() == joints.len();
-        return Some(
-            match (&of_joints, of_joints.as_deref().and_then(from_one)) {
-                // the joints have numbers in a row: the first column is the first joint's
-                (Some(of), Some(first)) if whole => {
-                    let place = |n: &u32| by_key(&Key::Number(n - first + base));
-                    (How::Fits, of.iter().map(place).collect())
-                }
-                (None, _) if whole => {
-                    let place = |k: usize| by_key(&Key::Number(base + k as u32));
-                    let how = match joints.len() {
-                        1 => How::Fits,
-                        _ => How::InOrder,
-                    };
-                    (how, (0..joints.len()).map(place).collect())
-                }
-                // other numbers, or not all: by the same number where the joints have one
-                (Some(of), _)
-                    if of.iter().all(|n| own.contains(n)) && own.len() == joints.len() =>
-                {
-                    let place = |n: &u32| by_key(&Key::Number(*n));
-                    (How::Fits, of.iter().map(place).collect())
-                }
-                (Some(of), first) => {
-                    let shift = first.map_or(0, |first| i64::from(base) - i64::from(first));
-                    let shift = if base <= 1 { shift } else { 0 };
-                    let place = |n: &u32| {
-                        let number = u32::try_from(i64::from(*n) + shift).ok()?;
-                        by_key(&Key::Number(number))
-                    };
-                    (How::InPart, of.iter().map(place).collect())
-                }
-                (None, _) if own.len() >= joints.len() => {
-                    let place = |k: usize| by_key(&Key::Number(own[k]));
-                    (How::InPart, (0..joints.len()).map(place).collect())
-                }
-                (None, _) => {
-                    // as many joints as columns have numbers in a row: an arm without its fingers
-                    let of = numbered_alike(joints, own.len()).filter(|_| from_start)?;
-                    let place = |k: usize| {
-                        let at = of.iter().position(|joint| *joint == k)?;
-                        by_key(&Key::Number(base + at as u32))
-                    };
-                    (How::InPart, (0..joints.len()).map(place).collect())
-                }
-            },
-        );
+        let of_joint = |at: usize| Some(base + at as u32);
+        let (how, numbers): (How, Vec<Option<u32>>) = match (of_joints, first) {
+            // the joints have numbers in a row: the first column is the first joint's
+            (Some(of), Some(first)) if whole => (
+                How::Fits,
+                of.iter().map(|n| Some(n - first + base)).collect(),
+            ),
+            (None, _) if whole => {
+                let how = match joints.len() {
+                    1 => How::Fits,
+                    _ => How::InOrder,
+                };
+                (how, (0..joints.len()).map(of_joint).collect())
+            }
+            // other numbers, or not all: by the same number where the joints have one
+            (Some(of), _) if of.iter().all(|n| own.contains(n)) && own.len() == joints.len() => {
+                (How::Fits, of.into_iter().map(Some).collect())
+            }
+            (Some(of), first) => {
+                let first = first.filter(|_| base <= 1);
+                let shift = first.map_or(0, |first| i64::from(base) - i64::from(first));
+                let shifted = |n: &u32| u32::try_from(i64::from(*n) + shift).ok();
+                (How::InPart, of.iter().map(shifted).collect())
+            }
+            (None, _) if own.len() >= joints.len() => {
+                let numbers = own[..joints.len()].iter().copied();
+                (How::InPart, numbers.map(Some).collect())
+            }
+            (None, _) => {
+                // as many joints as columns have numbers in a row: an arm without its fingers
+                let of = numbered_alike(joints, own.len()).filter(|_| from_start)?;
+                let place = |k: usize| of.iter().position(|joint| *joint == k);
+                let number = |k: usize| place(k).and_then(of_joint);
+                (How::InPart, (0..joints.len()).map(number).collect())
+            }
+        };
+        let column = |number: Option<u32>| by_key(&Key::Number(number?));
+        return Some((how, numbers.into_iter().map(column).collect()));
     }
     // one joint, one column
     if let ([_], [(_, only)]) = (joints, &family.members[..]) {

@@ -214,7 +214,6 @@ fn chosen(groups: &[StateGroup], name: &str) -> Result<Option<String>, MappingEr
     })
 }
 
-/// The first numbers of every column.
 fn sample(log: &mut RawReader) -> Result<Vec<Vec<f64>>, MappingError> {
     let width = log.names().len();
     let mut out = vec![Vec::new(); width];

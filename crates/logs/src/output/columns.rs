@@ -6,7 +6,6 @@
 //! | `<kind>_<joint>` of every joint, e.g. `tau_hat_q1` | `/<kind>` | effort for torques, else position |
 //! | all others | `/columns`, the names of columns for those of joints | position |
 
-/// Array of a `JointState`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Array {
     Position,
@@ -22,7 +21,6 @@ pub(super) struct TopicColumns {
     pub(super) arrays: Vec<(Array, Vec<usize>)>,
 }
 
-/// Topic of the joints.
 pub(super) const JOINTS: &str = "/joint_states";
 /// Topic of the columns that belong to no joint.
 pub(super) const COLUMNS: &str = "/columns";

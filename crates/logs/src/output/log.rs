@@ -63,7 +63,6 @@ impl LogForm {
     }
 }
 
-/// A file, compressed on the way.
 pub(super) enum Packed {
     Plain(AtomicFile),
     Gzip(flate2::write::GzEncoder<AtomicFile>),
@@ -135,9 +134,8 @@ pub struct LogWriter {
 
 impl fmt::Debug for LogWriter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("LogWriter")
-            .field("path", &self.path)
-            .finish_non_exhaustive()
+        let mut shown = f.debug_struct("LogWriter");
+        shown.field("path", &self.path).finish_non_exhaustive()
     }
 }
 

@@ -36,7 +36,6 @@ uint32 nanosec
 /// `std_msgs/msg/Float64`.
 const FLOAT: &str = "float64 data\n";
 
-/// Rows as messages.
 pub(super) struct McapLog<W: Write> {
     writer: Writer<NoSeek<W>>,
     topics: Vec<(u16, TopicColumns, Vec<u8>)>,
@@ -70,7 +69,6 @@ impl<W: Write> McapLog<W> {
         })
     }
 
-    /// Writes the messages of a row.
     pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> McapResult<()> {
         let t = row.first().copied().unwrap_or(f64::NAN);
         let (stamp, exact) = stamp(origin, t)?;
@@ -98,14 +96,12 @@ impl<W: Write> McapLog<W> {
         Ok(())
     }
 
-    /// Ends the recording.
     pub(super) fn finish(mut self) -> McapResult<W> {
         self.writer.finish()?;
         Ok(self.writer.into_inner().into_inner())
     }
 }
 
-/// Adds a topic of messages of this kind.
 fn channel<W: Write>(
     writer: &mut Writer<NoSeek<W>>,
     topic: &str,
@@ -127,7 +123,6 @@ fn header(channel_id: u16, sequence: u32, stamp: i128) -> MessageHeader {
     }
 }
 
-/// Notes, numbered.
 fn metadata(notes: &[String]) -> Metadata {
     let numbered = notes.iter().enumerate();
     Metadata {

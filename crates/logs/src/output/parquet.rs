@@ -16,10 +16,8 @@ use crate::log::Instant;
 
 /// Numbers that are held until they are written.
 const MAX_HELD_NUMBERS: usize = 1 << 20;
-/// Rows of a group at least.
 const MIN_GROUP_ROWS: usize = 1024;
 
-/// Rows as a Parquet file.
 pub(super) struct ParquetLog<W: Write + Send> {
     columns: Vec<String>,
     notes: Vec<String>,
@@ -44,7 +42,6 @@ impl<W: Write + Send> ParquetLog<W> {
         }
     }
 
-    /// Writes a row.
     pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> io::Result<()> {
         self.origin = origin;
         for (column, value) in self.held.iter_mut().zip(row) {
@@ -114,7 +111,6 @@ impl<W: Write + Send> ParquetLog<W> {
         Ok(())
     }
 
-    /// Ends the file.
     pub(super) fn finish(mut self) -> io::Result<W> {
         if self.held.iter().any(|column| !column.is_empty()) {
             self.write()?;

@@ -33,13 +33,6 @@ struct Ready {
     named: PathBuf,
 }
 
-/// A file that has its name.
-struct Renamed {
-    path: PathBuf,
-    /// What had the name before, under another.
-    old: Option<SecondName>,
-}
-
 /// A second name of a file that is replaced, held for as long as this value lives.
 struct SecondName {
     name: PathBuf,
@@ -103,7 +96,8 @@ impl Together {
         let several = ready.len() > 1;
         // Under the lock: an interruption finds all of them finished or none.
         let mut unfinished = unfinished();
-        let mut renamed: Vec<Renamed> = Vec::with_capacity(ready.len());
+        // with what had their names before, under other ones
+        let mut renamed: Vec<(PathBuf, Option<SecondName>)> = Vec::with_capacity(ready.len());
         for Ready { file, path, named } in ready {
             let temporary = file.path().to_owned();
             unfinished.remove(&temporary);
@@ -116,12 +110,18 @@ impl Together {
                 if let Some(old) = old {
                     let _ = std::fs::remove_file(old.name);
                 }
-                renamed.into_iter().rev().for_each(Renamed::undo);
+                for (path, old) in renamed.into_iter().rev() {
+                    // As far as the system lets us: it has just refused something.
+                    let _ = match old {
+                        Some(old) => std::fs::rename(old.name, path),
+                        None => std::fs::remove_file(path),
+                    };
+                }
                 return Err(OutputError::new(&named, error.error));
             }
-            renamed.push(Renamed { path, old });
+            renamed.push((path, old));
         }
-        for old in renamed.into_iter().filter_map(|file| file.old) {
+        for old in renamed.into_iter().filter_map(|(_, old)| old) {
             // one that is left is a file too many, and no half one
             let _ = std::fs::remove_file(old.name);
         }
@@ -130,16 +130,6 @@ impl Together {
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Renamed {
-    fn undo(self) {
-        // As far as the system lets us: it has just refused something.
-        let _ = match self.old {
-            Some(old) => std::fs::rename(old.name, self.path),
-            None => std::fs::remove_file(self.path),
-        };
     }
 }
 

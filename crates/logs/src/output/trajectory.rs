@@ -48,7 +48,6 @@ pub struct JointTrajectory {
     pub points: Vec<[Vec<f64>; 3]>,
 }
 
-/// Numbers between brackets.
 fn list(values: &[f64]) -> String {
     let all: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
     format!("[{}]", all.join(", "))

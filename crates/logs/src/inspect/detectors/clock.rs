@@ -46,7 +46,6 @@ pub(crate) struct LogClock {
     pub(crate) without_time: u64,
 }
 
-/// What the clock was like.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct ClockFacts {
     /// Median step [s]; 0 where there is none.
@@ -63,17 +62,14 @@ pub(crate) struct ClockFacts {
 
 impl LogClock {
     /// Takes the times of some rows, and says for each what it is to the row before.
-    pub(crate) fn take(&mut self, times: &[f64], steps: &mut Vec<RowStep>) {
-        steps.clear();
+    pub(crate) fn take(&mut self, times: &[f64]) -> Vec<RowStep> {
         self.long_from = GAP
             * match self.rows {
                 0 => typical_step(times),
                 _ => self.steps.quantile_not_zero(0.5),
             };
-        for &t in times {
-            self.rows += 1;
-            steps.push(self.step(t));
-        }
+        self.rows += times.len() as u64;
+        times.iter().map(|t| self.step(*t)).collect()
     }
 
     fn step(&mut self, t: f64) -> RowStep {
@@ -119,7 +115,6 @@ impl LogClock {
         }
     }
 
-    /// Median step of the rows so far [s].
     pub(crate) fn step_so_far(&self) -> f64 {
         self.steps.quantile(0.5)
     }
@@ -129,7 +124,6 @@ impl LogClock {
         self.first.map_or(0.0, |first| self.last - first)
     }
 
-    /// What is known at the end.
     pub(crate) fn facts(&self) -> ClockFacts {
         let dt = self.steps.quantile(0.5);
         if dt <= 0.0 {
@@ -169,8 +163,7 @@ mod tests {
         times[100] = times[99];
         times[200] = 0.15;
         times[300] = f64::NAN;
-        let mut steps = Vec::new();
-        clock.take(&times, &mut steps);
+        let steps = clock.take(&times);
         let facts = clock.facts();
         assert!((facts.dt - 0.001).abs() < 1e-6, "{facts:?}");
         assert_eq!((steps[0], steps[1]), (RowStep::Apart, RowStep::Next));
@@ -189,7 +182,7 @@ mod tests {
         let times: Vec<f64> = (0..20_000)
             .map(|k| f64::from(k) * 0.01 + if k % 2 == 0 { 0.001 } else { -0.001 })
             .collect();
-        clock.take(&times, &mut Vec::new());
+        clock.take(&times);
         let facts = clock.facts();
         let jitter = 0.2 / facts.dt * 0.01;
         assert!((facts.jitter - jitter).abs() < 0.02, "{facts:?}");

@@ -21,7 +21,6 @@ struct PairCounts {
     opposite: u64,
 }
 
-/// A pair of channels that hold the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CopiedChannel {
     pub(crate) first: usize,
@@ -41,7 +40,6 @@ impl Copies {
         }
     }
 
-    /// Takes row `k` of some columns.
     #[inline]
     pub(crate) fn take(&mut self, columns: &[&[f64]], k: usize) {
         for (value, column) in self.row.iter_mut().zip(columns) {
@@ -62,7 +60,6 @@ impl Copies {
         self.previous.copy_from_slice(&self.row);
     }
 
-    /// Pairs that are copies.
     pub(crate) fn found(&self) -> Vec<CopiedChannel> {
         let mut found = Vec::new();
         let mut pairs = self.pairs.iter();

@@ -53,7 +53,6 @@ pub struct JointMotion {
     pub condition: Option<f64>,
 }
 
-/// Follows one position channel.
 #[derive(Debug, Clone)]
 pub(crate) struct Excitation {
     /// Rows between the three positions that a speed and an acceleration are formed from.
@@ -102,7 +101,6 @@ impl Excitation {
         }
     }
 
-    /// Takes the next row.
     #[inline]
     pub(crate) fn take(&mut self, t: f64, value: f64) {
         let length = self.times.len();
@@ -115,7 +113,6 @@ impl Excitation {
         }
     }
 
-    /// The next row belongs to another stretch.
     pub(crate) fn part(&mut self) {
         self.count = 0;
         self.fast = 0;
@@ -174,12 +171,8 @@ impl Excitation {
         found.or_else(|| all().reduce(f64::min)).unwrap_or(0.0)
     }
 
-    /// Root mean square of the acceleration.
-    pub(crate) fn acceleration_rms(&self) -> f64 {
-        self.rms(0)
-    }
-
-    fn rms(&self, column: usize) -> f64 {
+    /// Root mean square of the acceleration, or of column 1, the speed.
+    pub(crate) fn rms(&self, column: usize) -> f64 {
         (self.gram[column][column] / self.points.max(1) as f64).sqrt()
     }
 

@@ -3,10 +3,8 @@
 
 /// A position that goes to such a number was no further from it than so many of its steps before, or of its smallest ones.
 const USUAL_STEPS: f64 = 10.0;
-/// Rows that are remembered.
 const MAX_ROWS: usize = 65_536;
 
-/// Looks for failed reads, row by row.
 #[derive(Debug, Clone)]
 pub(crate) struct FailedReads {
     /// Positions of the last row that was read, and how far they went to it.
@@ -15,9 +13,10 @@ pub(crate) struct FailedReads {
     /// Smallest step of each that is not 0.
     grains: Vec<f64>,
     failing: bool,
-    times: Vec<f64>,
-    /// What the first of them reads.
-    value: f64,
+    /// Times of the rows that failed, in order [s].
+    pub(crate) times: Vec<f64>,
+    /// What the first of them reads, as it was logged.
+    pub(crate) value: f64,
 }
 
 impl FailedReads {
@@ -64,16 +63,6 @@ impl FailedReads {
         let mut pairs = self.before.iter().zip(&self.steps).zip(&self.grains);
         pairs.any(|((q, step), grain)| (q - to).abs() > USUAL_STEPS * step.max(*grain))
     }
-
-    /// What the first of them reads, as it was logged.
-    pub(crate) fn value(&self) -> f64 {
-        self.value
-    }
-
-    /// Times of the rows that failed, in order \[s\].
-    pub(crate) fn times(&self) -> &[f64] {
-        &self.times
-    }
 }
 
 #[cfg(test)]
@@ -85,7 +74,7 @@ mod tests {
         for (k, row) in rows.enumerate() {
             reads.take(k as f64, &row[..2], &row[2..]);
         }
-        reads.times().to_vec()
+        reads.times
     }
 
     #[test]

@@ -35,11 +35,11 @@ impl FlatRun {
     }
 }
 
-/// The runs of one channel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Flat {
     current: Option<Current>,
-    runs: Vec<FlatRun>,
+    /// The runs of three rows and more, in the order of time.
+    pub(crate) runs: Vec<FlatRun>,
     /// Rows of the shortest run that is kept, once there are too many.
     shortest: u64,
     /// Lengths of all runs, runs of one row too.
@@ -88,7 +88,6 @@ impl Flat {
         self.begin(t, value, position, step);
     }
 
-    /// The next row belongs to another stretch.
     pub(crate) fn part(&mut self) {
         self.end(f64::NAN);
         self.current = None;
@@ -129,11 +128,6 @@ impl Flat {
             self.runs.retain(|run| run.rows >= self.shortest);
         }
         self.runs.push(run);
-    }
-
-    /// The runs of three rows and more, in the order of time.
-    pub(crate) fn runs(&self) -> &[FlatRun] {
-        &self.runs
     }
 }
 
@@ -199,8 +193,8 @@ mod tests {
     fn a_run_knows_its_rows_its_edges_and_how_far_the_joint_went() {
         let values = (0..100).map(|k| f64::from(k.clamp(20, 50)));
         let flat = fed(values);
-        assert_eq!(flat.runs().len(), 2);
-        let [first, second] = [flat.runs()[0], flat.runs()[1]];
+        assert_eq!(flat.runs.len(), 2);
+        let [first, second] = [flat.runs[0], flat.runs[1]];
         assert_eq!((first.rows, first.from, first.exit), (21, 0.0, 1.0));
         assert!(first.entry.is_nan());
         assert_eq!((second.value, second.rows, second.entry), (50.0, 50, 1.0));
@@ -223,8 +217,8 @@ mod tests {
     fn the_longest_runs_are_kept_where_there_are_too_many() {
         let values = (0..60_000).map(|k| f64::from(k / if k < 30_000 { 3 } else { 6 }));
         let flat = fed(values);
-        assert!(flat.runs().len() <= MAX_RUNS);
-        let all = flat.runs().iter().all(|run| run.rows == 6);
+        assert!(flat.runs.len() <= MAX_RUNS);
+        let all = flat.runs.iter().all(|run| run.rows == 6);
         assert!(all, "{:?}", flat.shortest);
     }
 }

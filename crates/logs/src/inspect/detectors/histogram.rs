@@ -1,6 +1,5 @@
 //! Quantiles of magnitudes in one pass and fixed memory.
 
-/// Bins per octave.
 const PER_OCTAVE: usize = 32;
 /// Magnitudes below 2^LOWEST count as 0.
 const LOWEST: i32 = -70;
@@ -15,7 +14,8 @@ pub(crate) struct Histogram {
     counts: Vec<u64>,
     sums: Vec<f64>,
     zeros: u64,
-    total: u64,
+    /// How many were counted.
+    pub(crate) total: u64,
 }
 
 impl Histogram {
@@ -36,11 +36,6 @@ impl Histogram {
         let bin = ((above >> SHIFT) as usize).min(self.counts.len() - 1);
         self.counts[bin] += 1;
         self.sums[bin] += magnitude;
-    }
-
-    /// How many were counted.
-    pub(crate) fn total(&self) -> u64 {
-        self.total
     }
 
     /// The magnitude that `share` (0..=1) of those counted do not exceed; 0 where there are none.

@@ -105,7 +105,6 @@ impl Repeats {
         self.rows = 1;
     }
 
-    /// The next row belongs to another stretch.
     pub(crate) fn part(&mut self) {
         if self.rows > MAX_RUN_ROWS {
             self.end(&vec![f64::NAN; self.joints]);
@@ -233,7 +232,6 @@ impl Repeats {
     }
 }
 
-/// Repeated rows of a log.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RepeatedRows {
     /// All of them, and those at whose place the robot certainly moves.

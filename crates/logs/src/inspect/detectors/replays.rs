@@ -96,7 +96,6 @@ impl Replays {
         }
     }
 
-    /// The stretch that is followed is at its end.
     pub(crate) fn part(&mut self) {
         let long = |run: &Replay| run.hits >= MIN_HITS && run.last.0 - run.first.0 >= MIN_ROWS;
         self.found.extend(self.run.take().filter(long));
@@ -129,8 +128,8 @@ mod tests {
             replays.take(k as f64, &[position], &[torque]);
         }
         replays.part();
-        let found = replays.found();
-        found.iter().map(|e| (e.from, e.to, e.rows)).collect()
+        let found = replays.found().list.into_iter();
+        found.map(|e| (e.from, e.to, e.rows)).collect()
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 use std::ops::{Index, IndexMut};
 
-/// Rows that are remembered.
 const ROWS: usize = 64;
 
 /// Numbers of the last 64 rows, by the numbers of the rows.

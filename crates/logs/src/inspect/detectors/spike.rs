@@ -12,7 +12,6 @@
 use super::histogram::Histogram;
 use super::ring::Ring;
 
-/// Rows of the median.
 const MEDIAN_ROWS: usize = 7;
 const HALF_WIDTH: usize = MEDIAN_ROWS / 2;
 /// Rows to each side that are remembered of a spike.
@@ -75,7 +74,6 @@ fn cubic(nodes: &[[f64; 2]], at: f64) -> Option<f64> {
     Some((0..4).map(|i| weight(i) * nodes[i][1]).sum())
 }
 
-/// Looks for the spikes of one channel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spikes {
     values: Ring,
@@ -92,7 +90,8 @@ pub(crate) struct Spikes {
     pub(crate) differences_seen: Histogram,
     /// A difference above it may be a spike.
     suspect: f64,
-    found: Vec<Spike>,
+    /// Those that may be spikes, in the order of time.
+    pub(crate) found: Vec<Spike>,
     /// Height of the lowest spike that is kept, once there are too many.
     lowest: f64,
     /// Sums over the rows: of each step times the one before, of the squared steps, of the squared steps over two rows.
@@ -135,7 +134,6 @@ impl Spikes {
         }
     }
 
-    /// The next row belongs to another stretch.
     pub(crate) fn part(&mut self) {
         if self.count >= MEDIAN_ROWS {
             let last = self.count - 1 - HALF_WIDTH;
@@ -160,7 +158,7 @@ impl Spikes {
     /// The same, but where more rows are spikes than that leaves out, those are set aside first (Rosner 1983).
     pub(crate) fn usual(&self, deviation: f64) -> f64 {
         // they hide each other where they are counted among the rest
-        let rows = self.differences_seen.total().max(1) as f64;
+        let rows = self.differences_seen.total.max(1) as f64;
         let apart = |aside: usize| {
             let rest = 1.0 - aside as f64 / rows;
             self.differences_seen.quantile(SPIKE_QUANTILE * rest)
@@ -273,14 +271,8 @@ impl Spikes {
         let agrees = off * height > 0.0 && off.abs() > 0.5 * height.abs();
         agrees.then(|| off.abs().min(height.abs()).copysign(height))
     }
-
-    /// Those that may be spikes, in the order of time.
-    pub(crate) fn found(&self) -> &[Spike] {
-        &self.found
-    }
 }
 
-/// Median of seven numbers.
 #[inline]
 fn median(mut x: [f64; MEDIAN_ROWS]) -> f64 {
     // Exchanges that leave the middle one in its place (Devillard 1998).
@@ -341,7 +333,7 @@ mod tests {
             values[k] += 0.5;
         }
         let spikes = fed(&values);
-        let high = spikes.found().iter().filter(|s| s.height > 0.3);
+        let high = spikes.found.iter().filter(|s| s.height > 0.3);
         let found: Vec<f64> = high.map(|s| s.t).collect();
         assert_eq!(found, [500.0, 1200.0, 1201.0, 1202.0, 2990.0]);
     }
@@ -354,7 +346,7 @@ mod tests {
             values[k] += 0.5;
         }
         let spikes = fed(&values);
-        let high: Vec<&Spike> = spikes.found().iter().filter(|s| s.height > 0.3).collect();
+        let high: Vec<&Spike> = spikes.found.iter().filter(|s| s.height > 0.3).collect();
         let bad = |t: f64| high.iter().any(|spike| spike.t == t);
         assert_eq!(high.len(), 4);
         for spike in &high {
@@ -386,7 +378,7 @@ mod tests {
                 spikes.take(t, (5.0 * t).cos() + noise + pulse, position);
             }
             spikes.part();
-            let found = spikes.found().iter();
+            let found = spikes.found.iter();
             found.filter(|s| s.height.abs() > 10.0).count()
         };
         assert_eq!(found(1000), 0);
@@ -401,7 +393,7 @@ mod tests {
             values[k] += 3.0;
         }
         let spikes = fed(&values);
-        for spike in spikes.found() {
+        for spike in spikes.found {
             let inside = (2030.0..=2470.0).contains(&spike.t);
             assert!(spike.height.abs() < 1e-9 || !inside, "{spike:?}");
             assert!(spike.t >= 1990.0, "{spike:?}");

@@ -25,7 +25,6 @@ const MAX_LEAPS: usize = 4096;
 /// Largest heights that may be leaps, over those of 99 % of the rows.
 const SUSPECT_FACTOR: f64 = 3.0;
 
-/// A leap of a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Leap {
     /// Times of the last row before it and of the first one after it [s].
@@ -34,7 +33,6 @@ pub(crate) struct Leap {
     pub(crate) height: f64,
 }
 
-/// Looks for the leaps of one position.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Leaps {
     times: Ring,
@@ -46,7 +44,8 @@ pub(crate) struct Leaps {
     judged: usize,
     heights_seen: Histogram,
     suspect: f64,
-    found: Vec<Leap>,
+    /// Those that may be leaps, in the order of time.
+    pub(crate) found: Vec<Leap>,
     lowest: f64,
 }
 
@@ -92,7 +91,6 @@ impl Leaps {
         all / after
     }
 
-    /// The next row belongs to another stretch.
     pub(crate) fn part(&mut self) {
         if self.count >= 4 {
             let last = self.count - 2;
@@ -202,11 +200,6 @@ impl Leaps {
         found.is_finite().then_some(found)
     }
 
-    /// Those that may be leaps, in the order of time.
-    pub(crate) fn found(&self) -> &[Leap] {
-        &self.found
-    }
-
     /// Height that noise and the usual motion do not reach in a million logs like this one.
     pub(crate) fn unusual(&self, rows: u64) -> f64 {
         const LOGS: f64 = 1e6;
@@ -246,7 +239,6 @@ impl FreshRows {
         }
     }
 
-    /// Looks at the positions of the next row.
     #[inline]
     pub(crate) fn look(&mut self, t: f64, positions: &[f64]) -> Freshness {
         if positions == self.previous {
@@ -281,7 +273,7 @@ mod tests {
     }
 
     fn high(leaps: &Leaps, least: f64) -> Vec<(f64, f64)> {
-        let found = leaps.found().iter();
+        let found = leaps.found.iter();
         let high = found.filter(|leap| leap.height.abs() > least);
         high.map(|leap| (leap.at, leap.height)).collect()
     }

@@ -20,7 +20,6 @@ struct LongStep {
     range: f64,
 }
 
-/// Watches one position for its range's ends.
 #[derive(Debug, Clone)]
 pub(crate) struct Turns {
     low: f64,
@@ -46,7 +45,6 @@ impl Default for Turns {
     }
 }
 
-/// A position that begins anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Wrapped {
     pub(crate) range: f64,
@@ -57,7 +55,6 @@ pub(crate) struct Wrapped {
 }
 
 impl Turns {
-    /// Takes the next row.
     #[inline]
     pub(crate) fn take(&mut self, t: f64, value: f64) {
         self.low = self.low.min(value);
@@ -94,7 +91,6 @@ impl Turns {
         }
     }
 
-    /// The next row belongs to another stretch.
     pub(crate) fn part(&mut self) {
         self.last = None;
         self.waiting = None;

@@ -5,7 +5,6 @@ use super::windows::Window;
 /// Rows by which the velocity may lag or lead.
 const FARTHEST: usize = 50;
 
-/// How a velocity channel follows its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Follows {
     /// Rows by which it is late; negative where it is early.

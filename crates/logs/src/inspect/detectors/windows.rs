@@ -13,10 +13,9 @@ pub(crate) struct Window {
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
-/// Stretches of a log of any length.
 #[derive(Debug, Clone)]
 pub(crate) struct Windows {
-    kept: Vec<Window>,
+    pub(crate) kept: Vec<Window>,
     /// Every how many stretches one is kept.
     stride: u64,
     seen: u64,
@@ -33,7 +32,6 @@ impl Default for Windows {
 }
 
 impl Windows {
-    /// Offers the next stretch.
     pub(crate) fn offer(&mut self, t: &[f64], columns: &[&[f64]]) {
         let number = self.seen;
         self.seen += 1;
@@ -68,10 +66,6 @@ impl Windows {
         let step = self.kept.len().div_ceil(most).max(1);
         self.kept.iter().step_by(step)
     }
-
-    pub(crate) fn kept(&self) -> &[Window] {
-        &self.kept
-    }
 }
 
 #[cfg(test)]
@@ -84,7 +78,7 @@ mod tests {
         for k in 0..1000 {
             windows.offer(&[f64::from(k)], &[&[f64::from(-k)]]);
         }
-        let times: Vec<f64> = windows.kept().iter().map(|w| w.t[0]).collect();
+        let times: Vec<f64> = windows.kept.iter().map(|w| w.t[0]).collect();
         assert!(times.len() > MAX_STRETCHES / 2 && times.len() <= MAX_STRETCHES);
         let step = times[1] - times[0];
         let even = times.windows(2).all(|pair| pair[1] - pair[0] == step);
