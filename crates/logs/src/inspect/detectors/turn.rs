@@ -156,7 +156,8 @@ mod tests {
 
     #[test]
     fn leaps_of_other_sizes_and_plain_motions_do_not_begin_anew() {
-        let motions: [(fn(f64) -> f64, f64); 4] = [
+        type Motion = fn(f64) -> f64;
+        let motions: [(Motion, f64); 4] = [
             (|t| 3.0 * t.sin(), 1e-3),
             (|t| 0.1 * t.sin() + if t < 9.0 { 0.0 } else { 2.0 }, 1e-3),
             (|t| if t < 9.0 { 0.5 } else { 0.6 }, 1e-3),
