@@ -2,17 +2,15 @@
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
 
-use super::dissipative::{damping_and_friction, dissipative};
+use super::dissipative::damping_and_friction;
 use super::error::ExportError;
-use super::prepared::{Drive, Prepared, drive, joint_name, root};
+use super::prepared::{Drive, Prepared, drive, joint_name, placed, root};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::Property;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::{Body, STANDARD, pseudo_inertia};
 use cft_ident_core::robot::tree::Coupling;
-use cft_ident_core::robot::tree::space::{
-    Rotation, Vector, about, add, cross, product, times, turn,
-};
+use cft_ident_core::robot::tree::space::{Rotation, Vector, cross, times};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::robot_file::CoordinateLimits;
 use cft_ident_files::config::serial_section::FrameSection;
@@ -39,8 +37,8 @@ pub struct Arm {
     pub couplings: Vec<(Coupling, [f64; 3])>,
     /// Where the inertials come from.
     pub of_inertials: &'static [&'static str],
-    /// Effects that are in bodies, gravity and armatures, by their place in the model.
-    pub held: Vec<(usize, Property)>,
+    /// Places in the model of the effects that are in bodies, gravity and armatures.
+    pub held: Vec<usize>,
 }
 
 /// A link and the joint before it.
@@ -107,7 +105,7 @@ impl Arm {
         for (i, effect) in refined.effects.iter().enumerate() {
             if let Some(property) = effect.property() {
                 fold(property, &mut bodies, &mut drives, &mut gravity);
-                held.push((i, property));
+                held.push(i);
             }
         }
         let couplings = robot.transmission().couplings().iter().copied();
@@ -124,13 +122,11 @@ impl Arm {
             }
             let moved = drive(robot, link)?;
             let name = joint_name(robot, link, &moved);
-            let (mut rotation, mut origin) = (link.rotation, link.origin);
+            let (rotation, origin) = placed(link, &moved);
             let joint = match moved {
                 Drive::Joint(j) => {
-                    let [damping, friction] =
-                        dissipative(&prepared.model, j).unwrap_or_else(|| {
-                            damping_and_friction(&prepared.model.friction[j]).map(|x| x.max(0.0))
-                        });
+                    let law = &prepared.model.friction[j];
+                    let [damping, friction] = damping_and_friction(law).map(|x| x.max(0.0));
                     ArmJoint::Own(Box::new(OwnJoint {
                         limits: file.robot.limits.get(&name).cloned().unwrap_or_default(),
                         index: j,
@@ -146,17 +142,7 @@ impl Arm {
                     factor,
                     offset,
                 },
-                Drive::Rest(at) => {
-                    match link.kind {
-                        JointKind::Revolute => {
-                            rotation = product(&rotation, &about(&link.axis, at))
-                        }
-                        JointKind::Prismatic => {
-                            origin = add(&origin, &turn(&rotation, &times(at, &link.axis)));
-                        }
-                    }
-                    ArmJoint::Fixed
-                }
+                Drive::Rest(_) => ArmJoint::Fixed,
             };
             out.push(ArmLink {
                 name: link.name.clone(),
@@ -191,13 +177,12 @@ impl Arm {
         own
     }
 
-    /// Gear trains that a format with shared inertias can say, as inertia, damping and friction of
-    /// v_motor + ratio v_other, and what they leave of each joint's armature and damping.
+    /// What gear trains of v_motor + ratio v_other leave of each joint's armature and damping; none where it is below 0.
     pub(super) fn trains(&self) -> Option<Vec<[f64; 2]>> {
         let joints = self.joints();
         let mut own: Vec<[f64; 2]> = joints.iter().map(|j| [j.armature, j.damping]).collect();
         for (c, [inertia, damping, friction]) in &self.couplings {
-            if [inertia, damping, friction].into_iter().any(|x| *x < 0.0) {
+            if [inertia, damping, friction].iter().any(|x| **x < 0.0) {
                 return None;
             }
             for (k, share) in [(0, inertia), (1, damping)] {
@@ -264,6 +249,7 @@ pub(super) fn z_to(axis: &Vector) -> Rotation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cft_ident_core::robot::tree::space::turn;
 
     #[test]
     fn the_z_axis_is_turned_to_any_axis_by_a_rotation() {
@@ -285,11 +271,9 @@ mod tests {
         let (moments, axes) = principal(&body);
         let r = Matrix3::from_fn(|i, j| axes[i][j]);
         let back = r * Matrix3::from_diagonal(&moments.into()) * r.transpose();
-        for (k, (i, j)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
-            .into_iter()
-            .enumerate()
-        {
-            assert!((back[(i, j)] - body.inertia[k]).abs() < 1e-15);
+        let places = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        for (place, inertia) in places.into_iter().zip(body.inertia) {
+            assert!((back[place] - inertia).abs() < 1e-15);
         }
     }
 }

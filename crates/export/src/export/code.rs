@@ -8,9 +8,8 @@ use cft_ident_core::effect::as_code::EffectsCode;
 use cft_ident_core::effect::law_text::{exact, law};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::STANDARD;
-use cft_ident_core::robot::tree::{Coordinate, Coupling, DependentCoordinate};
+use cft_ident_core::robot::tree::{Coordinate, Coupling};
 
-/// The words of a language.
 pub(super) struct Language {
     /// A table: type, name with its sizes, values; `$` stands for each.
     table: fn(kind: &str, name: &str, sizes: &[usize], values: &str) -> String,
@@ -38,10 +37,8 @@ pub(super) const C: Language = Language {
 
 pub(super) const RUST: Language = Language {
     table: |kind, name, sizes, values| {
-        let kind = sizes
-            .iter()
-            .rev()
-            .fold(kind.to_owned(), |kind, n| format!("[{kind}; {n}]"));
+        let sizes = sizes.iter().rev();
+        let kind = sizes.fold(kind.to_owned(), |kind, n| format!("[{kind}; {n}]"));
         format!("#[allow(clippy::approx_constant)]\nconst {name}: {kind} = {values};\n")
     },
     open: '[',
@@ -58,20 +55,16 @@ impl Language {
             return values.first().cloned().unwrap_or_default();
         };
         let chunk = (values.len() / (*size).max(1)).max(1);
-        let parts: Vec<String> = values
-            .chunks(chunk)
-            .map(|v| self.nested(v, inner))
-            .collect();
+        let parts = values.chunks(chunk).map(|v| self.nested(v, inner));
+        let parts: Vec<String> = parts.collect();
         let between = if inner.is_empty() { ", " } else { ",\n     " };
         format!("{}{}{}", self.open, parts.join(between), self.close)
     }
 
-    /// Whether it is C.
     pub(super) fn is_c(&self) -> bool {
         self.open == '{'
     }
 
-    /// A table of numbers.
     pub(super) fn numbers(
         &self,
         name: &str,
@@ -103,24 +96,18 @@ impl Language {
         }
         let mut out = String::new();
         let is_c = self.is_c();
-        let parents: Vec<String> = links
-            .iter()
-            .map(|link| match (link.parent, is_c) {
-                (Some(parent), true) => parent.to_string(),
-                (None, true) => "-1".to_owned(),
-                (Some(parent), false) => format!("Some({parent})"),
-                (None, false) => "None".to_owned(),
-            })
-            .collect();
-        let slides: Vec<String> = links
-            .iter()
-            .map(|link| match (link.kind == JointKind::Prismatic, is_c) {
-                (slides, true) => u8::from(slides).to_string(),
-                (slides, false) => slides.to_string(),
-            })
-            .collect();
-        out += &self.words("PARENT", "Option<usize>", &parents);
-        out += &self.words("SLIDES", "bool", &slides);
+        let parents = links.iter().map(|link| match link.parent {
+            None => if is_c { "-1" } else { "None" }.to_owned(),
+            Some(parent) if is_c => parent.to_string(),
+            Some(parent) => format!("Some({parent})"),
+        });
+        let slides = links.iter().map(|link| link.kind == JointKind::Prismatic);
+        let slides = slides.map(|slides| match is_c {
+            true => u8::from(slides).to_string(),
+            false => slides.to_string(),
+        });
+        out += &self.words("PARENT", "Option<usize>", parents);
+        out += &self.words("SLIDES", "bool", slides);
         let rotations = links.iter().flat_map(|link| link.rotation).flatten();
         out += &self.numbers("ROTATION", &[l, 3, 3], rotations);
         out += &self.numbers("ORIGIN", &[l, 3], links.iter().flat_map(|link| link.origin));
@@ -130,10 +117,8 @@ impl Language {
         let sines = sines(program);
         if !sines.is_empty() {
             let s = sines.len();
-            let of: Vec<String> = sines.iter().map(|(i, _)| i.to_string()).collect();
-            out += &(self.table)("usize", "SINE_OF", &[s], &self.nested(&of, &[s]));
-            let amplitudes = sines.iter().map(|(_, x)| x[0]);
-            out += &self.numbers("AMPLITUDE", &[s], amplitudes);
+            out += &self.words("SINE_OF", "usize", sines.iter().map(|(i, _)| i.to_string()));
+            out += &self.numbers("AMPLITUDE", &[s], sines.iter().map(|(_, x)| x[0]));
             out += &self.numbers("PHASE", &[s], sines.iter().map(|(_, x)| x[1]));
             let factors = sines.iter().flat_map(|(_, x)| x[2..].to_vec());
             out += &self.numbers("SINE_K", &[s, n], factors);
@@ -142,27 +127,26 @@ impl Language {
     }
 
     /// A list of what are no numbers with a point.
-    pub(super) fn words(&self, name: &str, kind: &str, values: &[String]) -> String {
-        (self.table)(
-            kind,
-            name,
-            &[values.len()],
-            &self.nested(values, &[values.len()]),
-        )
+    pub(super) fn words(
+        &self,
+        name: &str,
+        kind: &str,
+        values: impl Iterator<Item = String>,
+    ) -> String {
+        let values: Vec<String> = values.collect();
+        let sizes = [values.len()];
+        (self.table)(kind, name, &sizes, &self.nested(&values, &sizes))
     }
 
-    /// The standard parameters of every link.
     pub(super) fn bodies(&self, name: &str, bodies: &[[f64; STANDARD]]) -> String {
         let sizes = [bodies.len(), STANDARD];
         self.numbers(name, &sizes, bodies.iter().flatten().copied())
     }
 
-    /// A vector.
     pub(super) fn vector(&self, name: &str, x: &[f64]) -> String {
         self.numbers(name, &[x.len()], x.iter().copied())
     }
 
-    /// Numbers between brackets.
     pub(super) fn list(&self, x: &[f64]) -> String {
         let all: Vec<String> = x.iter().copied().map(exact).collect();
         self.nested(&all, &[x.len()])
@@ -194,7 +178,6 @@ impl Language {
             .replace("@TO_STEP@", of(added || steps, ", temperature"))
     }
 
-    /// What the file is, line by line.
     pub(super) fn header(&self, program: &Program, note: &Note) -> String {
         let mut lines = note.lines.clone();
         lines.push(String::new());
@@ -213,15 +196,12 @@ impl Language {
                     .to_owned(),
             );
         }
-        let shown: Vec<String> = lines
-            .iter()
-            .map(|line| {
-                // nothing in a name may end the comment
-                let line = line.replace("*/", "* /");
-                format!("{}{line}", self.comment).trim_end().to_owned()
-            })
-            .collect();
-        shown.join("\n")
+        let shown = lines.iter().map(|line| {
+            // nothing in a name may end the comment
+            let line = line.replace("*/", "* /");
+            format!("{}{line}", self.comment).trim_end().to_owned()
+        });
+        shown.collect::<Vec<_>>().join("\n")
     }
 }
 
@@ -307,27 +287,19 @@ pub(super) fn without_memory(effects: &EffectsCode) -> &'static str {
 /// Every sine of a dependent coordinate: its link, then amplitude, phase and a factor per joint.
 pub(super) fn sines(program: &Program) -> Vec<(usize, Vec<f64>)> {
     let n = program.joints.len();
-    let of = |d: &DependentCoordinate| -> Vec<Vec<f64>> {
-        d.sines
-            .iter()
-            .map(|sine| {
-                let mut row = vec![sine.amplitude, sine.phase];
-                row.resize(2 + n, 0.0);
-                for (j, k) in &sine.of {
-                    row[2 + j] += k;
-                }
-                row
-            })
-            .collect()
-    };
-    let links = program.tree.links().iter().enumerate();
-    links
-        .flat_map(|(i, link)| {
-            let rows = match &link.coordinate {
-                Coordinate::Joint(_) => Vec::new(),
-                Coordinate::Follows(d) => of(d),
-            };
-            rows.into_iter().map(move |row| (i, row))
-        })
-        .collect()
+    let mut out = Vec::new();
+    for (i, link) in program.tree.links().iter().enumerate() {
+        let Coordinate::Follows(dependent) = &link.coordinate else {
+            continue;
+        };
+        for sine in &dependent.sines {
+            let mut row = vec![sine.amplitude, sine.phase];
+            row.resize(2 + n, 0.0);
+            for (j, k) in &sine.of {
+                row[2 + j] += k;
+            }
+            out.push((i, row));
+        }
+    }
+    out
 }

@@ -5,7 +5,7 @@
 
 use super::error::ExportError;
 use cft_ident_core::effect::as_code::EffectsCode;
-use cft_ident_core::effect::{AugmentedModel, Scene};
+use cft_ident_core::effect::{AugmentedModel, Scene, Torques};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
 use cft_ident_core::robot::friction::ViscousCoulomb;
@@ -21,20 +21,11 @@ pub(super) fn damping_and_friction(law: &JointFriction) -> [f64; 2] {
     }
 }
 
-/// Damping and friction of joint j, not below zero; `None` where its law is another one.
-pub(super) fn dissipative(model: &Model, j: usize) -> Option<[f64; 2]> {
-    match model.friction.get(j)? {
-        JointFriction::ViscousCoulomb(law) => Some([law.viscous, law.coulomb].map(|x| x.max(0.0))),
-        _ => None,
-    }
-}
-
 /// Speeds at which friction is looked at: so many in each decade of these \[m/s or rad/s\].
 const PER_DECADE: i32 = 20;
 const DECADES: [i32; 2] = [-6, 2];
 
-/// Friction of each joint at its speeds `v`, joint by joint and as many of each, with its effects among those of a
-/// speed alone (`of_friction`, by their place in the model).
+/// Friction of each joint at its speeds `v`, with its effects among those of a speed alone (`of_friction`).
 fn friction_at(refined: &AugmentedModel, of_friction: &[usize], v: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let rows = v.first().map_or(0, Vec::len);
     let rest = || vec![vec![0.0; rows]; v.len()];
@@ -48,16 +39,7 @@ fn friction_at(refined: &AugmentedModel, of_friction: &[usize], v: Vec<Vec<f64>>
         ..Stretch::default()
     };
     let torques = refined.torques(&along);
-    let scene = Scene {
-        robot: &refined.model.robot,
-        theta: &refined.model.theta,
-        laws: &refined.model.friction,
-        stretch: &along,
-        hat: &torques.hat,
-        load: &torques.load,
-        direction: &torques.direction,
-        tilt: None,
-    };
+    let scene = scene(&refined.model, &along, &torques);
     let mut of_effect = vec![0.0; rows];
     let each = refined.model.friction.iter().zip(&along.v).enumerate();
     each.map(|(j, (law, speeds))| {
@@ -73,6 +55,20 @@ fn friction_at(refined: &AugmentedModel, of_friction: &[usize], v: Vec<Vec<f64>>
     .collect()
 }
 
+/// What effects see of a model along a stretch.
+pub(super) fn scene<'a>(model: &'a Model, stretch: &'a Stretch, torques: &'a Torques) -> Scene<'a> {
+    Scene {
+        robot: &model.robot,
+        theta: &model.theta,
+        laws: &model.friction,
+        stretch,
+        hat: &torques.hat,
+        load: &torques.load,
+        direction: &torques.direction,
+        tilt: Some(&torques.tilt),
+    }
+}
+
 /// Friction of each joint at its speeds `v`, joint by joint and as many of each, as exported code has it: the law with
 /// the effects of the speed alone, and none where it would drive.
 ///
@@ -85,14 +81,11 @@ pub fn joint_friction(
     let of_friction = EffectsCode::of(refined)?.of_friction;
     let drives = driving(refined, &of_friction);
     let mut out = friction_at(refined, &of_friction, v.clone());
-    for ((friction, v), _) in out
-        .iter_mut()
-        .zip(&v)
-        .zip(&drives)
-        .filter(|of| of.1.is_some())
-    {
-        for (x, v) in friction.iter_mut().zip(v) {
-            *x = if *x * v > 0.0 { *x } else { 0.0 };
+    for ((friction, v), drives) in out.iter_mut().zip(&v).zip(&drives) {
+        if drives.is_some() {
+            for (x, v) in friction.iter_mut().zip(v) {
+                *x = if *x * v > 0.0 { *x } else { 0.0 };
+            }
         }
     }
     Ok(out)

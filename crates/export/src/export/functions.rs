@@ -2,61 +2,46 @@
 
 use std::fmt::Write;
 
-/// One of them: its name in statements, the functions of `math.h` that Rust has as methods, and its text.
+/// One of them: its name in statements, and its text.
 struct Function {
     name: &'static str,
     c: &'static str,
     rust: &'static str,
 }
 
-/// What C has in `math.h` and Rust as methods: function, method and its arguments.
-const METHODS: [(&str, &str); 30] = [
-    ("sin(", "fn sin(x: f64) -> f64 {\n    x.sin()\n}\n"),
-    ("cos(", "fn cos(x: f64) -> f64 {\n    x.cos()\n}\n"),
-    ("exp(", "fn exp(x: f64) -> f64 {\n    x.exp()\n}\n"),
-    ("expm1(", "fn expm1(x: f64) -> f64 {\n    x.exp_m1()\n}\n"),
-    ("tanh(", "fn tanh(x: f64) -> f64 {\n    x.tanh()\n}\n"),
-    ("fabs(", "fn fabs(x: f64) -> f64 {\n    x.abs()\n}\n"),
-    (
-        "pow(",
-        "fn pow(x: f64, p: f64) -> f64 {\n    x.powf(p)\n}\n",
-    ),
+/// What C has in `math.h` and Rust as methods: name of the function, its arguments and its text in Rust.
+const METHODS: [(&str, &str, &str); 30] = [
+    ("sin", "x: f64", "x.sin()"),
+    ("cos", "x: f64", "x.cos()"),
+    ("exp", "x: f64", "x.exp()"),
+    ("expm1", "x: f64", "x.exp_m1()"),
+    ("tanh", "x: f64", "x.tanh()"),
+    ("fabs", "x: f64", "x.abs()"),
+    ("pow", "x: f64, p: f64", "x.powf(p)"),
     // what formulas of users may call beside these
-    ("tan(", "fn tan(x: f64) -> f64 {\n    x.tan()\n}\n"),
-    ("asin(", "fn asin(x: f64) -> f64 {\n    x.asin()\n}\n"),
-    ("acos(", "fn acos(x: f64) -> f64 {\n    x.acos()\n}\n"),
-    ("atan(", "fn atan(x: f64) -> f64 {\n    x.atan()\n}\n"),
-    ("sinh(", "fn sinh(x: f64) -> f64 {\n    x.sinh()\n}\n"),
-    ("cosh(", "fn cosh(x: f64) -> f64 {\n    x.cosh()\n}\n"),
-    ("asinh(", "fn asinh(x: f64) -> f64 {\n    x.asinh()\n}\n"),
-    ("acosh(", "fn acosh(x: f64) -> f64 {\n    x.acosh()\n}\n"),
-    ("atanh(", "fn atanh(x: f64) -> f64 {\n    x.atanh()\n}\n"),
-    ("floor(", "fn floor(x: f64) -> f64 {\n    x.floor()\n}\n"),
-    ("round(", "fn round(x: f64) -> f64 {\n    x.round()\n}\n"),
-    ("ceil(", "fn ceil(x: f64) -> f64 {\n    x.ceil()\n}\n"),
-    ("trunc(", "fn trunc(x: f64) -> f64 {\n    x.trunc()\n}\n"),
-    ("sqrt(", "fn sqrt(x: f64) -> f64 {\n    x.sqrt()\n}\n"),
-    ("cbrt(", "fn cbrt(x: f64) -> f64 {\n    x.cbrt()\n}\n"),
-    ("log(", "fn log(x: f64) -> f64 {\n    x.ln()\n}\n"),
-    ("log2(", "fn log2(x: f64) -> f64 {\n    x.log2()\n}\n"),
-    ("log10(", "fn log10(x: f64) -> f64 {\n    x.log10()\n}\n"),
-    (
-        "atan2(",
-        "fn atan2(x: f64, y: f64) -> f64 {\n    x.atan2(y)\n}\n",
-    ),
-    (
-        "fmin(",
-        "fn fmin(x: f64, y: f64) -> f64 {\n    x.min(y)\n}\n",
-    ),
-    (
-        "fmax(",
-        "fn fmax(x: f64, y: f64) -> f64 {\n    x.max(y)\n}\n",
-    ),
-    (
-        "copysign(",
-        "fn copysign(x: f64, y: f64) -> f64 {\n    x.copysign(y)\n}\n",
-    ),
-    ("fmod(", "fn fmod(x: f64, y: f64) -> f64 {\n    x % y\n}\n"),
+    ("tan", "x: f64", "x.tan()"),
+    ("asin", "x: f64", "x.asin()"),
+    ("acos", "x: f64", "x.acos()"),
+    ("atan", "x: f64", "x.atan()"),
+    ("sinh", "x: f64", "x.sinh()"),
+    ("cosh", "x: f64", "x.cosh()"),
+    ("asinh", "x: f64", "x.asinh()"),
+    ("acosh", "x: f64", "x.acosh()"),
+    ("atanh", "x: f64", "x.atanh()"),
+    ("floor", "x: f64", "x.floor()"),
+    ("round", "x: f64", "x.round()"),
+    ("ceil", "x: f64", "x.ceil()"),
+    ("trunc", "x: f64", "x.trunc()"),
+    ("sqrt", "x: f64", "x.sqrt()"),
+    ("cbrt", "x: f64", "x.cbrt()"),
+    ("log", "x: f64", "x.ln()"),
+    ("log2", "x: f64", "x.log2()"),
+    ("log10", "x: f64", "x.log10()"),
+    ("atan2", "x: f64, y: f64", "x.atan2(y)"),
+    ("fmin", "x: f64, y: f64", "x.min(y)"),
+    ("fmax", "x: f64, y: f64", "x.max(y)"),
+    ("copysign", "x: f64, y: f64", "x.copysign(y)"),
+    ("fmod", "x: f64, y: f64", "x % y"),
 ];
 
 const FUNCTIONS: [Function; 8] = [
@@ -347,11 +332,7 @@ fn elastic(w: f64, d: f64, dt: f64, load: f64, s: &mut [f64; 14]) -> f64 {
 /// Those that the statements `$f(` call, in C.
 pub(super) fn in_c(statements: &[&[String]]) -> String {
     let called = FUNCTIONS.iter().filter(|f| calls(statements, f.name));
-    let mut out = String::new();
-    for function in called {
-        let _ = writeln!(out, "{}", function.c);
-    }
-    out
+    called.map(|function| format!("{}\n", function.c)).collect()
 }
 
 /// Those that the statements call, in Rust.
@@ -363,16 +344,20 @@ pub(super) fn in_rust(statements: &[&[String]]) -> String {
             let _ = write!(out, "\n#[inline]\n{}", function.rust);
         }
     }
-    for (name, text) in METHODS {
+    for (name, arguments, text) in METHODS {
+        let call = format!("{name}(");
         // not those whose name ends alike
         let any = |line: &String| {
-            let found = line.match_indices(name);
+            let found = line.match_indices(&call);
             let before = |at: usize| line[..at].chars().next_back();
             let mut own = found.filter(|(at, _)| !before(*at).is_some_and(char::is_alphanumeric));
             own.any(|(at, _)| before(at) != Some('$'))
         };
         if statements.iter().any(|lines| lines.iter().any(any)) {
-            let _ = write!(out, "\n#[inline]\n{text}");
+            let _ = write!(
+                out,
+                "\n#[inline]\nfn {name}({arguments}) -> f64 {{\n    {text}\n}}\n"
+            );
         }
     }
     out

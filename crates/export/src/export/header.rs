@@ -32,8 +32,7 @@ const SINES: &str = "\
 pub fn header(program: &Program, name: &str, note: &Note) -> String {
     let effects = &program.effects;
     let n = program.joints.len();
-    let count = sines(program).len();
-    let (constant, loops) = match count {
+    let (constant, loops) = match sines(program).len() {
         0 => (String::new(), "        (void)0;"),
         s => (format!(", S = {s}"), SINES),
     };
@@ -46,31 +45,26 @@ pub fn header(program: &Program, name: &str, note: &Note) -> String {
         let (field, what) = (&memory.name, memory.what.replace("*/", "* /"));
         let size = memory.size.map_or(String::new(), |n| format!("[{n}]"));
         let _ = writeln!(fields, "    double {field}{size}; /* {what} */");
-        match memory.size {
-            None => init.push(format!("state.{field} = {};", memory.first)),
-            Some(n) => {
-                init.extend((0..n).map(|i| format!("state.{field}[{i}] = {};", memory.first)))
-            }
-        }
+        let places: Vec<String> = match memory.size {
+            None => vec![String::new()],
+            Some(n) => (0..n).map(|i| format!("[{i}]")).collect(),
+        };
+        let each = places.iter();
+        init.extend(each.map(|place| format!("state.{field}{place} = {};", memory.first)));
     }
     let about = about(effects);
     if !about.is_empty() {
         init.push("$about(state, q);".to_owned());
     }
-    let unused = |used: bool, text: &str| {
-        if used {
-            String::new()
-        } else {
-            format!("    {text}\n")
-        }
+    let unused = |used: bool, text: &str| match used {
+        true => String::new(),
+        false => format!("    {text}\n"),
     };
     let moves = program.friction.iter().any(|f| *f != JointFriction::None);
     let friction =
         unused(moves || !effects.friction.is_empty(), "(void)v;") + &C.statements(&friction);
-    let steps = unused(
-        effects.steps.iter().any(|s| s.contains("dt")),
-        "(void)load;",
-    ) + &C.statements(&effects.steps);
+    let timed = effects.steps.iter().any(|s| s.contains("dt"));
+    let steps = unused(timed, "(void)load;") + &C.statements(&effects.steps);
     let begin = unused(init.iter().any(|s| s.contains('q')), "(void)q;") + &C.statements(&init);
     let beside = beside(program);
     let (besides, weight) = match beside.is_empty() {
@@ -81,10 +75,8 @@ pub fn header(program: &Program, name: &str, note: &Note) -> String {
         ),
     };
     let observer = program.observer.as_ref();
-    let text = TEMPLATE.replace(
-        "@OBSERVER@\n",
-        &observer.map_or(String::new(), |recipe| recipe.in_c(program)),
-    );
+    let observer = observer.map_or(String::new(), |recipe| recipe.in_c(program));
+    let text = TEMPLATE.replace("@OBSERVER@\n", &observer);
     C.with_inputs(&text, effects)
         .replace("@TABLES@", tables.trim_end())
         .replace("@BODY@", C.bodies("BODY", &program.bodies).trim_end())

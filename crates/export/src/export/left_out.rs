@@ -1,14 +1,14 @@
 //! What a format cannot say of a model, and how much of the torque that is.
 
-use std::fmt::Write;
-
 use serde::Serialize;
 
 use super::arm::{Arm, Says};
-use super::dissipative::damping_and_friction;
+use super::dissipative::{damping_and_friction, scene};
 use super::error::ExportError;
-use cft_ident_core::effect::{AugmentedModel, Scene, shifted};
+use super::prepared::hashed;
+use cft_ident_core::effect::{AugmentedModel, shifted};
 use cft_ident_core::motion::Stretch;
+use cft_ident_core::number;
 use cft_ident_core::robot::friction::sign;
 
 /// A part of the model's torque that a file does not hold.
@@ -24,13 +24,12 @@ pub struct LeftOut {
     pub percent_of_torque: Option<f64>,
 }
 
-/// One of them, with the torque of every joint along a stretch.
 struct Part<'a> {
     what: String,
     torque: Box<Torque<'a>>,
 }
 
-/// Torque of every joint along a stretch.
+/// Torque of every joint along a stretch, by the model's there.
 type Torque<'a> = dyn Fn(&Stretch, &[Vec<f64>]) -> Vec<Vec<f64>> + 'a;
 
 /// What a format cannot say, with its size along the stretches given, of which there may be none.
@@ -130,7 +129,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
     }
     for (i, effect) in refined.effects.iter().enumerate() {
         // a drive's inertia is named with that of its joint
-        if arm.held.iter().any(|(held, _)| *held == i) {
+        if arm.held.contains(&i) {
             continue;
         }
         let late = (0..n).any(|j| effect.shift(j) != 0.0);
@@ -146,16 +145,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
                     return each.collect();
                 }
                 let plain = AugmentedModel::plain(model.clone()).torques(s);
-                let scene = Scene {
-                    robot: &model.robot,
-                    theta: &model.theta,
-                    laws: &model.friction,
-                    stretch: s,
-                    hat: &plain.hat,
-                    load: &plain.load,
-                    direction: &plain.direction,
-                    tilt: Some(&plain.tilt),
-                };
+                let scene = scene(model, s, &plain);
                 let mut all = vec![vec![0.0; s.len()]; n];
                 for (j, out) in all.iter_mut().enumerate() {
                     effect.torque(&scene, j, out);
@@ -196,10 +186,7 @@ pub fn lines(left_out: &[LeftOut], logs: &[String], elsewhere: Elsewhere) -> Vec
     for part in left_out {
         let size = match (part.percent_of_torque, &part.joint) {
             (Some(percent), Some(joint)) => {
-                format!(
-                    ", {} % at {joint}",
-                    cft_ident_core::number::significant(percent, 3)
-                )
+                format!(", {} % at {joint}", number::significant(percent, 3))
             }
             _ => String::new(),
         };
@@ -223,11 +210,6 @@ pub fn side_file(
         logs: &'a [String],
         left_out: &'a [LeftOut],
     }
-    let mut out = String::new();
-    for line in notes {
-        let _ = writeln!(out, "{}", format!("# {line}").trim_end());
-    }
-    out.push('\n');
-    out += &toml::to_string(&File { logs, left_out })?;
-    Ok(out)
+    let text = toml::to_string(&File { logs, left_out })?;
+    Ok(format!("{}\n{text}", hashed(notes)))
 }

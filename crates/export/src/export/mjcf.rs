@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use super::arm::{Arm, ArmJoint, ArmLink, Says, quaternion};
-use super::prepared::{quoted, words};
+use super::prepared::{in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::of_roll_pitch_yaw;
 
@@ -16,15 +16,7 @@ pub const SAYS: Says = Says {
 
 /// The text of a model; `notes` stand at its head.
 pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
-    let mut out = String::from("<!--\n");
-    for line in notes {
-        // two hyphens would end the comment early
-        let _ = writeln!(
-            out,
-            "{}",
-            format!("  {}", line.replace("--", "- -")).trim_end()
-        );
-    }
+    let mut out = format!("<!--\n{}", in_comment(notes));
     let _ = write!(
         out,
         "-->\n<mujoco model=\"identified\">\n  <compiler angle=\"radian\" autolimits=\"true\" \
@@ -33,14 +25,7 @@ pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
         quoted(&arm.root)
     );
     let own = arm.trains();
-    for (i, _) in arm
-        .links
-        .iter()
-        .enumerate()
-        .filter(|(_, l)| l.parent.is_none())
-    {
-        body(&mut out, arm, i, 3, own.as_deref());
-    }
+    bodies(&mut out, arm, None, 3, own.as_deref());
     out.push_str("    </body>\n  </worldbody>\n");
     if let (Some(_), false) = (&own, arm.couplings.is_empty()) {
         tendons(&mut out, arm);
@@ -58,41 +43,43 @@ pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
     out
 }
 
-/// A link and all that hang on it; trees are at most as deep as they have links.
-fn body(out: &mut String, arm: &Arm, i: usize, depth: usize, own: Option<&[[f64; 2]]>) {
-    let link = &arm.links[i];
-    let (pad, body) = ("  ".repeat(depth), &link.body);
-    let [xx, xy, xz, yy, yz, zz] = body.inertia;
-    let _ = write!(
-        out,
-        "{pad}<body name=\"{}\" pos=\"{}\" quat=\"{}\">\n{pad}  <inertial pos=\"{}\" mass=\"{:?}\" \
-         fullinertia=\"{}\"/>\n",
-        quoted(&link.name),
-        words(&link.origin),
-        words(&quaternion(&link.rotation)),
-        words(&body.centre),
-        body.mass,
-        words(&[xx, yy, zz, xy, xz, yz])
-    );
-    joint(out, link, &pad, own);
-    for frame in arm.frames.iter().filter(|frame| frame.link == link.name) {
-        let _ = writeln!(
+/// The links that hang on `parent`, each with all that hang on it; trees are at most as deep as they have links.
+fn bodies(
+    out: &mut String,
+    arm: &Arm,
+    parent: Option<usize>,
+    depth: usize,
+    own: Option<&[[f64; 2]]>,
+) {
+    let pad = "  ".repeat(depth);
+    let all = arm.links.iter().enumerate();
+    for (i, link) in all.filter(|(_, link)| link.parent == parent) {
+        let body = &link.body;
+        let [xx, xy, xz, yy, yz, zz] = body.inertia;
+        let _ = write!(
             out,
-            "{pad}  <site name=\"{}\" pos=\"{}\" quat=\"{}\"/>",
-            quoted(&frame.name),
-            words(&frame.xyz),
-            words(&quaternion(&of_roll_pitch_yaw(&frame.rpy)))
+            "{pad}<body name=\"{}\" pos=\"{}\" quat=\"{}\">\n{pad}  <inertial pos=\"{}\" mass=\"{:?}\" \
+             fullinertia=\"{}\"/>\n",
+            quoted(&link.name),
+            words(&link.origin),
+            words(&quaternion(&link.rotation)),
+            words(&body.centre),
+            body.mass,
+            words(&[xx, yy, zz, xy, xz, yz])
         );
+        joint(out, link, &pad, own);
+        for frame in arm.frames.iter().filter(|frame| frame.link == link.name) {
+            let _ = writeln!(
+                out,
+                "{pad}  <site name=\"{}\" pos=\"{}\" quat=\"{}\"/>",
+                quoted(&frame.name),
+                words(&frame.xyz),
+                words(&quaternion(&of_roll_pitch_yaw(&frame.rpy)))
+            );
+        }
+        bodies(out, arm, Some(i), depth + 1, own);
+        let _ = writeln!(out, "{pad}</body>");
     }
-    for (k, _) in arm
-        .links
-        .iter()
-        .enumerate()
-        .filter(|(_, l)| l.parent == Some(i))
-    {
-        self::body(out, arm, k, depth + 1, own);
-    }
-    let _ = writeln!(out, "{pad}</body>");
 }
 
 fn joint(out: &mut String, link: &ArmLink, pad: &str, own: Option<&[[f64; 2]]>) {
@@ -111,12 +98,10 @@ fn joint(out: &mut String, link: &ArmLink, pad: &str, own: Option<&[[f64; 2]]>) 
             );
         }
         ArmJoint::Own(joint) => {
-            let [armature, damping] =
-                own.map_or([joint.armature, joint.damping], |own| own[joint.index]);
-            let range = joint
-                .limits
-                .position
-                .map_or(String::new(), |ends| format!(" range=\"{}\"", words(&ends)));
+            let whole = [joint.armature, joint.damping];
+            let [armature, damping] = own.map_or(whole, |own| own[joint.index]);
+            let range = joint.limits.position;
+            let range = range.map_or(String::new(), |ends| format!(" range=\"{}\"", words(&ends)));
             let _ = writeln!(
                 out,
                 "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{axis}\" armature=\"{armature:?}\" \
@@ -145,7 +130,6 @@ fn tendons(out: &mut String, arm: &Arm) {
     out.push_str("  </tendon>\n");
 }
 
-/// Links that follow a joint.
 fn followers(out: &mut String, arm: &Arm) {
     let mut lines = String::new();
     for link in &arm.links {

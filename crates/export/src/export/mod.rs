@@ -9,7 +9,7 @@
 //! | [`module`] | the Rust module |
 //! | [`recipe`] | an observer of external torques as numbers |
 //! | `observer` | the same in C and Rust |
-//! | [`standard`] | standard parameters of links from base parameters |
+//! | `standard` | standard parameters of links from base parameters |
 //! | [`dissipative`] | friction and drive inertias below zero |
 //! | `single` | a single joint as a chain of one link |
 //! | `prepared` | a model as links with inertials |
@@ -37,7 +37,7 @@ pub mod recipe;
 pub mod ros2_control;
 pub mod sdf;
 mod single;
-pub mod standard;
+mod standard;
 pub mod urdf;
 pub mod urdf_source;
 pub mod usd;

@@ -29,23 +29,13 @@ const SINES: &str = "\
 /// The text of a module with `tau`, `gravity`, `friction`, `rigid`, and `step` for what remembers.
 pub fn module(program: &Program, note: &Note) -> String {
     let effects = &program.effects;
-    let count = sines(program).len();
-    let (constant, loops, slope) = match count {
+    let mutable = "let mut slope = LINEAR;";
+    let (constant, loops, slope) = match sines(program).len() {
         0 => (String::new(), "", "let slope = LINEAR;"),
-        s => (
-            format!("const SINES: usize = {s};\n"),
-            SINES,
-            "let mut slope = LINEAR;",
-        ),
+        s => (format!("const SINES: usize = {s};\n"), SINES, mutable),
     };
     let [friction, drives, added] = [code::friction, code::drives, code::added].map(|f| f(program));
-    let called = [
-        &friction[..],
-        &drives,
-        &added,
-        &effects.steps,
-        &effects.askew,
-    ];
+    let called = [&friction, &drives, &added, &effects.steps, &effects.askew].map(Vec::as_slice);
     let mut tables = RUST.tables(program);
     tables += &RUST.bodies("BODY", &program.bodies);
     tables += &RUST.vector("FALL", &fall(program));
@@ -61,10 +51,9 @@ pub fn module(program: &Program, note: &Note) -> String {
         let _ = writeln!(init, "        {name}: {first},");
     }
     let about = about(effects);
-    let begin = if about.is_empty() {
-        ""
-    } else {
-        "    about(&mut state, q);\n"
+    let begin = match about.is_empty() {
+        true => "",
+        false => "    about(&mut state, q);\n",
     };
     let beside = beside(program);
     let (besides, weight) = match beside.is_empty() {
@@ -80,17 +69,15 @@ pub fn module(program: &Program, note: &Note) -> String {
         false => text + "\n",
     };
     let observer = program.observer.as_ref();
-    let text = TEMPLATE.replace(
-        "@OBSERVER@\n",
-        &observer.map_or(String::new(), |recipe| recipe.in_rust(program)),
-    );
+    let observer = observer.map_or(String::new(), |recipe| recipe.in_rust(program));
+    let text = TEMPLATE.replace("@OBSERVER@\n", &observer);
     RUST.with_inputs(&text, effects)
         .replace("@TABLES@\n", &tables)
         .replace("@BESIDE@", &beside)
         .replace("@WEIGHT@\n", weight)
         .replace("@CARRIED@", carried(program))
         .replace("@SINES_CONST@\n", &constant)
-        .replace("let mut slope = LINEAR;", slope)
+        .replace(mutable, slope)
         .replace("@SINES@\n", loops)
         .replace("@HELPERS@", &functions::in_rust(&called))
         .replace("@FRICTION@", &RUST.statements(&friction))
@@ -116,7 +103,6 @@ pub fn module(program: &Program, note: &Note) -> String {
         .replace("@HEADER@", &RUST.header(program, note))
 }
 
-/// The time by which each torque is late.
 fn lead(program: &Program) -> String {
     let late = &program.effects.lead_s;
     if late.iter().all(|d| *d == 0.0) {

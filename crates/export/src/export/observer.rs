@@ -61,22 +61,13 @@ const LATE_IN_RUST: &str = "\
         }";
 
 impl Recipe {
-    /// Type, functions and tables in C.
     pub(super) fn in_c(&self, program: &Program) -> String {
         let plain = "    for (j = 0; j < N; j++) y[j] = r[2][N + j] - model[j];";
-        self.text(
-            program,
-            (IN_C, &C),
-            (plain, LATE_IN_C),
-            [
-                "    double measured[@D@][@N@], modelled[@D@][@N@];\n    int late;\n",
-                "",
-                "o->late = ",
-            ],
-        )
+        let fields = "    double measured[@D@][@N@], modelled[@D@][@N@];\n    int late;\n";
+        let of_late = [fields, "", "o->late = "];
+        self.text(program, (IN_C, &C), (plain, LATE_IN_C), of_late)
     }
 
-    /// The same in Rust.
     pub(super) fn in_rust(&self, program: &Program) -> String {
         let plain = "        for j in 0..JOINTS {\n            y[j] = r[2][JOINTS + j] - model[j];\n        }";
         let fields = "    measured: [[f64; JOINTS]; @D@],\n    modelled: [[f64; JOINTS]; @D@],\n    late: usize,\n";
@@ -86,8 +77,7 @@ impl Recipe {
         self.text(program, (IN_RUST, &RUST), (plain, LATE_IN_RUST), of_late)
     }
 
-    /// The template with its marks filled in: the statements of the residual without and with a delay, and what
-    /// is there for a delay alone.
+    /// The template with its marks filled in, by statements without and with a delay, and those of a delay alone.
     fn text(
         &self,
         program: &Program,
@@ -95,12 +85,10 @@ impl Recipe {
         (plain, late): (&str, &str),
         of_late: [&str; 3],
     ) -> String {
-        let (residual, of_late) = match &self.late {
-            None => (plain, [""; 3]),
-            Some(_) => (late, of_late),
+        let (residual, of_late, size, lead) = match &self.late {
+            None => (plain, [""; 3], 0, 0),
+            Some(of) => (late, of_late, of.size, of.lead),
         };
-        let size = self.late.as_ref().map_or(0, |late| late.size);
-        let lead = self.late.as_ref().map_or(0, |late| late.lead);
         let each = self.joints.iter().map(|joint| joint.speed_edges.len());
         let edges = each.max().unwrap_or(0).max(1);
         template
@@ -163,9 +151,8 @@ impl Recipe {
         let mut at = 0;
         for (j, law) in program.friction.iter().enumerate() {
             for slope in slopes(law, &format!("v[{j}]")) {
-                lines.push(format!(
-                    "tau[{j}] += UNCERTAIN_FRICTION[k][{at}] * ({slope});"
-                ));
+                let line = format!("tau[{j}] += UNCERTAIN_FRICTION[k][{at}] * ({slope});");
+                lines.push(line);
                 at += 1;
             }
         }
@@ -188,19 +175,17 @@ impl Recipe {
             x.resize(size, with);
             x
         };
-        let of = self.joints.iter();
-        let limits = of
-            .clone()
-            .flat_map(|j| padded(&j.speed_edges, edges, NEVER));
+        let of = || self.joints.iter();
+        let limits = of().flat_map(|j| padded(&j.speed_edges, edges, NEVER));
         out += &language.numbers("EDGES", &[n, edges], limits);
-        let std = of.clone().flat_map(|j| padded(&j.std, edges + 1, 0.0));
+        let std = of().flat_map(|j| padded(&j.std, edges + 1, 0.0));
         out += &language.numbers("STD", &[n, edges + 1], std);
-        out += &language.numbers("BAND", &[n], of.clone().map(|j| j.band));
-        out += &language.numbers("LIMIT", &[n], of.map(|j| j.limit));
+        out += &language.numbers("BAND", &[n], of().map(|j| j.band));
+        out += &language.numbers("LIMIT", &[n], of().map(|j| j.limit));
         if let Some(late) = &self.late {
             let (oldest, weights) = late.nodes();
             let oldest = oldest.into_iter().map(|k| k.to_string());
-            out += &language.words("OLDEST", "usize", &oldest.collect::<Vec<_>>());
+            out += &language.words("OLDEST", "usize", oldest);
             out += &language.numbers("WEIGHTS", &[n, 4], weights.into_iter());
         }
         out

@@ -3,9 +3,11 @@
 use super::error::ExportError;
 use super::single;
 use super::standard::{Standard, nearest};
-use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::model::Model;
+use cft_ident_core::robot::standard::Body;
+use cft_ident_core::robot::tree::space::{Rotation, Vector, about, add, product, times, turn};
 use cft_ident_core::robot::tree::{Coordinate, Link};
+use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::serial_section::InertialSection;
 
@@ -70,7 +72,21 @@ impl Prepared {
     }
 }
 
-/// Name of the joint before a link.
+/// Rotation and origin of a link's frame in that of the link before.
+pub(super) fn placed(link: &Link, drive: &Drive) -> (Rotation, Vector) {
+    let (rotation, origin) = (link.rotation, link.origin);
+    match (drive, link.kind) {
+        (Drive::Rest(at), JointKind::Revolute) => {
+            (product(&rotation, &about(&link.axis, *at)), origin)
+        }
+        (Drive::Rest(at), JointKind::Prismatic) => {
+            let moved = turn(&rotation, &times(*at, &link.axis));
+            (rotation, add(&origin, &moved))
+        }
+        _ => (rotation, origin),
+    }
+}
+
 pub(super) fn joint_name(robot: &Robot, link: &Link, drive: &Drive) -> String {
     let names = robot.joint_names();
     if let Drive::Joint(j) = drive {
@@ -118,9 +134,8 @@ pub(super) fn drive(robot: &Robot, link: &Link) -> Result<Drive, ExportError> {
 pub(super) fn root(robot: &Robot, file: &ModelFile) -> String {
     let mut name = "base".to_owned();
     let frames = &file.robot.robot.frame;
-    while robot.tree().links().iter().any(|l| l.name == name)
-        || frames.iter().any(|f| f.name == name)
-    {
+    let links = robot.tree().links();
+    while links.iter().any(|l| l.name == name) || frames.iter().any(|f| f.name == name) {
         name.push_str("_frame");
     }
     name
@@ -136,20 +151,14 @@ fn feasible(file: &ModelFile, robot: &Robot) -> Option<(Vec<Option<InertialSecti
             inertia: body.inertia,
         })
     });
-    let bodies: Vec<Option<InertialSection>> = bodies.collect();
+    let bodies: Option<Vec<InertialSection>> = bodies.collect();
     let drives = match robot.drive_inertia() {
-        true => {
-            let names = robot.joint_names().iter();
-            names
-                .map(|name| file.drive_inertia.get(name).copied())
-                .collect()
-        }
+        true => (robot.joint_names().iter())
+            .map(|name| file.drive_inertia.get(name).copied())
+            .collect(),
         false => Some(Vec::new()),
     };
-    bodies
-        .iter()
-        .all(Option::is_some)
-        .then_some((bodies, drives?))
+    Some((bodies?.into_iter().map(Some).collect(), drives?))
 }
 
 /// What the head says of inertials that are nearest to the robot file's.
@@ -169,12 +178,50 @@ const NEAR_FEASIBLE: [&str; 3] = [
     "[[link]] tables, which give other torques: the parameters were changed after they were found.",
     "They need not be those of a body that can be.",
 ];
+
+/// Lines that begin with the mark of a comment.
+pub(super) fn hashed(lines: &[String]) -> String {
+    let each = lines.iter();
+    each.map(|line| format!("# {line}").trim_end().to_owned() + "\n")
+        .collect()
+}
+
+/// Lines inside a comment of XML.
+pub(super) fn in_comment(lines: &[String]) -> String {
+    let each = lines.iter().map(|line| format!("  {}", unended(line)));
+    each.map(|line| line.trim_end().to_owned() + "\n").collect()
+}
+
+/// A line without two hyphens, which would end a comment of XML early.
+pub(super) fn unended(line: &str) -> String {
+    line.replace("--", "- -")
+}
+
+/// Names of the moments and products of inertia of a body, in their order.
+pub(super) const MOMENTS: [&str; 6] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
+
+/// A body as a URDF has it.
+pub(super) fn inertial(body: &Body) -> String {
+    let inertia = MOMENTS.iter().zip(body.inertia);
+    let inertia: Vec<String> = inertia.map(|(key, x)| format!("{key}=\"{x:?}\"")).collect();
+    format!(
+        "<inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{:?}\"/>\n      \
+         <inertia {}/>\n    </inertial>",
+        words(&body.centre),
+        body.mass,
+        inertia.join(" ")
+    )
+}
+
+/// Damping and friction of a joint as a URDF has them.
+pub(super) fn dynamics([damping, friction]: [f64; 2]) -> String {
+    format!("<dynamics damping=\"{damping:?}\" friction=\"{friction:?}\"/>")
+}
+
 /// A text inside an attribute.
 pub(super) fn quoted(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Numbers that are read back bit for bit.

@@ -76,15 +76,16 @@ impl Program {
     pub fn of(model: &Model) -> Self {
         let robot = &model.robot;
         let couplings = robot.transmission().couplings().iter().copied();
+        let couplings = couplings.zip(robot.coupling_parameters(&model.theta));
+        let kinds: Vec<JointKind> = (0..robot.joints()).map(|j| robot.joint_kind(j)).collect();
         Self {
             joints: robot.joint_names().to_vec(),
-            kinds: (0..robot.joints()).map(|j| robot.joint_kind(j)).collect(),
+            rest: kinds.iter().map(|kind| slow(*kind)).collect(),
+            kinds,
             tree: robot.tree().clone(),
             bodies: robot.link_parameters(&model.theta),
             drives: robot.drive_parameters(&model.theta),
-            couplings: couplings
-                .zip(robot.coupling_parameters(&model.theta))
-                .collect(),
+            couplings: couplings.collect(),
             friction: model.friction.clone(),
             offset: model.offset.clone(),
             effects: EffectsCode {
@@ -93,9 +94,6 @@ impl Program {
             },
             observer: None,
             drives_at: driving(&AugmentedModel::plain(model.clone()), &[]),
-            rest: (0..robot.joints())
-                .map(|j| slow(robot.joint_kind(j)))
-                .collect(),
         }
     }
 }

@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 
 use super::ExportError;
-use cft_ident_core::robot::model::{JointFriction, Model};
+use super::dissipative::damping_and_friction;
+use cft_ident_core::robot::model::Model;
 
 /// A joint as the controller knows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,12 +62,7 @@ pub fn parameters(
                 inertia,
             });
         }
-        let viscous = match &model.friction[j] {
-            JointFriction::None => 0.0,
-            JointFriction::ViscousCoulomb(law) => law.viscous,
-            JointFriction::DoubleTanh(law) => law.viscous,
-        }
-        .max(0.0);
+        let [viscous, _] = damping_and_friction(&model.friction[j]).map(|x| x.max(0.0));
         let gains = [
             ("p", inertia * w * w),
             ("i", 0.0),
@@ -113,9 +109,7 @@ mod tests {
     #[test]
     fn numbers_are_doubles_to_every_reader() {
         let shown = [0.0, 12.0, 0.000_123_456_7, 123_456.7, -1.5].map(decimal);
-        assert_eq!(
-            shown,
-            ["0.0", "12.0000", "0.000123457", "123456.7", "-1.50000"]
-        );
+        let doubles = ["0.0", "12.0000", "0.000123457", "123456.7", "-1.50000"];
+        assert_eq!(shown, doubles);
     }
 }

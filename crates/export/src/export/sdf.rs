@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::arm::{Arm, ArmJoint, ArmLink, Says};
-use super::prepared::{quoted, words};
+use super::prepared::{MOMENTS, in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::roll_pitch_yaw;
 
@@ -18,15 +18,7 @@ const NONE: &str = "1e16";
 
 /// The text of a model in a world of its own, where gravity is the model's; `notes` stand at its head.
 pub fn sdf(arm: &Arm, notes: &[String]) -> String {
-    let mut out = String::from("<?xml version=\"1.0\"?>\n<!--\n");
-    for line in notes {
-        // two hyphens would end the comment early
-        let _ = writeln!(
-            out,
-            "{}",
-            format!("  {}", line.replace("--", "- -")).trim_end()
-        );
-    }
+    let mut out = format!("<?xml version=\"1.0\"?>\n<!--\n{}", in_comment(notes));
     let root = quoted(&arm.root);
     let _ = write!(
         out,
@@ -51,10 +43,7 @@ pub fn sdf(arm: &Arm, notes: &[String]) -> String {
             words(&body.centre),
             body.mass
         );
-        for (key, x) in ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
-            .iter()
-            .zip(body.inertia)
-        {
+        for (key, x) in MOMENTS.iter().zip(body.inertia) {
             let _ = write!(out, "<{key}>{x:?}</{key}>");
         }
         out.push_str("</inertia>\n        </inertial>\n      </link>\n");

@@ -10,7 +10,6 @@ use cft_ident_files::config::model_file::LinkBody;
 use cft_ident_files::config::robot_file::ModelKind;
 use cft_ident_files::config::serial_section::LinkSection;
 
-/// Name of the link.
 const LINK: &str = "link";
 /// Mass of a link that turns, of which nothing says \[kg\].
 const TURNING_MASS: f64 = 1.0;

@@ -23,7 +23,7 @@ pub enum Identifiability {
 }
 
 /// Mass that is taken for a link whose mass nothing says [kg].
-pub(crate) const UNTOLD_MASS: f64 = 1.0;
+const UNTOLD_MASS: f64 = 1.0;
 
 /// Standard parameters of every link, then of the drives, and whether torques determine them.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,16 +3,17 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::dissipative::{below_zero, dissipative};
+use super::dissipative::{below_zero, damping_and_friction};
 use super::error::ExportError;
-use super::prepared::{Drive, Prepared, drive, joint_name, quoted, root, words};
+use super::prepared::{
+    Drive, Prepared, drive, dynamics, hashed, inertial, joint_name, placed, quoted, root, unended,
+    words,
+};
 use super::standard::{Identifiability, Standard};
-use cft_ident_core::robot::model::Model;
+use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::standard::{Body, STANDARD, STANDARD_NAMES};
 use cft_ident_core::robot::tree::Link;
-use cft_ident_core::robot::tree::space::{
-    Vector, about, add, product, roll_pitch_yaw, times, turn,
-};
+use cft_ident_core::robot::tree::space::{Vector, roll_pitch_yaw};
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
@@ -47,8 +48,7 @@ pub fn urdf(
     let below = below.iter().map(String::as_str);
     let lines = notes.iter().map(String::as_str).chain(below).chain([""]);
     for line in lines.chain(of_inertials.iter().copied()).chain(IN_GENERAL) {
-        // two hyphens would end the comment early
-        let _ = writeln!(out, "  {}", line.replace("--", "- -"));
+        let _ = writeln!(out, "  {}", unended(line));
     }
     let _ = writeln!(
         out,
@@ -101,24 +101,14 @@ fn placement(file: &ModelFile, i: usize, link: &Link, drive: &Drive) -> [Vector;
     // what the robot file says in these words is kept to the last digit
     let section = file.robot.robot.link.get(i);
     let said = section.filter(|s| s.xyz.is_some() || s.rpy.is_some());
-    let (xyz, rpy) = match said {
-        Some(s) => (s.xyz.unwrap_or_default(), s.rpy.unwrap_or_default()),
-        None => (link.origin, roll_pitch_yaw(&link.rotation)),
-    };
-    match (drive, link.kind) {
-        (Drive::Rest(at), JointKind::Revolute) => {
-            let turned = product(&link.rotation, &about(&link.axis, *at));
-            [xyz, roll_pitch_yaw(&turned)]
-        }
-        (Drive::Rest(at), JointKind::Prismatic) => {
-            let moved = turn(&link.rotation, &times(*at, &link.axis));
-            [add(&xyz, &moved), rpy]
-        }
-        _ => [xyz, rpy],
+    let (rotation, origin) = placed(link, drive);
+    let turned = matches!((drive, link.kind), (Drive::Rest(_), JointKind::Revolute));
+    match said.filter(|_| !turned) {
+        Some(s) => [origin, s.rpy.unwrap_or_default()],
+        None => [origin, roll_pitch_yaw(&rotation)],
     }
 }
 
-/// The joint before a link.
 fn joint(
     out: &mut String,
     model: &Model,
@@ -171,11 +161,9 @@ fn joint(
     }
     match drive {
         Drive::Joint(j) => {
-            if let Some([damping, friction]) = dissipative(model, j) {
-                let _ = writeln!(
-                    out,
-                    "    <dynamics damping=\"{damping:?}\" friction=\"{friction:?}\"/>"
-                );
+            if let law @ JointFriction::ViscousCoulomb(_) = &model.friction[j] {
+                let loss = damping_and_friction(law).map(|x| x.max(0.0));
+                let _ = writeln!(out, "    {}", dynamics(loss));
             }
         }
         Drive::Mimic(joint, factor, offset) => {
@@ -216,24 +204,15 @@ fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<
             moment: size,
         });
     }
-    let body = Body::of(&values);
-    let keys = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
-    let inertia: Vec<String> = keys
-        .iter()
-        .zip(body.inertia)
-        .map(|(k, x)| format!("{k}=\"{x:?}\""))
-        .collect();
     let _ = write!(
         out,
         "  <!-- about the origin of the link: determined {}; only in sums with others {}; not at all {} -->\n  \
-         <link name=\"{}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      \
-         <mass value=\"{m:?}\"/>\n      <inertia {}/>\n    </inertial>\n  </link>\n",
+         <link name=\"{}\">\n    {}\n  </link>\n",
         of(Identifiability::Alone),
         of(Identifiability::InSum),
         of(Identifiability::Nothing),
         quoted(&link.name),
-        words(&body.centre),
-        inertia.join(" ")
+        inertial(&Body::of(&values))
     );
     Ok(())
 }
@@ -255,12 +234,8 @@ fn side_file(
     side.covariance = None;
     side.estimate_covariance = None;
     // base parameters come out of the URDF; what the drives add to them stands here
-    let base: Vec<&str> = robot
-        .parameters()
-        .iter()
-        .take(robot.groupings().len())
-        .map(|p| &*p.name)
-        .collect();
+    let base = robot.parameters().iter().take(robot.groupings().len());
+    let base: Vec<&str> = base.map(|p| &*p.name).collect();
     side.parameters
         .retain(|p| p.joint.is_some() || !base.contains(&p.name.as_str()));
     let first = robot.tree().links().len() * STANDARD;
@@ -277,14 +252,10 @@ fn side_file(
             verdict: None,
         });
     }
-    let mut text = String::new();
-    for line in notes {
-        let _ = writeln!(text, "{}", format!("# {line}").trim_end());
-    }
-    text.push_str(
-        "# What the URDF cannot hold: drive inertias, couplings, friction, offsets. A model file: give\n\
-         # it as -m; links and inertials are read from the URDF beside it.\n\n",
-    );
-    text.push_str(&side.sections()?);
-    Ok(text)
+    Ok(format!(
+        "{}# What the URDF cannot hold: drive inertias, couplings, friction, offsets. A model file: give\n\
+         # it as -m; links and inertials are read from the URDF beside it.\n\n{}",
+        hashed(notes),
+        side.sections()?
+    ))
 }

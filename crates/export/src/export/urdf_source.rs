@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::arm::{Arm, ArmJoint, ArmLink, OwnJoint};
+use super::arm::{Arm, ArmJoint, ArmLink};
 use super::error::ExportError;
-use super::prepared::words;
+use super::prepared::{dynamics, inertial, words};
 use cft_ident_core::robot::tree::{Coordinate, Link};
 use cft_ident_files::config::{RobotFile, UrdfReplacement};
 
@@ -72,12 +72,13 @@ pub fn replacement(
         }
         found.push(at);
         let name = &links[at].name;
-        out.inertials.insert(name.clone(), inertial(link));
+        out.inertials.insert(name.clone(), inertial(&link.body));
         let frames = source.robot.frame.iter();
         let lumped = frames.filter(|frame| frame.link == *name);
         out.bare.extend(lumped.map(|frame| frame.name.clone()));
         if let (ArmJoint::Own(joint), Coordinate::Joint(j)) = (&link.joint, &links[at].coordinate) {
-            out.dynamics.insert(joints[*j].clone(), dynamics(joint));
+            let dynamics = dynamics([joint.damping, joint.friction]);
+            out.dynamics.insert(joints[*j].clone(), dynamics);
         }
     }
     let inertials: BTreeSet<&String> = out.inertials.keys().collect();
@@ -111,27 +112,4 @@ fn difference(link: &ArmLink, there: &Link, parent: Option<usize>) -> Option<Str
         let [a, b] = [words(&there.axis), words(&link.axis)];
         format!("its axis is {a} and not {b}")
     })
-}
-
-fn inertial(link: &ArmLink) -> String {
-    let body = &link.body;
-    let keys = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].into_iter();
-    let inertia: Vec<String> = keys
-        .zip(body.inertia)
-        .map(|(key, x)| format!("{key}=\"{x:?}\""))
-        .collect();
-    format!(
-        "<inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{:?}\"/>\n      \
-         <inertia {}/>\n    </inertial>",
-        words(&body.centre),
-        body.mass,
-        inertia.join(" ")
-    )
-}
-
-fn dynamics(joint: &OwnJoint) -> String {
-    format!(
-        "<dynamics damping=\"{:?}\" friction=\"{:?}\"/>",
-        joint.damping, joint.friction
-    )
 }

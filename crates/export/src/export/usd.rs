@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::arm::{Arm, ArmJoint, ArmLink, OwnJoint, Says, principal, quaternion, z_to};
+use super::prepared::hashed;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::{Rotation, UNTURNED, Vector, add, product, turn};
 
@@ -49,9 +50,7 @@ pub fn usd(arm: &Arm, notes: &[String]) -> String {
     out.push_str(
         "(\n    defaultPrim = \"identified\"\n    metersPerUnit = 1\n    kilogramsPerUnit = 1\n    upAxis = \"Z\"\n)\n\n",
     );
-    for line in notes {
-        let _ = writeln!(out, "{}", format!("# {line}").trim_end());
-    }
+    out += &hashed(notes);
     let mut prims = Prims(BTreeSet::new());
     let scene = prims.name("scene");
     let root = prims.name(&arm.root);

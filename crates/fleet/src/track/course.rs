@@ -1,8 +1,8 @@
 //! One parameter of one robot over its logs.
 
 use super::changes::{ChangeKind, ParameterChange, least_seen, seek};
-use super::local_level::{Variances, smooth};
-use super::together::{About, Member};
+use super::local_level::smooth;
+use super::together::{About, Signal};
 use super::walk::{Sizes, median};
 
 /// What one log says of a parameter.
@@ -63,15 +63,8 @@ pub fn follow_together(
     let times: Vec<f64> = first.iter().map(|e| e.time).collect();
     let spacings = spacings(&times);
     let signals: Vec<Signal> = parameters.iter().map(|own| Signal::of(own)).collect();
-    let members: Vec<Member> = (signals.iter())
-        .map(|own| Member {
-            signal: &own.values,
-            estimate: &own.variances,
-            alone: &own.outliers,
-        })
-        .collect();
     let about = About {
-        members: &members,
+        members: &signals,
         spacings: &spacings,
         times: &times,
         correlation,
@@ -95,24 +88,15 @@ pub fn follow_together(
     .collect()
 }
 
-/// Estimates of one parameter, as they are followed.
-struct Signal {
-    values: Vec<f64>,
-    /// Infinite where a log says nothing, or stands alone.
-    variances: Vec<f64>,
-    outliers: Vec<usize>,
-}
-
 impl Signal {
     fn of(estimates: &[LogEstimate]) -> Self {
         let known =
             |e: &LogEstimate| e.variance.is_finite() && e.variance > 0.0 && e.value.is_finite();
-        let mut variances: Vec<f64> = (estimates.iter())
-            .map(|e| if known(e) { e.variance } else { f64::INFINITY })
-            .collect();
-        let values: Vec<f64> = (estimates.iter())
-            .map(|e| if known(e) { e.value } else { 0.0 })
-            .collect();
+        let pair = |e: &LogEstimate| match known(e) {
+            true => (e.value, e.variance),
+            false => (0.0, f64::INFINITY),
+        };
+        let (values, mut variances): (Vec<f64>, Vec<f64>) = estimates.iter().map(pair).unzip();
         let outliers = alone(&values, &variances);
         for k in &outliers {
             variances[*k] = f64::INFINITY;
@@ -126,7 +110,7 @@ impl Signal {
 
     /// Its course with these changes.
     fn course(&self, sizes: &Sizes, spacings: &[f64], changes: Vec<ParameterChange>) -> Course {
-        let mut all: Variances = sizes.variances(&self.variances, spacings);
+        let mut all = sizes.variances(&self.variances, spacings);
         for change in &changes {
             match change.kind {
                 ChangeKind::Step => all.walk[change.at] += FORGETTING * change.size * change.size,
@@ -134,19 +118,12 @@ impl Signal {
                 ChangeKind::Ramp => {
                     let logs = (self.values.len() - change.at).max(1) as f64;
                     let slope = change.size / logs;
-                    all.walk[change.at..]
-                        .iter_mut()
-                        .for_each(|q| *q += slope * slope);
+                    let walks = all.walk[change.at..].iter_mut();
+                    walks.for_each(|q| *q += slope * slope);
                 }
             }
         }
-        let mut rest = self.values.clone();
-        for (y, r) in rest.iter_mut().zip(&all.estimate) {
-            if !r.is_finite() {
-                *y = 0.0;
-            }
-        }
-        let (values, variance) = smooth(&rest, &all);
+        let (values, variance) = smooth(&self.determined(&self.values), &all);
         Course {
             values,
             std: variance.into_iter().map(f64::sqrt).collect(),
@@ -163,15 +140,12 @@ impl Signal {
 fn spacings(times: &[f64]) -> Vec<f64> {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let usual = median(steps().filter(|s| *s > 0.0)).unwrap_or(1.0);
-    let spacing = |s: f64| (s / usual).clamp(0.0, 100.0);
-    std::iter::once(1.0)
-        .chain(steps().map(spacing))
-        .take(times.len())
-        .collect()
+    let spacings = steps().map(|s| (s / usual).clamp(0.0, 100.0));
+    let all = std::iter::once(1.0).chain(spacings);
+    all.take(times.len()).collect()
 }
 
-/// Estimates that stand alone: far from the median of those before them and of those after them. So is a log in which the robot carried
-/// something; a change is one when as many logs show it as do not.
+/// Estimates far from the median of those before them and of those after: so is a log in which the robot carried something.
 fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
     let known: Vec<usize> = (0..signal.len())
         .filter(|k| variances[*k].is_finite())
@@ -193,8 +167,8 @@ fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
         match place - from < 2 || to - place < 3 {
             true => x - middle(from..to, place),
             false => {
-                let sides = [from..place, place + 1..to].map(|side| x - middle(side, place));
-                let [before, after] = sides;
+                let [before, after] =
+                    [from..place, place + 1..to].map(|side| x - middle(side, place));
                 if before.abs() < after.abs() {
                     before
                 } else {
@@ -211,10 +185,8 @@ fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
         let std = (1.4826 * scale).max(variances[known[place]].sqrt());
         off[place].abs() > OUTLIER_DEVIATIONS * std
     };
-    (0..known.len())
-        .filter(|p| far(*p))
-        .map(|p| known[p])
-        .collect()
+    let alone = (0..known.len()).filter(|place| far(*place));
+    alone.map(|place| known[place]).collect()
 }
 
 #[cfg(test)]
@@ -253,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_step_that_is_seen_is_told_in_about_one_course_of_two() {
+    fn the_least_step_that_is_seen_is_reported_in_about_one_course_of_two() {
         let (mut known, mut sizes) = ([0; 3], Vec::new());
         for seed in 0..60 {
             let least = follow(&course(seed, |_| 0.0), 1e-3).least_seen.unwrap();
@@ -267,17 +239,15 @@ mod tests {
         // comes by chance at 1e-3 among 78 places and kinds
         sizes.sort_by(f64::total_cmp);
         assert!((0.3..0.5).contains(&sizes[30]), "{sizes:?}");
-        assert!(
-            known[0] <= 6 && (18..=45).contains(&known[1]) && known[2] >= 54,
-            "{known:?}"
-        );
+        let half = (18..=45).contains(&known[1]);
+        assert!(known[0] <= 6 && half && known[2] >= 54, "{known:?}");
         let few = course(0, |_| 0.0);
         assert_eq!(follow(&few[..11], 1e-3).least_seen, None);
         assert!(follow(&few[..12], 1e-3).least_seen.is_some());
     }
 
     #[test]
-    fn a_ramp_is_told_from_a_step() {
+    fn a_ramp_is_no_step() {
         let mut found = 0;
         for seed in 0..20 {
             let ramp = |k: usize| if k < 20 { 0.0 } else { 0.2 * (k as f64 - 19.0) };
@@ -360,16 +330,13 @@ mod tests {
             };
             let found = follow(&course(seed, again)[..38], 1e-4);
             assert!(found.changes.is_empty(), "{seed}: {:?}", found.changes);
-            let first = follow(
-                &course(seed, |k| if k < 31 { 0.0 } else { 4.0 })[..38],
-                1e-4,
-            );
-            assert_eq!(first.changes.len(), 1, "{seed}");
+            let stays = course(seed, |k| if k < 31 { 0.0 } else { 4.0 });
+            assert_eq!(follow(&stays[..38], 1e-4).changes.len(), 1, "{seed}");
         }
     }
 
     #[test]
-    fn bands_cover_and_logs_that_tell_nothing_are_bridged() {
+    fn bands_cover_and_logs_that_say_nothing_are_bridged() {
         let (mut inside, mut all) = (0, 0);
         for seed in 0..40 {
             let mut estimates = course(seed, |_| 0.0);

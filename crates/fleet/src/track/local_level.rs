@@ -15,8 +15,6 @@ pub(super) struct Variances {
 /// Gains and variances of the innovations, which depend on the variances alone.
 #[derive(Debug, Clone)]
 pub(super) struct Whitener {
-    /// Kalman gain and standard deviation of each innovation; none where an estimate says nothing or starts the
-    /// filter.
     steps: Vec<Step>,
 }
 
@@ -57,8 +55,7 @@ impl Whitener {
         }
     }
 
-    /// Innovations of a signal over their deviations, log by log: uncorrelated and of variance 1 for the model's own; 0
-    /// where there is none. The level is not in them.
+    /// Innovations of a signal over their deviations, log by log; 0 where there is none. The level is not in them.
     pub(super) fn apply(&self, signal: &[f64]) -> Vec<f64> {
         let (mut level, mut out) = (0.0, Vec::with_capacity(signal.len()));
         for (step, y) in self.steps.iter().zip(signal) {
@@ -160,22 +157,22 @@ mod tests {
 
     const SIGNAL: [f64; 5] = [1.0, 2.5, 0.0, 2.0, 4.0];
 
-    /// Covariance of the estimates that say something, about an unknown level at the first.
-    fn dense() -> (DMatrix<f64>, DVector<f64>) {
-        let v = variances();
-        let known = [0, 1, 3, 4];
-        let walked = |k: usize| v.walk[1..=k].iter().sum::<f64>();
+    /// Inverse covariance of the estimates that say something, by the walk that two have in common, and these estimates.
+    fn dense(walked: impl Fn(usize, usize) -> f64) -> (DMatrix<f64>, DVector<f64>) {
+        let (estimate, known) = (variances().estimate, [0, 1, 3, 4]);
         let covariance = DMatrix::from_fn(4, 4, |a, b| {
             let (i, j) = (known[a], known[b]);
-            walked(i.min(j)) + if a == b { v.estimate[i] } else { 0.0 }
+            walked(i, j) + if a == b { estimate[i] } else { 0.0 }
         });
-        (covariance, DVector::from_fn(4, |a, _| SIGNAL[known[a]]))
+        let inverse = covariance.try_inverse().unwrap();
+        (inverse, DVector::from_fn(4, |a, _| SIGNAL[known[a]]))
     }
 
     #[test]
     fn whitened_innovations_have_the_square_of_generalised_least_squares() {
-        let (v, y) = dense();
-        let inverse = v.try_inverse().unwrap();
+        // about an unknown level at the first place
+        let v = variances();
+        let (inverse, y) = dense(|i, j| v.walk[1..=i.min(j)].iter().sum());
         let one = DVector::from_element(4, 1.0);
         let level = (one.dot(&(&inverse * &y))) / one.dot(&(&inverse * &one));
         let e = &y - &one * level;
@@ -194,15 +191,8 @@ mod tests {
         // the level at the last place: walks counted back from there
         let (level, variance) = smooth(&SIGNAL, &variances());
         let v = variances();
-        let known = [0, 1, 3, 4];
-        let walked = |k: usize| v.walk[k + 1..].iter().sum::<f64>();
-        let covariance = DMatrix::from_fn(4, 4, |a, b| {
-            let (i, j) = (known[a], known[b]);
-            walked(i.max(j)) + if a == b { v.estimate[i] } else { 0.0 }
-        });
-        let inverse = covariance.try_inverse().unwrap();
+        let (inverse, y) = dense(|i, j| v.walk[i.max(j) + 1..].iter().sum());
         let one = DVector::from_element(4, 1.0);
-        let y = DVector::from_fn(4, |a, _| SIGNAL[known[a]]);
         let certainty = one.dot(&(&inverse * &one));
         assert!((variance[4] * certainty - 1.0).abs() < 1e-12);
         assert!((level[4] - one.dot(&(&inverse * &y)) / certainty).abs() < 1e-12);

@@ -5,20 +5,20 @@ use nalgebra::DMatrix;
 use super::local_level::Whitener;
 use super::walk::{Sizes, median};
 
-/// One parameter of those that are followed together.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Member<'a> {
-    pub signal: &'a [f64],
-    /// Variances of the estimates; infinite where a log says nothing, or stands alone.
-    pub estimate: &'a [f64],
+/// Estimates of one parameter of those that are followed together.
+#[derive(Debug)]
+pub(super) struct Signal {
+    pub values: Vec<f64>,
+    /// Infinite where a log says nothing, or stands alone.
+    pub variances: Vec<f64>,
     /// Logs that stand alone.
-    pub alone: &'a [usize],
+    pub outliers: Vec<usize>,
 }
 
-impl Member<'_> {
-    /// A signal of this course with 0 where no log determines it.
-    pub(super) fn determined(&self, signal: &[f64]) -> Vec<f64> {
-        let pairs = signal.iter().zip(self.estimate);
+impl Signal {
+    /// Values of this course with 0 where no log determines it.
+    pub(super) fn determined(&self, values: &[f64]) -> Vec<f64> {
+        let pairs = values.iter().zip(&self.variances);
         pairs
             .map(|(x, r)| if r.is_finite() { *x } else { 0.0 })
             .collect()
@@ -28,7 +28,7 @@ impl Member<'_> {
 /// What is known of courses.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct About<'a> {
-    pub members: &'a [Member<'a>],
+    pub members: &'a [Signal],
     /// Spacings of the logs over the usual one.
     pub spacings: &'a [f64],
     pub times: &'a [f64],
@@ -36,11 +36,22 @@ pub(super) struct About<'a> {
     pub correlation: Option<&'a [f64]>,
 }
 
+/// What is estimated of each parameter besides the changes: level, walk and scatter.
+const OTHERS: usize = 3;
+
 impl About<'_> {
-    /// Number of estimates that say something.
-    pub(super) fn determined(&self) -> usize {
-        let all = self.members.iter().flat_map(|member| member.estimate);
-        all.filter(|r| r.is_finite()).count()
+    /// Estimates that say something, less what is estimated from them with so many changes.
+    pub(super) fn freedom(&self, changes: usize) -> usize {
+        let all = self.members.iter().flat_map(|member| &member.variances);
+        let shown = all.filter(|r| r.is_finite()).count();
+        shown.saturating_sub(self.members.len() * (OTHERS + changes))
+    }
+
+    /// Logs that say something.
+    pub(super) fn shown(&self) -> Vec<usize> {
+        (0..self.times.len())
+            .filter(|k| self.members.iter().any(|m| m.variances[*k].is_finite()))
+            .collect()
     }
 }
 
@@ -65,7 +76,7 @@ impl<'a> White<'a> {
     pub(super) fn new(about: About<'a>, sizes: &[Sizes], rests: &[Vec<f64>]) -> Self {
         let members = about.members.iter().zip(sizes);
         let whiteners: Vec<Whitener> = members
-            .map(|(m, own)| Whitener::new(&own.variances(m.estimate, about.spacings)))
+            .map(|(m, own)| Whitener::new(&own.variances(&m.variances, about.spacings)))
             .collect();
         let correlation = match whiteners.len() {
             1 => DMatrix::identity(1, 1),
@@ -93,7 +104,7 @@ impl<'a> White<'a> {
     /// All courses' signals, white, one after the other log by log.
     pub(super) fn signals(&self) -> Vec<f64> {
         let pairs = self.whiteners.iter().zip(self.about.members);
-        let apart: Vec<Vec<f64>> = pairs.map(|(own, m)| own.apply(m.signal)).collect();
+        let apart: Vec<Vec<f64>> = pairs.map(|(own, m)| own.apply(&m.values)).collect();
         self.mixed(&apart)
     }
 

@@ -3,11 +3,10 @@
 use super::local_level::{Variances, Whitener};
 
 /// Sizes of the walk and of the scatter that are tried, as variances over the median variance of an estimate.
-const TRIED: [f64; 9] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+pub(super) const TRIED: [f64; 9] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 /// Degrees of freedom of the innovations: a step and a log with a payload are no walk.
 const FREEDOM: f64 = 4.0;
 
-/// Sizes of both.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Sizes {
     /// Variance of the walk over a usual time between two logs.
@@ -38,30 +37,16 @@ pub(super) fn median(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     }
 }
 
-/// Sizes, and how unlikely the innovations are under them: half of minus twice the logarithm of their likelihood, but
-/// for a constant.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Likeliest {
-    pub sizes: Sizes,
-    pub cost: f64,
-}
-
-/// The sizes under which the innovations are likeliest, by Student's law with 4 degrees of freedom: what moves once
-/// is sought as a change, and must not pass for a walk (Lange, Little and Taylor 1989).
-pub(super) fn sizes(signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Likeliest {
-    among(&TRIED, signal, estimate, spacings)
-}
-
-/// The same of a parameter that does not walk.
-pub(super) fn still(signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Likeliest {
-    among(&TRIED[..1], signal, estimate, spacings)
-}
-
-fn among(walks: &[f64], signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Likeliest {
-    let mut best = Likeliest {
-        sizes: Sizes::default(),
-        cost: f64::INFINITY,
-    };
+/// The sizes under which the innovations are likeliest, by Student's law with 4 degrees of freedom: what moves once is
+/// sought as a change, and must not pass for a walk (Lange, Little and Taylor 1989). With them how unlikely they are:
+/// half of minus twice the logarithm of the likelihood, but for a constant. `walks` are tried as [`TRIED`] are.
+pub(super) fn sizes(
+    walks: &[f64],
+    signal: &[f64],
+    estimate: &[f64],
+    spacings: &[f64],
+) -> (Sizes, f64) {
+    let mut best = (Sizes::default(), f64::INFINITY);
     let Some(unit) = median(estimate.iter().copied()) else {
         return best;
     };
@@ -75,8 +60,8 @@ fn among(walks: &[f64], signal: &[f64], estimate: &[f64], spacings: &[f64]) -> L
             let unlikely = |x: f64| 0.5 * (FREEDOM + 1.0) * (1.0 + x * x / (FREEDOM - 2.0)).ln();
             let innovations = whitener.apply(signal).into_iter();
             let cost = whitener.log_std() + innovations.map(unlikely).sum::<f64>();
-            if cost < best.cost - 1e-9 {
-                best = Likeliest { sizes, cost };
+            if cost < best.1 - 1e-9 {
+                best = (sizes, cost);
             }
         }
     }
@@ -90,7 +75,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn walk_and_scatter_are_told_apart() {
+    fn walk_and_scatter_are_not_confused() {
         let mut chance = ChaCha8Rng::seed_from_u64(5);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
         let n = 200;
@@ -102,9 +87,9 @@ mod tests {
             scattered.push(3.0 * draw());
             walked.push(level + draw());
         }
-        let found = sizes(&scattered, &estimate, &spacings).sizes;
+        let (found, _) = sizes(&TRIED, &scattered, &estimate, &spacings);
         assert!(found.scatter >= 3.0 && found.walk <= 0.1, "{found:?}");
-        let found = sizes(&walked, &estimate, &spacings).sizes;
+        let (found, _) = sizes(&TRIED, &walked, &estimate, &spacings);
         assert!(found.walk >= 0.3 && found.scatter <= 1.0, "{found:?}");
     }
 }

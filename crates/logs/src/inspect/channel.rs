@@ -62,59 +62,24 @@ pub fn is_time(name: &str) -> bool {
         .find_map(|unit| base.strip_suffix(unit))
         .unwrap_or(base);
     let base = base.trim_start_matches(['_', '%', '/', '.']);
-    matches!(
-        base,
-        "t" | "time"
-            | "timestamp"
-            | "time_stamp"
-            | "stamp"
-            | "times"
-            | "sec"
-            | "secs"
-            | "seconds"
-            | "elapsed"
-            | "elapsed_time"
-            | "rosbagtimestamp"
-            | "ipoc"
-            | "zeit"
-            | "clock"
-            | "simtime"
-            | "sim_time"
-            | "rostime"
-            | "header.stamp"
-            | "field.header.stamp"
-    )
+    words::lists(TIMES, base)
 }
 
+/// Names of times.
+const TIMES: &str = "\
+    t time timestamp time_stamp stamp times sec secs seconds elapsed elapsed_time rosbagtimestamp ipoc \
+    zeit clock simtime sim_time rostime header.stamp field.header.stamp";
+
 /// Words that stand for a role where a name begins with one, the longer before the shorter.
-const WORDS: [(&str, ChannelRole); 27] = [
-    ("acceleration", ChannelRole::Acceleration),
-    ("accel", ChannelRole::Acceleration),
-    ("acc", ChannelRole::Acceleration),
-    ("ddq", ChannelRole::Acceleration),
-    ("qdd", ChannelRole::Acceleration),
-    ("velocity", ChannelRole::Velocity),
-    ("speed", ChannelRole::Velocity),
-    ("vel", ChannelRole::Velocity),
-    ("omega", ChannelRole::Velocity),
-    ("dq", ChannelRole::Velocity),
-    ("qd", ChannelRole::Velocity),
-    ("position", ChannelRole::Position),
-    ("angle", ChannelRole::Position),
-    ("pos", ChannelRole::Position),
-    ("x_c", ChannelRole::Position),
-    ("q", ChannelRole::Position),
-    ("torque", ChannelRole::Torque),
-    ("effort", ChannelRole::Torque),
-    ("force", ChannelRole::Torque),
-    ("current", ChannelRole::Torque),
-    ("voltage", ChannelRole::Torque),
-    ("tau", ChannelRole::Torque),
-    ("iq", ChannelRole::Torque),
-    ("u", ChannelRole::Torque),
-    ("i", ChannelRole::Torque),
-    ("f", ChannelRole::Torque),
-    ("v", ChannelRole::Velocity),
+const WORDS: [(ChannelRole, &str); 5] = [
+    (ChannelRole::Acceleration, "acceleration accel acc ddq qdd"),
+    (ChannelRole::Velocity, "velocity speed vel omega dq qd"),
+    (ChannelRole::Position, "position angle pos x_c q"),
+    (
+        ChannelRole::Torque,
+        "torque effort force current voltage tau iq u i f",
+    ),
+    (ChannelRole::Velocity, "v"),
 ];
 
 /// Role and joint by the name of a column: `q_elbow`, `dq1`, `position[elbow]`, `Reference Velocity`.
@@ -130,12 +95,14 @@ fn guess(name: &str) -> (ChannelRole, Option<String>) {
         return (ChannelRole::Command, None);
     }
     let shown = words::role(&spoken);
-    let of_words = || {
-        let joint = shown.filter(|role| *role != ChannelRole::Other);
-        let joint = joint.map(|_| words::joint(&spoken));
-        (shown.unwrap_or(ChannelRole::Other), joint)
-    };
-    for (word, role) in WORDS {
+    // `position_error` and `q_dot` are what their other words say
+    let contract = ["q_", "dq_", "ddq_", "tau_"];
+    let contract = contract.iter().any(|prefix| base.starts_with(prefix));
+    let listed = WORDS.iter().flat_map(|(role, words)| {
+        let each = words.split_whitespace();
+        each.map(move |word| (word, *role))
+    });
+    for (word, role) in listed {
         let Some(rest) = base.strip_prefix(word) else {
             continue;
         };
@@ -144,18 +111,15 @@ fn guess(name: &str) -> (ChannelRole, Option<String>) {
         let ends = rest.is_empty() || rest.starts_with(|c: char| !c.is_alphabetic());
         // One letter alone means too much to be believed.
         let numbered = !rest.is_empty() || word.len() > 1;
-        // `position_error` and `q_dot` are what their other words say
-        let contract = ["q_", "dq_", "ddq_", "tau_"]
-            .iter()
-            .any(|p| base.starts_with(p));
         let agrees =
             shown.is_none_or(|shown| shown == role || (shown == ChannelRole::Other && contract));
         if ends && numbered && agrees {
-            let joint = (!joint.is_empty()).then(|| joint.to_owned());
-            return (role, Some(joint.unwrap_or_default()));
+            return (role, Some(joint.to_owned()));
         }
     }
-    of_words()
+    let role = shown.unwrap_or(ChannelRole::Other);
+    let joint = (role != ChannelRole::Other).then(|| words::joint(&spoken));
+    (role, joint)
 }
 
 #[cfg(test)]
@@ -164,45 +128,46 @@ mod tests {
 
     #[test]
     fn the_names_of_the_contract_and_of_measured_logs_are_understood() {
+        use ChannelRole::*;
         for (name, role, joint) in [
-            ("q_q1", ChannelRole::Position, Some("q1")),
-            ("dq_q1", ChannelRole::Velocity, Some("q1")),
-            ("ddq_elbow", ChannelRole::Acceleration, Some("elbow")),
-            ("tau_q5", ChannelRole::Torque, Some("q5")),
-            ("x_c3", ChannelRole::Position, Some("3")),
-            ("u_3", ChannelRole::Torque, Some("3")),
-            ("q1", ChannelRole::Position, Some("1")),
-            ("dq7", ChannelRole::Velocity, Some("7")),
-            ("tau7", ChannelRole::Torque, Some("7")),
-            ("u1", ChannelRole::Torque, Some("1")),
-            ("q_ref1", ChannelRole::Command, None),
-            ("Reference Velocity", ChannelRole::Command, None),
-            ("Position", ChannelRole::Position, Some("")),
-            ("Velocity", ChannelRole::Velocity, Some("")),
-            ("Iq", ChannelRole::Torque, Some("")),
+            ("q_q1", Position, Some("q1")),
+            ("dq_q1", Velocity, Some("q1")),
+            ("ddq_elbow", Acceleration, Some("elbow")),
+            ("tau_q5", Torque, Some("q5")),
+            ("x_c3", Position, Some("3")),
+            ("u_3", Torque, Some("3")),
+            ("q1", Position, Some("1")),
+            ("dq7", Velocity, Some("7")),
+            ("tau7", Torque, Some("7")),
+            ("u1", Torque, Some("1")),
+            ("q_ref1", Command, None),
+            ("Reference Velocity", Command, None),
+            ("Position", Position, Some("")),
+            ("Velocity", Velocity, Some("")),
+            ("Iq", Torque, Some("")),
             (
                 "position[shoulder_pan_joint]",
-                ChannelRole::Position,
+                Position,
                 Some("shoulder_pan_joint"),
             ),
-            ("effort[0]", ChannelRole::Torque, Some("0")),
-            ("q1 [deg]", ChannelRole::Position, Some("1")),
-            ("Function Activated", ChannelRole::Other, None),
-            ("status_1", ChannelRole::Other, None),
-            ("quality", ChannelRole::Other, None),
-            ("pulses", ChannelRole::Other, None),
-            ("temperature", ChannelRole::Other, None),
-            ("positions_0", ChannelRole::Position, Some("0")),
-            ("actual_qd_3", ChannelRole::Velocity, Some("3")),
-            ("joint_1_position", ChannelRole::Position, Some("joint_1")),
-            ("act_torque_abs_nm_1", ChannelRole::Torque, Some("abs_1")),
-            ("position_error_1", ChannelRole::Other, None),
-            ("q_dot_1", ChannelRole::Velocity, Some("1")),
-            ("v", ChannelRole::Other, None),
+            ("effort[0]", Torque, Some("0")),
+            ("q1 [deg]", Position, Some("1")),
+            ("Function Activated", Other, None),
+            ("status_1", Other, None),
+            ("quality", Other, None),
+            ("pulses", Other, None),
+            ("temperature", Other, None),
+            ("positions_0", Position, Some("0")),
+            ("actual_qd_3", Velocity, Some("3")),
+            ("joint_1_position", Position, Some("joint_1")),
+            ("act_torque_abs_nm_1", Torque, Some("abs_1")),
+            ("position_error_1", Other, None),
+            ("q_dot_1", Velocity, Some("1")),
+            ("v", Other, None),
         ] {
-            let found = InspectedChannel::guessed(name);
+            let (found_role, found_joint) = guess(name);
             assert_eq!(
-                (found.role, found.joint.as_deref()),
+                (found_role, found_joint.as_deref()),
                 (role, joint),
                 "{name}"
             );

@@ -1,48 +1,37 @@
 //! Faults as they are reported: of a whole channel, or of stretches of it.
 
 use super::fault::{Episodes, FaultKind, LogFault, Severity};
+use super::findings::Findings;
 use super::judge::Track;
 use crate::log::RowFault;
 use cft_ident_core::number::clock;
 
 /// Faults under construction, and what is to be cut out.
+#[derive(Default)]
 pub(super) struct FaultList {
-    pub(super) faults: Vec<LogFault>,
+    /// What is found so far.
+    pub(super) found: Findings,
     /// Rows to leave out: from, to [s], and why.
     pub(super) cuts: Vec<([f64; 2], FaultKind)>,
-    /// Numbers to put in the place of spikes: time [s], place of the channel, number.
-    pub(super) bridges: Vec<(f64, usize, f64)>,
-    /// Times of rows that were not read [s].
-    pub(super) failed: Vec<f64>,
-    /// Positions that begin anew, by their places, and their ranges.
-    pub(super) wraps: Vec<(usize, f64)>,
-    /// Torques that are exactly 0 in motion, by their places: from, to [s].
-    pub(super) off: Vec<(usize, [f64; 2])>,
     /// Stretches in which everything is frozen [s].
     pub(super) stalls: Vec<[f64; 2]>,
-    /// Rows for which each sample was held.
-    pub(super) held: Option<usize>,
     /// Kinds that are reported but not acted upon.
-    pub(super) keep: Vec<RowFault>,
+    keep: Vec<RowFault>,
     first: f64,
     last: f64,
 }
+
+/// How much a fault matters, what is wrong, and the channel where it is one's.
+pub(super) type Fault<'a> = (Severity, FaultKind, Option<&'a Track>);
 
 impl FaultList {
     /// No faults yet, of a log from `first` to `last` [s].
     pub(super) fn new(first: f64, last: f64, keep: &[RowFault]) -> Self {
         Self {
-            faults: Vec::new(),
-            cuts: Vec::new(),
-            bridges: Vec::new(),
-            failed: Vec::new(),
-            wraps: Vec::new(),
-            off: Vec::new(),
-            stalls: Vec::new(),
-            held: None,
             keep: keep.to_vec(),
             first,
             last,
+            ..Self::default()
         }
     }
 
@@ -55,67 +44,62 @@ impl FaultList {
         effect: String,
         remedy: &str,
     ) {
-        self.of_log(severity, kind, track.rows, effect, remedy);
-        if let Some(fault) = self.faults.last_mut() {
-            fault.channel = Some(track.channel.name.clone());
-        }
+        self.of_log((severity, kind, Some(track)), track.rows, effect, remedy);
     }
 
-    /// Adds a fault of all channels all through the log.
-    pub(super) fn of_log(
-        &mut self,
-        severity: Severity,
-        kind: FaultKind,
-        rows: u64,
-        effect: String,
-        remedy: &str,
-    ) {
-        let duration_s = self.last - self.first;
-        self.faults.push(LogFault {
+    /// Adds a fault of so many rows all through the log.
+    pub(super) fn of_log(&mut self, fault: Fault, rows: u64, effect: String, remedy: &str) {
+        let (severity, kind, track) = fault;
+        self.found.faults.push(LogFault {
+            channel: name(track).map(str::to_owned),
             rows,
-            ..LogFault::whole(severity, kind, duration_s, effect, remedy)
+            ..LogFault::whole(severity, kind, self.last - self.first, effect, remedy)
         });
     }
 
-    /// Adds a fault for each stretch, or one for all of them where they are many; `effect` is
-    /// given the rows and the number of stretches.
+    /// Adds a fault for each stretch, or one for all of them where they are many; `effect` follows the number of rows.
+    pub(super) fn rows(&mut self, fault: Fault, episodes: &Episodes, effect: &str, remedy: &str) {
+        let effect = |rows: u64, times: usize| format!("{} {effect}", rows_text(rows, times));
+        self.stretches(fault, episodes, &effect, remedy);
+    }
+
+    /// The same where `effect` is made of the rows and the number of stretches; gives what was added.
     pub(super) fn stretches(
         &mut self,
-        kind: FaultKind,
-        severity: Severity,
-        channel: Option<&str>,
+        (severity, kind, track): Fault,
         episodes: &Episodes,
         effect: &dyn Fn(u64, usize) -> String,
         remedy: &str,
-    ) {
-        for (episode, count) in episodes.merged() {
+    ) -> &mut [LogFault] {
+        let before = self.found.faults.len();
+        let first = self.first;
+        let each = episodes.merged().into_iter().map(|(episode, count)| {
             let effect = effect(episode.rows, count);
-            self.faults.push(LogFault {
-                channel: channel.map(str::to_owned),
-                from_s: episode.from - self.first,
+            LogFault {
+                channel: name(track).map(str::to_owned),
+                from_s: episode.from - first,
                 rows: episode.rows,
-                ..LogFault::whole(severity, kind, episode.to - self.first, effect, remedy)
-            });
-        }
+                ..LogFault::whole(severity, kind, episode.to - first, effect, remedy)
+            }
+        });
+        self.found.faults.extend(each);
+        &mut self.found.faults[before..]
     }
 
-    /// Leaves the rows of some stretches out, which were reported as this fault of this channel, unless
-    /// the robot file keeps them.
-    pub(super) fn cut(&mut self, kind: FaultKind, channel: Option<&str>, episodes: &Episodes) {
-        if self.acts(kind, channel) {
-            let spans = episodes.iter().map(|e| ([e.from, e.to], kind));
+    /// Leaves the rows of some stretches out, which were reported as this fault, unless the robot file keeps them.
+    pub(super) fn cut(&mut self, fault: Fault, episodes: &Episodes) {
+        if self.acts(fault) {
+            let spans = episodes.list.iter().map(|e| ([e.from, e.to], fault.1));
             self.cuts.extend(spans);
         }
     }
 
-    /// Marks what was reported as this fault of this channel as acted upon; false, and told so, where
-    /// the robot file keeps it.
-    pub(super) fn acts(&mut self, kind: FaultKind, channel: Option<&str>) -> bool {
+    /// Marks what was reported as this fault as acted upon; false, and it is said there, where the robot file keeps it.
+    pub(super) fn acts(&mut self, (_, kind, track): Fault) -> bool {
         let kept = kind.kept(&self.keep);
-        for fault in &mut self.faults {
-            if fault.kind != kind || fault.channel.as_deref() != channel {
-                continue;
-            }
+        let channel = name(track);
+        let same = |of: &&mut LogFault| of.kind == kind && of.channel.as_deref() == channel;
+        for fault in self.found.faults.iter_mut().filter(same) {
             if kept {
                 fault.severity = Severity::Info;
                 fault.remedy = format!(
@@ -134,6 +118,10 @@ impl FaultList {
         let near = |[from, to]: &[f64; 2]| from - reach <= t && t <= to + reach;
         self.stalls.iter().any(near)
     }
+}
+
+fn name(track: Option<&Track>) -> Option<&str> {
+    track.map(|track| track.channel.name.as_str())
 }
 
 /// `1 row`, `7 rows`, `7 rows in 3 stretches`.

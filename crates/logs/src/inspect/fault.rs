@@ -217,7 +217,7 @@ impl LogFault {
 /// Stretches of a log, in the order of time, few enough to be listed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Episodes {
-    list: Vec<FaultEpisode>,
+    pub(super) list: Vec<FaultEpisode>,
 }
 
 /// One stretch: times of its first and last row [s], and how many rows of it are concerned.
@@ -246,17 +246,8 @@ impl Episodes {
         }
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.list.is_empty()
-    }
-
-    /// Rows in all of them.
     pub(super) fn rows(&self) -> u64 {
         self.list.iter().map(|episode| episode.rows).sum()
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = &FaultEpisode> {
-        self.list.iter()
     }
 
     /// As they are reported: one by one, or all as one where there are many.
@@ -279,26 +270,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_stretches_are_joined_and_many_are_told_as_one() {
+    fn near_stretches_are_joined_and_many_are_reported_as_one() {
+        let first =
+            |found: &[(FaultEpisode, usize)]| (found[0].0.from, found[0].0.to, found[0].0.rows);
         let mut episodes = Episodes::default();
         episodes.add(1.0, 1.1, 2, 0.05);
         episodes.add(1.14, 1.2, 1, 0.05);
         episodes.add(2.0, 2.0, 1, 0.05);
         let found = episodes.merged();
-        assert_eq!(found.len(), 2);
-        assert_eq!(
-            (found[0].0.from, found[0].0.to, found[0].0.rows),
-            (1.0, 1.2, 3)
-        );
+        assert_eq!((found.len(), first(&found)), (2, (1.0, 1.2, 3)));
         for k in 0..20 {
             episodes.add(3.0 + f64::from(k), 3.5 + f64::from(k), 4, 0.0);
         }
         let found = episodes.merged();
         assert_eq!((found.len(), found[0].1), (1, 22));
-        assert_eq!(
-            (found[0].0.from, found[0].0.to, found[0].0.rows),
-            (1.0, 22.5, 84)
-        );
+        assert_eq!(first(&found), (1.0, 22.5, 84));
     }
 
     #[test]

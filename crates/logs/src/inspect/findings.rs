@@ -1,11 +1,14 @@
 //! What is known of a log in the end.
 
+use std::cmp::Reverse;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::detectors::excitation::JointMotion;
 use super::fault::{FaultKind, LogFault, Severity};
 use super::words::ChannelRole;
+use crate::log::Bridge;
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -62,14 +65,14 @@ fn together<T: Clone>(
     logs: &[(String, Findings)],
     list: impl Fn(&Findings) -> &[T],
 ) -> Vec<OfLog<T>> {
-    let of = |(log, findings): &(String, Findings)| {
-        let entry = |found: &T| OfLog {
+    let mut out = Vec::new();
+    for (log, findings) in logs {
+        out.extend(list(findings).iter().map(|found| OfLog {
             found: found.clone(),
             log: log.clone(),
-        };
-        list(findings).iter().map(entry).collect::<Vec<_>>()
-    };
-    logs.iter().flat_map(of).collect()
+        }));
+    }
+    out
 }
 
 /// A log as it was found.
@@ -101,10 +104,9 @@ pub struct Findings {
     /// Rows that a fit leaves out: first and last time [s], in order and apart.
     #[serde(skip)]
     pub cuts: Vec<[f64; 2]>,
-    /// Numbers that a fit puts in the place of spikes: time [s], place of the channel, number; in the
-    /// order of time.
+    /// Numbers that a fit puts in the place of spikes, in the order of time.
     #[serde(skip)]
-    pub bridges: Vec<(f64, usize, f64)>,
+    pub bridges: Vec<Bridge>,
     /// Times of the rows that a fit leaves out because nothing was read [s].
     #[serde(skip)]
     pub failed: Vec<f64>,
@@ -146,6 +148,11 @@ impl RowCost {
             RowFate::Bridged => " (bridged)",
         };
         format!("{} {}{fate}", self.rows, self.kind.word())
+    }
+
+    /// Brings costs into their order, the most first.
+    pub(super) fn sort(costs: &mut [Self]) {
+        costs.sort_by_key(|cost| (Reverse(cost.rows), cost.kind));
     }
 }
 
@@ -190,6 +197,18 @@ impl Findings {
         });
     }
 
+    /// Puts a fault of the whole log before the others.
+    pub(super) fn put_first(
+        &mut self,
+        (severity, kind): (Severity, FaultKind),
+        rows: u64,
+        effect: String,
+        remedy: &str,
+    ) {
+        let whole = LogFault::whole(severity, kind, self.duration_s, effect, remedy);
+        self.faults.insert(0, LogFault { rows, ..whole });
+    }
+
     /// Whether something hides the rest, so that a second look sees more ([`super::look_again`]).
     pub fn hides(&self) -> bool {
         !self.wraps.is_empty() || self.held.is_some()
@@ -211,9 +230,8 @@ impl Findings {
 
     /// The faults of one severity.
     pub fn of(&self, severity: Severity) -> impl Iterator<Item = &LogFault> {
-        self.faults
-            .iter()
-            .filter(move |fault| fault.severity == severity)
+        let all = self.faults.iter();
+        all.filter(move |fault| fault.severity == severity)
     }
 }
 

@@ -7,7 +7,7 @@ use super::findings::{Findings, RowCost, RowFate, joined};
 use super::judge::{Depth, LogJudge};
 use super::words::ChannelRole;
 use crate::log::{
-    Block, Bridge, DeclaredChannels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
+    Block, DeclaredChannels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
 };
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven clock closes none.
@@ -29,11 +29,8 @@ pub struct Gate {
     /// Torques that are exactly 0 in motion, by their places: from, to [s].
     off: Vec<(usize, [f64; 2])>,
     /// What is reported of them, and whether the robot moves as without its motors there, once known.
-    off_told: Vec<LogFault>,
+    faults_of_off: Vec<LogFault>,
     freely: Option<bool>,
-    /// Positions among the channels.
-    positions: usize,
-    /// Median step of the log [s].
     dt: f64,
     /// The instant from which the log's times are counted.
     origin: Instant,
@@ -59,27 +56,28 @@ impl Gate {
             keep_repeats: keep.contains(&RowFault::RepeatedRows),
             ..Mending::default()
         };
-        let mut reader = open()?;
-        reader.mend(&mending);
-        let Some(mut found) = findings(&mut reader, keep, stop, also)? else {
+        let mut read = |mending: &Mending| -> Result<_, LogError> {
+            let mut reader = open()?;
+            reader.mend(mending);
+            let found = findings(&mut reader, keep, stop, also)?;
+            let positions = reader.layout().positions.len();
+            Ok(found.map(|found| (found, reader.origin(), reader.hold(), positions)))
+        };
+        let Some((mut found, mut origin, held, positions)) = read(&mending)? else {
             return Ok(None);
         };
-        let held = reader
-            .hold()
-            .filter(|_| !keep.contains(&RowFault::SampleAndHold));
+        let held = held.filter(|_| !keep.contains(&RowFault::SampleAndHold));
         let mut marked = Vec::new();
         if held.is_some() || !found.wraps.is_empty() {
             mending.held = held;
-            mending.wraps = vec![None; reader.layout().positions.len()];
+            mending.wraps = vec![None; positions];
             for (place, range) in &found.wraps {
                 mending.wraps[*place] = Some(*range);
             }
             let turning = found.faults.into_iter();
             marked.extend(turning.filter(|fault| fault.kind == FaultKind::WrappedEncoder));
-            reader = open()?;
-            reader.mend(&mending);
-            found = match findings(&mut reader, keep, stop, also)? {
-                Some(found) => found,
+            (found, origin, ..) = match read(&mending)? {
+                Some(again) => again,
                 None => return Ok(None),
             };
         }
@@ -96,19 +94,12 @@ impl Gate {
             mended.extend(found.costs.into_iter().filter(|cost| of_mended(cost.kind)));
             bridges.append(&mut found.bridges);
             failed.append(&mut found.failed);
-            bridges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            bridges.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.channel.cmp(&b.channel)));
             failed.sort_by(f64::total_cmp);
-            let bridge = |(t, channel, value): &(f64, usize, f64)| Bridge {
-                t: *t,
-                channel: *channel,
-                value: *value,
-            };
-            mending.bridges = bridges.iter().map(bridge).collect();
+            mending.bridges = bridges.as_slice().into();
             mending.failed = failed.as_slice().into();
-            reader = open()?;
-            reader.mend(&mending);
-            found = match findings(&mut reader, keep, stop, also)? {
-                Some(found) => found,
+            (found, origin, ..) = match read(&mending)? {
+                Some(again) => again,
                 None => return Ok(None),
             };
         }
@@ -119,27 +110,25 @@ impl Gate {
                 None => found.costs.push(cost),
             }
         }
-        let off_told = found.of(Severity::Info);
-        let off_told = off_told.filter(|fault| fault.kind == FaultKind::MotorOff);
-        let off_told = off_told.cloned().collect();
+        let of_off = found.of(Severity::Info);
+        let of_off = of_off.filter(|fault| fault.kind == FaultKind::MotorOff);
+        let faults_of_off = of_off.cloned().collect();
+        let cut = found.of(Severity::Warning).filter(|fault| fault.cut);
+        marked.extend(cut.cloned());
         let refusal = found.of(Severity::Error).next().cloned();
-        marked.extend(
-            found
-                .of(Severity::Warning)
-                .filter(|fault| fault.cut)
-                .cloned(),
-        );
+        let off = found.off.iter();
         Ok(Some(Self {
             refusal,
             marked,
-            costs: found.costs,
             dt: found.rate_hz.map_or(0.0, |rate| 1.0 / rate),
+            off: off
+                .map(|(place, span)| (place.saturating_sub(positions), *span))
+                .collect(),
+            faults_of_off,
+            costs: found.costs,
             cuts: found.cuts,
-            off: found.off,
-            off_told,
             freely: None,
-            origin: reader.origin(),
-            positions: reader.layout().positions.len(),
+            origin,
             mending,
         }))
     }
@@ -162,9 +151,7 @@ impl Gate {
     /// Stretches in which a torque is exactly 0 while its joint moves, by the torque's place: from,
     /// to [s].
     pub fn off(&self) -> Vec<(usize, [f64; 2])> {
-        let positions = self.positions;
-        let place = |(place, span): &(usize, [f64; 2])| (place.saturating_sub(positions), *span);
-        self.off.iter().map(place).collect()
+        self.off.clone()
     }
 
     /// Says whether the robot moves in them as it does without its motors: if not, they are left out.
@@ -180,8 +167,7 @@ impl Gate {
             rows: spans.iter().map(rows).sum(),
             fate: RowFate::LeftOut,
         });
-        self.costs
-            .sort_by(|a, b| b.rows.cmp(&a.rows).then(a.kind.cmp(&b.kind)));
+        RowCost::sort(&mut self.costs);
         self.cuts = joined(self.cuts.drain(..).chain(spans).collect());
     }
 
@@ -208,23 +194,21 @@ impl Gate {
     /// What is left out or mended and where, one sentence for each kind of fault.
     pub fn warnings(&self) -> Vec<String> {
         let mut kinds: Vec<(FaultKind, u64)> = Vec::new();
-        for fault in self.marked.iter().chain(&self.off_told) {
+        for fault in self.marked.iter().chain(&self.faults_of_off) {
             match kinds.iter_mut().find(|(kind, _)| *kind == fault.kind) {
                 Some((_, rows)) => *rows += fault.rows,
                 None => kinds.push((fault.kind, fault.rows)),
             }
         }
         kinds.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
-        kinds
-            .into_iter()
-            .map(|(kind, _)| self.sentence(kind))
-            .collect()
+        let kinds = kinds.into_iter();
+        kinds.map(|(kind, _)| self.sentence(kind)).collect()
     }
 
     /// All that is marked as of one kind, channel by channel.
     fn sentence(&self, kind: FaultKind) -> String {
         let mut channels: Vec<(Option<&str>, u64, Vec<String>)> = Vec::new();
-        let all = self.marked.iter().chain(&self.off_told);
+        let all = self.marked.iter().chain(&self.faults_of_off);
         for fault in all.filter(|fault| fault.kind == kind) {
             let name = fault.channel.as_deref();
             match channels.iter_mut().find(|(known, ..)| *known == name) {
@@ -236,9 +220,7 @@ impl Gate {
             }
         }
         let of = channels.iter().map(|(name, rows, spans)| {
-            let name = name
-                .map(|name| format!(" of `{}`", escape(name)))
-                .unwrap_or_default();
+            let name = name.map_or(String::new(), |name| format!(" of `{}`", escape(name)));
             let more = match spans.len() {
                 0..=4 => String::new(),
                 many => format!(" and {} more", many - 4),
@@ -253,28 +235,26 @@ impl Gate {
             )
         });
         let of = of.collect::<Vec<_>>().join(";");
+        let followed;
         let then = match kind {
             FaultKind::WrappedEncoder => {
                 let remedies = self.marked.iter().filter(|fault| fault.kind == kind);
                 let remedies: Vec<&str> = remedies.map(|fault| fault.remedy.as_str()).collect();
-                format!("followed through its turns; {}", remedies.join(", "))
+                followed = format!("followed through its turns; {}", remedies.join(", "));
+                &*followed
             }
             FaultKind::PositionStep => {
-                "the log is parted there; before or after it the position is off".to_owned()
+                "the log is parted there; before or after it the position is off"
             }
             FaultKind::MotorOff if self.freely == Some(true) => {
                 "torques of 0 that are data, for the robot moves as it does without its motors"
-                    .to_owned()
             }
             FaultKind::MotorOff => {
                 "torques of 0 in motion that does not go with them: left out, and nothing is differentiated across"
-                    .to_owned()
             }
-            FaultKind::Spike => "bridged by the rows beside them".to_owned(),
-            FaultKind::FailedRead => {
-                "left out, and the log is interpolated over a few of them".to_owned()
-            }
-            _ => "left out, and nothing is differentiated across".to_owned(),
+            FaultKind::Spike => "bridged by the rows beside them",
+            FaultKind::FailedRead => "left out, and the log is interpolated over a few of them",
+            _ => "left out, and nothing is differentiated across",
         };
         format!("{}{of}: {then}", kind.word())
     }
@@ -287,7 +267,8 @@ fn findings(
     stop: &dyn Fn() -> bool,
     also: &mut dyn FnMut(&Block, &Layout),
 ) -> Result<Option<Findings>, LogError> {
-    let mut judge = LogJudge::new(channels(reader), Depth::Gate).keeping(keep);
+    let mut judge = LogJudge::new(channels(reader), Depth::Gate);
+    judge.keep = keep.to_vec();
     let mut block = Block::default();
     let mut columns: Vec<Vec<f64>> = Vec::new();
     while reader.read(&mut block)? {
@@ -295,8 +276,7 @@ fn findings(
             return Ok(None);
         }
         also(&block, reader.layout());
-        let rows = block.len();
-        let torques = block.tau.len().checked_div(rows).unwrap_or(0);
+        let torques = block.tau.len().checked_div(block.len()).unwrap_or(0);
         columns.resize_with(block.joints() + torques, Vec::new);
         columns.iter_mut().for_each(Vec::clear);
         let (positions, others) = columns.split_at_mut(block.joints());
@@ -325,20 +305,19 @@ fn part(rows: &[f64], columns: &mut [Vec<f64>]) {
 /// The channels whose numbers a fit reads.
 fn channels(reader: &Reader) -> Vec<InspectedChannel> {
     let layout = reader.layout();
+    // Volts are logged as the amplifier gave them.
+    let volts = layout.channels == DeclaredChannels::Actuator;
     let kinds = [
-        (&layout.positions, ChannelRole::Position),
-        (&layout.torques, ChannelRole::Torque),
+        (&layout.positions, ChannelRole::Position, false),
+        (&layout.torques, ChannelRole::Torque, volts),
     ];
-    let each = kinds.into_iter().flat_map(|(channels, role)| {
+    let each = kinds.into_iter().flat_map(|(channels, role, saturates)| {
         let joints = channels.iter().zip(&layout.joints);
-        joints.map(move |(channel, joint)| {
-            let mut seen = InspectedChannel::new(&channel.column, role, Some(joint), None);
-            // Volts are logged as the amplifier gave them.
-            seen.saturates =
-                role == ChannelRole::Torque && layout.channels == DeclaredChannels::Actuator;
-            seen.factor = channel.factor;
-            seen.zero = channel.offset;
-            seen
+        joints.map(move |(channel, joint)| InspectedChannel {
+            saturates,
+            factor: channel.factor,
+            zero: channel.offset,
+            ..InspectedChannel::new(&channel.column, role, Some(joint), None)
         })
     });
     each.collect()
@@ -356,10 +335,9 @@ pub struct Cutter {
 impl Cutter {
     /// Removes the rows that lie in a span.
     pub fn cut(&mut self, block: &mut Block) {
-        let (Some(first), Some(last)) = (block.t.first(), block.t.last()) else {
+        let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else {
             return;
         };
-        let (first, last) = (*first, *last);
         while self.spans.get(self.next).is_some_and(|[_, to]| *to < first) {
             self.next += 1;
         }
@@ -408,19 +386,12 @@ mod tests {
             let mut block = block(from, to);
             cutter.cut(&mut block);
             assert_eq!(block.q.len(), 2 * block.len());
-            assert!(
-                block
-                    .q
-                    .chunks(2)
-                    .zip(&block.tau)
-                    .all(|(q, tau)| q[1] == *tau)
-            );
+            let mut pairs = block.q.chunks(2).zip(&block.tau);
+            assert!(pairs.all(|(q, tau)| q[1] == *tau));
             kept.extend(block.tau);
         }
-        let expected: Vec<f64> = (0..30u32)
-            .filter(|k| ![4, 5, 6, 10, 11, 12, 13, 14].contains(k))
-            .map(f64::from)
-            .collect();
+        let rows = (0..30).filter(|k| ![4, 5, 6, 10, 11, 12, 13, 14].contains(k));
+        let expected: Vec<f64> = rows.map(f64::from).collect();
         assert_eq!(kept, expected);
         assert_eq!(cutter.removed(), 8);
         let steps = kept.windows(2).map(|pair| pair[1] - pair[0]);

@@ -23,7 +23,6 @@ const MIN_TRAVEL_SHARE: f64 = 0.02;
 const NOISE_BAND_HZ: f64 = 20.0;
 /// Channels whose shape is looked at; of more only the numbers are.
 const SHAPED: usize = 512;
-/// Channels that are compared with each other.
 const COMPARED: usize = 64;
 
 /// What no drive warms up by within so short a time: 5 degC, 1 s.
@@ -71,11 +70,8 @@ pub(super) struct Track {
 
 impl Track {
     fn new(channel: InspectedChannel, position: Option<usize>) -> Self {
-        let shaped = matches!(
-            channel.role,
-            ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
-        );
         Self {
+            shaped: channel.role.has_shape(),
             channel,
             rows: 0,
             low: f64::INFINITY,
@@ -95,7 +91,6 @@ impl Track {
             before: f64::NAN,
             leaps_of_heat: Episodes::default(),
             highest: 0.0,
-            shaped,
         }
     }
 
@@ -211,7 +206,6 @@ pub struct LogJudge {
     pub(super) copies: Copies,
     /// Channels whose copies are looked for.
     pub(super) compared: Vec<usize>,
-    /// Channels that hold positions.
     pub(super) positions: Vec<usize>,
     pub(super) windows: Windows,
     /// Kinds of findings that are not acted upon.
@@ -220,9 +214,6 @@ pub struct LogJudge {
     pub(super) band_hz: f64,
     /// Rows are messages, of which those without a number are left out.
     pub(super) messages: bool,
-    steps: Vec<RowStep>,
-    /// Which rows repeat the positions of the row before.
-    fresh: Vec<Freshness>,
     fresh_rows: FreshRows,
     /// Channels with torques and velocities.
     others: Vec<usize>,
@@ -232,57 +223,39 @@ pub struct LogJudge {
 impl LogJudge {
     /// For a log of these channels, time aside.
     pub fn new(mut channels: Vec<InspectedChannel>, depth: Depth) -> Self {
-        let of_motion = channels.iter_mut().filter(|channel| {
-            matches!(
-                channel.role,
-                ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
-            )
-        });
-        for channel in of_motion.skip(SHAPED) {
+        let all = channels.iter_mut();
+        let shaped = all.filter(|channel| channel.role.has_shape());
+        for channel in shaped.skip(SHAPED) {
             channel.role = ChannelRole::Other;
         }
         let of_role = |role: ChannelRole| -> Vec<usize> {
-            let all = channels.iter().enumerate();
-            all.filter(|(_, channel)| channel.role == role)
-                .map(|(index, _)| index)
-                .collect()
+            let all = 0..channels.len();
+            all.filter(|index| channels[*index].role == role).collect()
         };
         let positions = of_role(ChannelRole::Position);
         let position_of = |channel: &InspectedChannel| {
             let joint = channel.joint.as_deref()?;
             let of_joint = |index: &&usize| channels[**index].joint.as_deref() == Some(joint);
-            let only = match positions[..] {
-                // A name without a joint means the only one there is.
-                [only] if joint.is_empty() => Some(only),
-                _ => None,
-            };
-            let found = positions.iter().find(of_joint).copied().or(only);
+            // A name without a joint means the only one there is.
+            let alone = positions.len() == 1 && joint.is_empty();
+            let only = positions.first().filter(|_| alone);
+            let found = positions.iter().find(of_joint).or(only).copied();
             found.filter(|_| channel.role != ChannelRole::Position)
         };
-        let tracks: Vec<Track> = channels
-            .iter()
+        let tracks = (channels.iter())
             .map(|channel| Track::new(channel.clone(), position_of(channel)))
             .collect();
-        let mut compared = Vec::new();
-        for role in [
-            ChannelRole::Position,
-            ChannelRole::Velocity,
-            ChannelRole::Torque,
-            ChannelRole::Command,
-        ] {
-            if depth == Depth::Whole || role == ChannelRole::Position || role == ChannelRole::Torque
-            {
-                compared.extend(of_role(role));
-            }
-        }
-        compared.sort_unstable();
+        let is_compared = |index: &usize| match (depth, channels[*index].role) {
+            (Depth::Gate, role) => role.is_fitted(),
+            (Depth::Whole, role) => role.has_shape() || role == ChannelRole::Command,
+        };
+        let mut compared: Vec<usize> = (0..channels.len()).filter(is_compared).collect();
         compared.truncate(COMPARED);
         let mut others = of_role(ChannelRole::Torque);
         others.extend(of_role(ChannelRole::Velocity));
         Self {
             depth,
             clock: LogClock::default(),
-            fresh: Vec::new(),
             fresh_rows: FreshRows::new(positions.len()),
             keep: Vec::new(),
             band_hz: NOISE_BAND_HZ,
@@ -297,26 +270,7 @@ impl LogJudge {
             positions,
             tracks,
             windows: Windows::default(),
-            steps: Vec::new(),
         }
-    }
-
-    /// The same, with kinds of findings that are reported but not acted upon.
-    pub fn keeping(mut self, keep: &[RowFault]) -> Self {
-        self.keep = keep.to_vec();
-        self
-    }
-
-    /// The same, with the band that a fit keeps \[Hz\], where it is known.
-    pub fn within(mut self, band_hz: Option<f64>) -> Self {
-        self.band_hz = band_hz.unwrap_or(NOISE_BAND_HZ);
-        self
-    }
-
-    /// The same for a recording of messages.
-    pub fn of_messages(mut self, messages: bool) -> Self {
-        self.messages = messages;
-        self
     }
 
     /// Takes consecutive rows: times [s], and one column per channel.
@@ -331,15 +285,14 @@ impl LogJudge {
                 track.excitation = Some(Excitation::new(dt, track.channel.speed));
             }
         }
-        let mut steps = std::mem::take(&mut self.steps);
-        self.clock.take(times, &mut steps);
+        let mut steps = self.clock.take(times);
         self.leave_out_failed(times, &mut steps, columns);
         // What happens again within a few rows is one event.
         let join = 10.5 * self.clock.step_so_far();
-        self.look_for_fresh(times, columns);
+        let fresh = self.look_for_fresh(times, columns);
         for (track, values) in self.tracks.iter_mut().zip(columns) {
             let positions = track.position.map(|index| columns[index]);
-            track.take(times, (&steps, &self.fresh), values, positions, join);
+            track.take(times, (&steps, &fresh), values, positions, join);
         }
         let compared: Vec<&[f64]> = self.compared.iter().map(|index| columns[*index]).collect();
         for (k, step) in steps.iter().enumerate() {
@@ -350,27 +303,22 @@ impl LogJudge {
         self.watch_repeats(times, &steps, columns);
         let whole = steps.iter().skip(1).all(|step| *step == RowStep::Next);
         let finite = || {
-            columns
-                .iter()
-                .zip(&self.tracks)
-                .all(|(column, track)| !track.shaped || column.iter().all(|x| x.is_finite()))
+            let mut pairs = columns.iter().zip(&self.tracks);
+            pairs.all(|(column, track)| !track.shaped || column.iter().all(|x| x.is_finite()))
         };
         if self.depth == Depth::Whole && whole && finite() {
             self.windows.offer(times, columns);
         }
-        self.steps = steps;
     }
 
     /// Says of each row whether it repeats the positions of the row before.
-    fn look_for_fresh(&mut self, times: &[f64], columns: &[&[f64]]) {
-        self.fresh.clear();
+    fn look_for_fresh(&mut self, times: &[f64], columns: &[&[f64]]) -> Vec<Freshness> {
         let row = &mut self.row[0];
-        for (k, &t) in times.iter().enumerate() {
-            for (value, index) in row.iter_mut().zip(&self.positions) {
-                *value = columns[*index][k];
-            }
-            self.fresh.push(self.fresh_rows.look(t, row));
-        }
+        let each = times.iter().enumerate().map(|(k, t)| {
+            gather(row, columns, &self.positions, k);
+            self.fresh_rows.look(*t, row)
+        });
+        each.collect()
     }
 
     /// Marks rows that were not read.
@@ -401,13 +349,8 @@ impl LogJudge {
                 continue;
             }
             let [positions, others] = &mut self.row;
-            let gather = |row: &mut [f64], indices: &[usize]| {
-                for (value, index) in row.iter_mut().zip(indices) {
-                    *value = columns[*index][k];
-                }
-            };
-            gather(positions, &self.positions);
-            gather(others, &self.others);
+            gather(positions, columns, &self.positions, k);
+            gather(others, columns, &self.others, k);
             if *step == RowStep::Apart || positions.iter().any(|x| !x.is_finite()) {
                 self.repeats.part();
             }
@@ -418,12 +361,17 @@ impl LogJudge {
 
     /// Whether a position channel moves: further than its grain, and not far less than the others.
     pub(super) fn moves(&self, track: &Track) -> bool {
-        let travels = self
-            .positions
-            .iter()
-            .map(|index| self.tracks[*index].travel());
+        let positions = self.positions.iter();
+        let travels = positions.map(|index| self.tracks[*index].travel());
         let farthest = travels.fold(0.0, f64::max);
         let step = track.flat.steps.quantile_not_zero(0.05);
         track.travel() > (30.0 * step).max(MIN_TRAVEL_SHARE * farthest)
+    }
+}
+
+/// Row `k` of some columns.
+fn gather(row: &mut [f64], columns: &[&[f64]], indices: &[usize], k: usize) {
+    for (value, index) in row.iter_mut().zip(indices) {
+        *value = columns[*index][k];
     }
 }

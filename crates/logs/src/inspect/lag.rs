@@ -2,8 +2,7 @@
 
 use super::detectors::clock::ClockFacts;
 use super::draft::{FaultList, seconds};
-use super::fault::FaultKind;
-use super::fault::Severity::Warning;
+use super::fault::{FaultKind, Severity::Warning};
 use super::judge::LogJudge;
 use super::words::ChannelRole;
 use crate::log::{DelayEstimate, DelayEstimator};
@@ -23,10 +22,7 @@ pub(super) const REMEDY: &str = "take both from one message or one cycle of the 
 /// A warning where the stretches of the log agree in a delay.
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     // Joints that have both channels.
-    let pairs: Vec<(usize, usize)> = judge
-        .tracks
-        .iter()
-        .enumerate()
+    let pairs: Vec<(usize, usize)> = (judge.tracks.iter().enumerate())
         .filter(|(_, track)| track.channel.role == ChannelRole::Torque)
         .filter_map(|(torque, track)| Some((track.position?, torque)))
         .filter(|(position, _)| judge.moves(&judge.tracks[*position]))
@@ -37,11 +33,8 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
     let Some(DelayEstimate { delay_s, std_s }) = delay(judge, &pairs) else {
         return;
     };
-    if delay_s.abs()
-        < (MIN_DELAY_ROWS * clock.dt)
-            .max(MIN_DEVIATIONS * std_s)
-            .max(MIN_DELAY_S)
-    {
+    let least = (MIN_DELAY_ROWS * clock.dt).max(MIN_DEVIATIONS * std_s);
+    if delay_s.abs() < least.max(MIN_DELAY_S) {
         return;
     }
     let side = if delay_s > 0.0 { "behind" } else { "ahead of" };
@@ -50,10 +43,10 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
         seconds(delay_s.abs()),
         seconds(2.0 * std_s.max(0.1 * clock.dt))
     );
-    draft.of_log(Warning, FaultKind::Delay, judge.clock.rows, effect, REMEDY);
+    let fault = (Warning, FaultKind::Delay, None);
+    draft.of_log(fault, judge.clock.rows, effect, REMEDY);
 }
 
-/// The delay that all stretches have in common.
 fn delay(judge: &LogJudge, pairs: &[(usize, usize)]) -> Option<DelayEstimate> {
     let mut delay = DelayEstimator::default();
     let (mut q, mut tau) = (Vec::new(), Vec::new());

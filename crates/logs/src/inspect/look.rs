@@ -1,10 +1,9 @@
 //! Shows a log, as it stands in its files, to the judge.
 
 use super::channel::InspectedChannel;
-use super::fault::{FaultKind, LogFault, Severity};
-use super::findings::Findings;
+use super::fault::{FaultKind, Severity};
+use super::findings::{Findings, RowCost};
 use super::judge::{Depth, LogJudge};
-use super::words::ChannelRole;
 use crate::log::{LogError, RawBlock, RawReader, RowFault, Unwrap};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
@@ -56,23 +55,14 @@ pub fn look_again(
     let Some(mut found) = look(log, &plan, stop)? else {
         return Ok(None);
     };
-    let hiding = |fault: &&LogFault| {
-        matches!(
-            fault.kind,
-            FaultKind::WrappedEncoder | FaultKind::SampleAndHold
-        )
-    };
-    found
-        .faults
-        .extend(first.faults.iter().filter(hiding).cloned());
-    let held = first
-        .costs
-        .iter()
-        .filter(|cost| cost.kind == FaultKind::SampleAndHold);
+    let hiding = [FaultKind::WrappedEncoder, FaultKind::SampleAndHold];
+    let faults = first.faults.iter();
+    let faults = faults.filter(|fault| hiding.contains(&fault.kind));
+    found.faults.extend(faults.cloned());
+    let costs = first.costs.iter();
+    let held = costs.filter(|cost| cost.kind == FaultKind::SampleAndHold);
     found.costs.extend(held);
-    found
-        .costs
-        .sort_by(|a, b| b.rows.cmp(&a.rows).then(a.kind.cmp(&b.kind)));
+    RowCost::sort(&mut found.costs);
     found.rows = first.rows;
     found.wraps.clone_from(&first.wraps);
     found.held = first.held;
@@ -93,10 +83,10 @@ pub fn look(
         log.set_time(column, seconds);
     }
     let channels = plan.channels.iter().map(|planned| planned.channel.clone());
-    let mut judge = LogJudge::new(channels.collect(), Depth::Whole)
-        .keeping(&plan.keep)
-        .within(plan.band_hz)
-        .of_messages(log.is_recording());
+    let mut judge = LogJudge::new(channels.collect(), Depth::Whole);
+    judge.keep.clone_from(&plan.keep);
+    judge.band_hz = plan.band_hz.unwrap_or(judge.band_hz);
+    judge.messages = log.is_recording();
     let mut turning: Vec<Option<Unwrap>> = (plan.channels.iter())
         .map(|planned| planned.wrap.map(Unwrap::new))
         .collect();
@@ -112,14 +102,15 @@ pub fn look(
         }
         for (planned, turning) in plan.channels.iter().zip(&mut turning) {
             let column = &mut block.columns[planned.column];
-            scale(column, planned.factor, planned.offset);
+            let (factor, offset) = (planned.factor, planned.offset);
+            if factor != 1.0 || offset != 0.0 {
+                column.iter_mut().for_each(|x| *x = *x * factor + offset);
+            }
             if let Some(turning) = turning {
                 column.iter_mut().for_each(|q| *q = turning.take(*q));
             }
         }
-        let columns: Vec<&[f64]> = plan
-            .channels
-            .iter()
+        let columns: Vec<&[f64]> = (plan.channels.iter())
             .map(|planned| block.columns[planned.column].as_slice())
             .collect();
         judge.take(&block.t, &columns);
@@ -132,53 +123,31 @@ pub fn look(
             "{rows} rows have more or fewer fields than the header names: a fit refuses the log"
         );
         let remedy = "complete or delete these rows; write decimal points, not commas";
-        let to_s = findings.duration_s;
-        let fault = LogFault::whole(
-            Severity::Error,
-            FaultKind::MalformedRows,
-            to_s,
-            effect,
-            remedy,
-        );
-        findings.faults.insert(0, LogFault { rows, ..fault });
+        let fault = (Severity::Error, FaultKind::MalformedRows);
+        findings.put_first(fault, rows, effect, remedy);
     }
     let rows = findings.rows;
     if rows < 2 {
         let effect = format!("{rows} row(s): nothing can be said, and a fit refuses the log");
         let remedy = "record again, or check the span";
-        let fault = LogFault::whole(
-            Severity::Error,
-            FaultKind::IncompleteFile,
-            0.0,
-            effect,
-            remedy,
-        );
-        findings.faults.insert(0, LogFault { rows, ..fault });
+        let fault = (Severity::Error, FaultKind::IncompleteFile);
+        findings.put_first(fault, rows, effect, remedy);
     }
     for (rows, effect) in log.contradictions() {
         let remedy = "stop the other publisher, or remap its topic, and record again; what is left is the machine that was recorded most";
-        let (severity, kind) = (Severity::Warning, FaultKind::OtherPublisher);
-        let fault = LogFault::whole(severity, kind, findings.duration_s, effect, remedy);
-        findings.faults.insert(0, LogFault { rows, ..fault });
+        let fault = (Severity::Warning, FaultKind::OtherPublisher);
+        findings.put_first(fault, rows, effect, remedy);
     }
     for (rows, effect) in log.uneven() {
         let remedy = "where it is known whose they are, say so by their places, `torque = \"effort[0]\"`, .. in [log.joint] of the robot file; else record again with one number for each name";
-        let (severity, kind) = (Severity::Error, FaultKind::MissingChannel);
-        let fault = LogFault::whole(severity, kind, findings.duration_s, effect, remedy);
-        findings.faults.insert(0, LogFault { rows, ..fault });
+        let fault = (Severity::Error, FaultKind::MissingChannel);
+        findings.put_first(fault, rows, effect, remedy);
     }
     for effect in log.breaks() {
         let remedy = "copy it again from where it was recorded; a recorder that is killed loses its last chunk";
-        let at_s = findings.duration_s;
-        let kind = FaultKind::IncompleteFile;
-        let fault = LogFault::whole(Severity::Warning, kind, at_s, effect, remedy);
-        findings.faults.insert(
-            0,
-            LogFault {
-                from_s: at_s,
-                ..fault
-            },
-        );
+        let fault = (Severity::Warning, FaultKind::IncompleteFile);
+        findings.put_first(fault, 0, effect, remedy);
+        findings.faults[0].from_s = findings.duration_s;
     }
     findings.place();
     Ok(Some(findings))
@@ -196,12 +165,8 @@ struct FreshRows {
 
 impl FreshRows {
     fn new(rows: usize, plan: &ColumnPlan) -> Self {
-        let of_motion = plan.channels.iter().filter(|planned| {
-            matches!(
-                planned.channel.role,
-                ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
-            )
-        });
+        let all = plan.channels.iter();
+        let of_motion = all.filter(|planned| planned.channel.role.has_shape());
         let columns: Vec<usize> = of_motion.map(|planned| planned.column).collect();
         Self {
             rows,
@@ -214,38 +179,21 @@ impl FreshRows {
     fn keep(&mut self, block: &mut RawBlock) {
         let mut kept = 0;
         for row in 0..block.rows() {
-            let own = self
-                .columns
-                .iter()
-                .map(|column| block.columns[*column][row]);
-            let same = own.eq(self.last.iter().copied());
+            let own = || self.columns.iter().map(|at| block.columns[*at][row]);
             self.since += 1;
-            if same && self.since < self.rows {
+            if own().eq(self.last.iter().copied()) && self.since < self.rows {
                 continue;
             }
             self.since = 0;
-            for (last, column) in self.last.iter_mut().zip(&self.columns) {
-                *last = block.columns[*column][row];
-            }
+            self.last.clear();
+            self.last.extend(own());
             block.t[kept] = block.t[row];
-            block
-                .columns
-                .iter_mut()
-                .for_each(|column| column[kept] = column[row]);
+            let columns = block.columns.iter_mut();
+            columns.for_each(|column| column[kept] = column[row]);
             kept += 1;
         }
         block.t.truncate(kept);
-        block
-            .columns
-            .iter_mut()
-            .for_each(|column| column.truncate(kept));
-    }
-}
-
-fn scale(column: &mut [f64], factor: f64, offset: f64) {
-    if factor != 1.0 || offset != 0.0 {
-        for value in column {
-            *value = *value * factor + offset;
-        }
+        let columns = block.columns.iter_mut();
+        columns.for_each(|column| column.truncate(kept));
     }
 }

@@ -24,7 +24,7 @@ mod position;
 mod shape;
 mod together;
 mod verdicts;
-pub mod words;
+pub(crate) mod words;
 
 pub use channel::{InspectedChannel, is_time};
 pub use detectors::excitation::JointMotion;

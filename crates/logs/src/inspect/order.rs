@@ -35,14 +35,9 @@ impl OrderFault {
     /// Makes the change in a list with one number for each joint.
     pub fn apply(self, x: &mut [f64]) {
         match self {
-            Self::None => {}
-            Self::Turn(joint) => {
-                if let Some(x) = x.get_mut(joint) {
-                    *x = -*x;
-                }
-            }
+            Self::Turn(joint) if joint < x.len() => x[joint] = -x[joint],
             Self::Exchange(a, b) if a.max(b) < x.len() => x.swap(a, b),
-            Self::Exchange(..) => {}
+            _ => {}
         }
     }
 }
@@ -108,10 +103,8 @@ impl OrderComparison {
             return;
         }
         let (modelled, logged) = row.split_at(n * self.changes.len());
-        for (sum, x) in self.modelled.iter_mut().zip(modelled) {
-            *sum += x * x;
-        }
-        for (sum, x) in self.logged.iter_mut().zip(logged) {
+        let powers = self.modelled.iter_mut().chain(&mut self.logged);
+        for (sum, x) in powers.zip(row) {
             *sum += x * x;
         }
         for (sums, x) in self.products.chunks_exact_mut(n).zip(modelled) {
@@ -149,22 +142,19 @@ impl OrderComparison {
     /// The delay of the torques behind the positions, where it explains what the model leaves;
     /// `dt` is the log's step [s].
     pub fn delay(&self, dt: f64, rows: u64, duration_s: f64) -> Option<LogFault> {
+        let mut known = self.slopes.clone();
+        known.retain(|[_, slope, left]| *slope > 0.0 && *left > 0.0);
         // Each joint counts as much as it is sure.
         let (mut top, mut bottom) = (0.0, 0.0);
-        let (mut explained, mut all) = (0.0, 0.0);
-        for [product, slope, left] in &self.slopes {
-            if *slope > 0.0 && *left > 0.0 {
-                top -= product / left;
-                bottom += slope / left;
-            }
+        for [product, slope, left] in &known {
+            top -= product / left;
+            bottom += slope / left;
         }
         let delay = if bottom > 0.0 { top / bottom } else { 0.0 };
-        for [product, slope, left] in &self.slopes {
-            if *slope > 0.0 && *left > 0.0 {
-                // |r + d p'|^2 is less than |r|^2 by this share
-                explained += -(2.0 * delay * product + delay * delay * slope) / left;
-                all += 1.0;
-            }
+        let (mut explained, all) = (0.0, known.len() as f64);
+        for [product, slope, left] in &known {
+            // |r + d p'|^2 is less than |r|^2 by this share
+            explained += -(2.0 * delay * product + delay * delay * slope) / left;
         }
         if delay.abs() < MIN_DELAY_ROWS * dt || explained < MIN_SHARE_BY_DELAY * all {
             return None;
@@ -179,23 +169,21 @@ impl OrderComparison {
         Some(LogFault { rows, ..fault })
     }
 
-    /// Share of the torque's power that is left, the mean of the joints, under change `index` of the
-    /// positions and `of_torques`.
+    /// Mean share of the joints' power that is left under change `index` of the positions and one of the torques.
     fn left(&self, index: usize, of_torques: OrderFault) -> f64 {
         let n = self.joints;
-        // Which logged torque stands for each joint, and its sign.
-        let mut from: Vec<usize> = (0..n).collect();
-        let mut sign = vec![1.0; n];
-        match of_torques {
-            OrderFault::None => {}
-            OrderFault::Turn(joint) => sign[joint] = -1.0,
-            OrderFault::Exchange(a, b) => from.swap(a, b),
-        }
         let (mut sum, mut count) = (0.0, 0.0);
         for j in 0..n {
-            let power = self.logged[from[j]];
+            // Which logged torque stands for the joint, and its sign.
+            let (from, sign) = match of_torques {
+                OrderFault::Turn(joint) if joint == j => (j, -1.0),
+                OrderFault::Exchange(a, b) if a == j => (b, 1.0),
+                OrderFault::Exchange(a, b) if b == j => (a, 1.0),
+                _ => (j, 1.0),
+            };
+            let power = self.logged[from];
             if power > 0.0 {
-                let product = sign[j] * self.products[(index * n + j) * n + from[j]];
+                let product = sign * self.products[(index * n + j) * n + from];
                 sum += (power - 2.0 * product + self.modelled[index * n + j]) / power;
                 count += 1.0;
             }
@@ -226,12 +214,7 @@ impl OrderComparison {
         {
             return None;
         }
-        let name = |joint: usize| {
-            joints
-                .get(joint)
-                .map(|name| escape(name))
-                .unwrap_or_default()
-        };
+        let name = |joint: usize| joints.get(joint).map_or(String::new(), |name| escape(name));
         let (problem, remedy) = match change {
             OrderFault::None => return None,
             OrderFault::Turn(joint) => (
@@ -260,11 +243,18 @@ mod tests {
     use super::*;
 
     /// Two joints that pull at each other, driven by different motions.
-    fn torque(q: [f64; 2], v: [f64; 2], a: [f64; 2]) -> [f64; 2] {
+    fn torque([q, v, a]: [[f64; 2]; 3]) -> [f64; 2] {
         [
             2.0 * a[0] + 0.3 * a[1] + v[0] + 5.0 * q[0].sin(),
             0.3 * a[0] + 0.5 * a[1] + 3.0 * v[1] + 2.0 * q[1].cos(),
         ]
+    }
+
+    fn motion(t: f64) -> [[f64; 2]; 3] {
+        let (w, u) = (1.3, 2.9);
+        let q = [(w * t).sin(), 0.6 * (u * t).cos()];
+        let v = [w * (w * t).cos(), -0.6 * u * (u * t).sin()];
+        [q, v, [-w * w * q[0], -u * u * q[1]]]
     }
 
     fn compared(positions: OrderFault, torques: OrderFault, late: f64) -> OrderComparison {
@@ -272,28 +262,17 @@ mod tests {
         let changes = comparison.changes().to_vec();
         for k in 0..5000 {
             let t = f64::from(k) * 0.01;
-            let (w, u) = (1.3, 2.9);
-            let q = [(w * t).sin(), 0.6 * (u * t).cos()];
-            let v = [w * (w * t).cos(), -0.6 * u * (u * t).sin()];
-            let a = [-w * w * q[0], -u * u * q[1]];
-            let s = t - late;
-            let then = [(w * s).sin(), 0.6 * (u * s).cos()];
-            let mut logged = torque(
-                then,
-                [w * (w * s).cos(), -0.6 * u * (u * s).sin()],
-                [-w * w * then[0], -u * u * then[1]],
-            );
+            let mut logged = torque(motion(t - late));
             logged[0] += 0.1 * (31.0 * t).sin();
             torques.apply(&mut logged);
             // The log has the wrong positions; the model is asked for what it would make of them.
             let mut row = Vec::new();
             for change in &changes {
-                let seen = [q, v, a].map(|mut x| {
+                row.extend(torque(motion(t).map(|mut x| {
                     positions.apply(&mut x);
                     change.apply(&mut x);
                     x
-                });
-                row.extend(torque(seen[0], seen[1], seen[2]));
+                })));
             }
             row.extend(logged);
             comparison.add(0, t, &row);
@@ -309,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn each_single_change_is_told_apart_and_a_right_log_is_not_doubted() {
+    fn each_single_change_is_named_and_a_right_log_is_not_doubted() {
         use OrderFault::{Exchange, None, Turn};
         assert_eq!(in_words(None, None), Option::None);
         for (positions, torques, expected) in [
@@ -328,16 +307,14 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_is_told_with_its_size_and_a_log_without_one_has_none() {
+    fn a_delay_is_reported_with_its_size_and_a_log_without_one_has_none() {
         let delay =
             |late| compared(OrderFault::None, OrderFault::None, late).delay(0.01, 5000, 50.0);
         assert_eq!(delay(0.0), None);
         let late = delay(0.03).unwrap().effect;
         let number: f64 = late.split(' ').nth(2).unwrap().parse().unwrap();
-        assert!(
-            (number - 30.0).abs() < 2.0 && late.contains("behind"),
-            "{late}"
-        );
+        let near = (number - 30.0).abs() < 2.0;
+        assert!(near && late.contains("behind"), "{late}");
         assert!(delay(-0.03).unwrap().effect.contains("ahead of"));
     }
 }

@@ -12,17 +12,14 @@ use cft_ident_core::number;
 
 /// Steps of an encoder that a leap has at least: rounding four rows makes two at most.
 const MIN_LEAP_STEPS: f64 = 4.0;
-/// A drive that accelerates as much as it can may turn its torque round from one row to the next,
-/// and within a row it may reach twice what it has on average over the time in which accelerations
-/// are formed.
+/// A drive may turn its torque round from one row to the next, and reach twice its average within a row.
 const DRIVE_FACTOR: f64 = 4.0;
 /// What is off by so many times what nearly all rows are is no acceleration of the motion.
 const EVENT_FACTOR: f64 = 3.0;
 /// Leaps of several joints at one time are one event: within so many steps.
 const SAME_EVENT_STEPS: f64 = 1.5;
 
-/// Leap of a position from one row to the next that its drive could make, by the accelerations of
-/// this log in which no event took part [unit of the channel].
+/// Leap of a position from one row to the next that its drive could make [unit of the channel].
 pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
     DRIVE_FACTOR * acceleration(track) * clock.dt * clock.dt
 }
@@ -30,17 +27,16 @@ pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
 /// The largest acceleration in which no leap and no spike took part.
 fn acceleration(track: &Track) -> f64 {
     let usual = track.spikes.usual(track.deviation());
-    let spikes = track.spikes.found().iter();
+    let spikes = track.spikes.found.iter();
     let spikes = spikes.filter(|spike| spike.height.abs() > EVENT_FACTOR * usual);
     let spikes = spikes.map(|spike| spike.t);
-    let leaps = track.leaps.found().iter().map(|leap| leap.at);
+    let leaps = track.leaps.found.iter().map(|leap| leap.at);
     let events: Vec<f64> = spikes.chain(leaps).collect();
     let motion = track.excitation.as_ref();
     motion.map_or(0.0, |motion| motion.highest_apart(&events))
 }
 
-/// The leaps that are higher than noise, the step of the encoder and the drive account for, and the
-/// least height that is, for one in a step of the clock.
+/// The leaps that noise, encoder and drive do not account for, and the least height of one in a step of the clock.
 fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
     let grain = track.flat.steps.quantile_not_zero(0.0);
     let noise = track.leaps.unusual(track.rows).max(MIN_LEAP_STEPS * grain);
@@ -48,7 +44,7 @@ fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
     // Rows that were left out leave the drive more time.
     let least = |step: f64| noise.max(DRIVE_FACTOR * acceleration * step * step);
     let high = |leap: &&Leap| leap.height.abs() > least(leap.at - leap.before);
-    let found = track.leaps.found().iter().filter(high).copied();
+    let found = track.leaps.found.iter().filter(high).copied();
     (found.collect(), least(clock.dt))
 }
 
@@ -63,20 +59,14 @@ pub(super) fn leaps(
     let known = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
     let (mut found, least) = unusual(track, clock);
     found.retain(|leap| !known(leap.at));
-    shown.extend(
-        found
-            .iter()
-            .map(|leap| [leap.before - reach, leap.at + reach]),
-    );
+    let near = |leap: &Leap| [leap.before - reach, leap.at + reach];
+    shown.extend(found.iter().map(near));
     let mut episodes = Episodes::default();
     for leap in &found {
         episodes.add(leap.before, leap.at, 1, -1.0);
     }
-    let Some(largest) = found
-        .iter()
-        .map(|leap| leap.height)
-        .max_by(|a, b| a.abs().total_cmp(&b.abs()))
-    else {
+    let heights = found.iter().map(|leap| leap.height);
+    let Some(largest) = heights.max_by(|a, b| a.abs().total_cmp(&b.abs())) else {
         return;
     };
     let others = with_it(judge, place, found[0].at, clock);
@@ -98,32 +88,19 @@ pub(super) fn leaps(
         )
         .replace("  ", " ")
     };
-    let at = judge
-        .clock
-        .first
-        .map_or(found[0].at, |first| found[0].at - first);
+    let first = judge.clock.first.unwrap_or(0.0);
     let remedy = &format!(
         "where its zero matters (gravity, other joints' inertias), use the part whose zero is right: LOG@0..{at:.3}s or LOG@{at:.3}..s",
-        at = at.max(0.0)
+        at = (found[0].at - first).max(0.0)
     );
-    let name = Some(track.channel.name.as_str());
-    let before = draft.faults.len();
-    draft.stretches(
-        FaultKind::PositionStep,
-        Warning,
-        name,
-        &episodes,
-        &effect,
-        remedy,
-    );
-    for fault in &mut draft.faults[before..] {
-        fault.size = Some(largest);
+    let fault = (Warning, FaultKind::PositionStep, Some(track));
+    for added in draft.stretches(fault, &episodes, &effect, remedy) {
+        added.size = Some(largest);
     }
-    draft.cut(FaultKind::PositionStep, name, &episodes);
+    draft.cut(fault, &episodes);
 }
 
-/// Reports a position that leaps to and fro in so many rows that none of them is a spike among others: what nearly all
-/// rows differ from their neighbours is more than a spike must have, and the steps between rows are noise and no motion.
+/// Reports a position that leaps to and fro in so many rows that none of them is a spike among others.
 pub(super) fn erratic(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     let grain = track.flat.steps.quantile_not_zero(0.0);
     let height = (SPIKE_SHARE * track.deviation()).max(MIN_LEAP_STEPS * grain);
@@ -141,8 +118,9 @@ pub(super) fn erratic(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     )
     .replace(" :", ":");
     let remedy = "see whether two sources write this channel, one row each (`inspect` lists the publishers of a recording); else look at its cable and encoder, and log again";
-    draft.whole(Error, FaultKind::Erratic, track, effect, remedy);
-    draft.acts(FaultKind::Erratic, Some(&track.channel.name));
+    let fault = (Error, FaultKind::Erratic, Some(track));
+    draft.of_log(fault, track.rows, effect, remedy);
+    draft.acts(fault);
 }
 
 /// Where a position leaps: the times before and at it [s].
@@ -156,9 +134,8 @@ fn with_it(judge: &LogJudge, place: usize, t: f64, clock: &ClockFacts) -> Vec<St
     let others = judge.positions.iter().filter(|other| **other != place);
     let leaps = |track: &Track| {
         let (found, _) = unusual(track, clock);
-        found
-            .iter()
-            .any(|leap| (leap.at - t).abs() < SAME_EVENT_STEPS * clock.dt)
+        let mut at = found.iter().map(|leap| leap.at);
+        at.any(|at| (at - t).abs() < SAME_EVENT_STEPS * clock.dt)
     };
     others
         .map(|other| &judge.tracks[*other])
@@ -176,10 +153,8 @@ pub(super) fn wrapped(judge: &LogJudge, place: usize, draft: &mut FaultList) -> 
     // Ranges are usual in the unit of the column.
     let size = track.channel.factor.abs();
     let counts = (8..=32).map(|bits| f64::from(bits).exp2());
-    let in_column: Vec<f64> = [std::f64::consts::TAU, 360.0]
-        .into_iter()
-        .chain(counts)
-        .collect();
+    let turns = [std::f64::consts::TAU, 360.0].into_iter();
+    let in_column: Vec<f64> = turns.chain(counts).collect();
     let usual: Vec<f64> = in_column.iter().map(|range| range * size).collect();
     let step = track.flat.steps.quantile_not_zero(0.5);
     let Some(found) = track.turns.wrapped(&usual, step) else {
@@ -188,47 +163,31 @@ pub(super) fn wrapped(judge: &LogJudge, place: usize, draft: &mut FaultList) -> 
     let mut episodes = Episodes::default();
     episodes.add(found.from, found.to, found.times, 0.0);
     let logged = found.range / size;
-    let exact = in_column
-        .iter()
-        .find(|range| (*range / logged - 1.0).abs() < 1e-9);
-    let logged = match exact {
+    let mut ranges = in_column.iter();
+    let logged = match ranges.find(|range| (*range / logged - 1.0).abs() < 1e-9) {
         Some(range) => range.to_string(),
         None => number::significant(logged, 7),
     };
     let unit = track.channel.unit.as_deref().unwrap_or("");
-    let effect = |_: u64, _: usize| {
-        format!(
-            "goes through the end of its range {} time(s), and begins anew there, {} {unit} away: taken as it is, it leaps at an impossible speed. A fit follows it through its turns",
-            found.times,
-            number::significant(found.range, 7)
-        )
-        .replace(" :", ":")
-    };
-    let joint = track
-        .channel
-        .joint
-        .as_deref()
-        .filter(|joint| !joint.is_empty());
+    let effect = format!(
+        "goes through the end of its range {} time(s), and begins anew there, {} {unit} away: taken as it is, it leaps at an impossible speed. A fit follows it through its turns",
+        found.times,
+        number::significant(found.range, 7)
+    )
+    .replace(" :", ":");
+    let joint = track.channel.joint.as_deref();
+    let joint = joint.filter(|joint| !joint.is_empty());
     let remedy = format!(
         "write `wrap = {logged}` into [log.joint.{}] of the robot file",
         joint.map_or_else(|| "NAME".to_owned(), crate::log::escape)
     );
-    let name = Some(track.channel.name.as_str());
-    let before = draft.faults.len();
-    draft.stretches(
-        FaultKind::WrappedEncoder,
-        Warning,
-        name,
-        &episodes,
-        &effect,
-        &remedy,
-    );
-    for fault in &mut draft.faults[before..] {
-        fault.size = Some(found.range);
+    let fault = (Warning, FaultKind::WrappedEncoder, Some(track));
+    for added in draft.stretches(fault, &episodes, &|_, _| effect.clone(), &remedy) {
+        added.size = Some(found.range);
     }
-    if !draft.acts(FaultKind::WrappedEncoder, name) {
+    if !draft.acts(fault) {
         return false;
     }
-    draft.wraps.push((place, found.range));
+    draft.found.wraps.push((place, found.range));
     true
 }

@@ -2,15 +2,16 @@
 //! coarse.
 
 use super::detectors::clock::ClockFacts;
-use super::detectors::flat::{FlatRun, Levels};
+use super::detectors::flat::FlatRun;
 use super::detectors::grain;
 use super::detectors::spike::{SPIKE, SPIKE_SHARE};
-use super::draft::{FaultList, rows_text};
+use super::draft::FaultList;
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
 use super::judge::{Depth, LogJudge, Track};
 use super::position;
 use super::words::ChannelRole;
+use crate::log::Bridge;
 
 /// Rows of one value from which a channel may be stuck.
 const STUCK_ROWS: u64 = 10;
@@ -27,20 +28,16 @@ const COARSE_ACCELERATION_SHARE: f64 = 0.1;
 /// Grain of a torque over its deviation that spoils a fit.
 const COARSE_TORQUE_SHARE: f64 = 0.1;
 
-/// The faults of one channel.
 pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
     let track = &judge.tracks[place];
-    match track.channel.role {
-        ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque => {}
-        ChannelRole::Temperature => return heat(track, draft),
-        ChannelRole::Acceleration | ChannelRole::Command | ChannelRole::Other => return,
+    if track.channel.role == ChannelRole::Temperature {
+        return heat(track, draft);
     }
-    if track.rows == 0 {
+    if track.rows == 0 || !track.channel.role.has_shape() {
         return;
     }
     if track.travel() == 0.0 {
-        constant(judge, track, draft);
-        return;
+        return constant(judge, track, draft);
     }
     if position::wrapped(judge, place, draft) {
         // Its shape is seen once it is followed through its turns.
@@ -54,29 +51,23 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     flat.tops.retain(|run| !stalled(run));
     flat.stuck.retain(|run| !stalled(run));
     flat.off(place, draft);
-    flat.report(track, draft);
+    flat.report(draft);
     // Where a channel leaps out of a flat stretch it is reported already.
     let reach = 5.5 * clock.dt;
-    let mut shown: Vec<[f64; 2]> = (flat.tops.iter().chain(&flat.stuck))
-        .map(|run| [run.from - reach, run.to + reach])
-        .chain(
-            draft
-                .stalls
-                .iter()
-                .map(|[from, to]| [from - reach, to + reach]),
-        )
-        .collect();
+    let runs = flat.tops.iter().chain(&flat.stuck);
+    let runs = runs.map(|run| [run.from, run.to]);
+    let known = runs.chain(draft.stalls.iter().copied());
+    let mut shown: Vec<[f64; 2]> = known.map(|[from, to]| [from - reach, to + reach]).collect();
     if track.channel.role == ChannelRole::Position {
         position::leaps(judge, place, (clock, reach, &mut shown), draft);
         position::erratic(judge, track, draft);
     }
     spikes(judge, place, (clock, &shown), draft);
     if judge.depth == Depth::Whole {
-        coarse(judge, track, clock, draft);
+        coarse(judge, place, clock, draft);
     }
 }
 
-/// A temperature that never changes, or that leaps.
 fn heat(track: &Track, draft: &mut FaultList) {
     if track.rows > 0 && track.travel() == 0.0 {
         let effect = format!(
@@ -92,33 +83,24 @@ fn heat(track: &Track, draft: &mut FaultList) {
         format!("{times} of up to {highest:.1} degC from row to row: no drive warms up so fast")
     };
     let remedy = "check the sensor and its wiring, and whether logs were joined there";
-    let (kind, name) = (
-        FaultKind::TemperatureStep,
-        Some(track.channel.name.as_str()),
-    );
-    draft.stretches(kind, Warning, name, &track.leaps_of_heat, &effect, remedy);
+    let fault = (Warning, FaultKind::TemperatureStep, Some(track));
+    draft.stretches(fault, &track.leaps_of_heat, &effect, remedy);
 }
 
-/// A channel that never changes.
 fn constant(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     let value = track.low;
-    let joint_moves = track
-        .position
-        .map(|index| &judge.tracks[index])
-        .is_some_and(|position| {
-            position.travel() > 30.0 * position.flat.steps.quantile_not_zero(0.05)
-                && position.travel() > 0.0
-        });
-    let all_rest = judge
-        .positions
-        .iter()
-        .all(|index| judge.tracks[*index].travel() == 0.0);
+    let joint_moves = track.position.is_some_and(|index| {
+        let position = &judge.tracks[index];
+        let step = position.flat.steps.quantile_not_zero(0.05);
+        position.travel() > 30.0 * step && position.travel() > 0.0
+    });
+    let mut positions = judge.positions.iter();
+    let all_rest = positions.all(|index| judge.tracks[*index].travel() == 0.0);
     match track.channel.role {
         ChannelRole::Torque | ChannelRole::Velocity if joint_moves => {
-            let severity = if track.channel.role == ChannelRole::Torque {
-                Error
-            } else {
-                Warning
+            let severity = match track.channel.role {
+                ChannelRole::Torque => Error,
+                _ => Warning,
             };
             let effect = format!(
                 "{value} in all {} rows although the joint moves: nothing can be fitted to it",
@@ -190,8 +172,7 @@ impl<'a> Flatness<'a> {
     }
 
     fn is_abrupt(&self, run: &FlatRun) -> bool {
-        // A joint at rest whose encoder slips leaps, and is not stuck: it is where it moves on the other
-        // side.
+        // A joint at rest whose encoder slips leaps, and is not stuck: it is where it moves on the other side.
         let leaps = |edge: &dyn Fn(&[f64; 2]) -> bool| self.leaps.iter().any(edge);
         let entered = !leaps(&|[_, at]| *at == run.from) || run.exit.abs() > self.slow;
         let left = !leaps(&|[before, _]| *before == run.to) || run.entry.abs() > self.slow;
@@ -200,21 +181,14 @@ impl<'a> Flatness<'a> {
 
     /// Runs at a value that the channel does not exceed.
     fn tops(&mut self) {
-        let (top, bottom) = (&self.track.flat.top, &self.track.flat.bottom);
-        let levels: [(&Levels, f64); 2] = [(top, 1.0), (bottom, -1.0)];
-        for (levels, sign) in levels {
+        let flat = &self.track.flat;
+        for (levels, sign) in [(&flat.top, 1.0), (&flat.bottom, -1.0)] {
             let value = sign * levels.extreme();
             if !levels.piles_up() {
                 continue;
             }
-            let runs: Vec<FlatRun> = self
-                .track
-                .flat
-                .runs()
-                .iter()
-                .filter(|run| run.value == value)
-                .copied()
-                .collect();
+            let runs = flat.runs.iter().filter(|run| run.value == value);
+            let runs: Vec<FlatRun> = runs.copied().collect();
             let position = self.track.channel.role == ChannelRole::Position;
             let longest = runs.iter().map(|run| run.rows).max().unwrap_or(0);
             // A torque that meets a limit does so while its joint is driven; positions and
@@ -232,7 +206,7 @@ impl<'a> Flatness<'a> {
     /// Runs at any other value.
     fn stuck(&mut self) {
         let position = self.track.channel.role == ChannelRole::Position;
-        for run in self.track.flat.runs() {
+        for run in &self.track.flat.runs {
             let long = run.rows >= STUCK_ROWS
                 && run.rows as f64 >= 5.0 * self.usual.min(STUCK_ROWS as f64);
             if !long || self.tops.iter().any(|top| top.is(run)) {
@@ -246,8 +220,7 @@ impl<'a> Flatness<'a> {
         }
     }
 
-    /// Takes out the runs in which a torque is exactly 0: a motor that is switched off has none, and
-    /// its joint may swing on. A dead channel looks alike; what distinguishes the two is the motion.
+    /// Takes out the runs in which a torque is exactly 0: a motor is off or a channel dead, which the motion shows.
     fn off(&mut self, place: usize, draft: &mut FaultList) {
         if self.track.channel.role != ChannelRole::Torque {
             return;
@@ -259,30 +232,21 @@ impl<'a> Flatness<'a> {
         runs.dedup_by(|a, b| a.is(b));
         for run in &runs {
             episodes.add(run.from, run.to, run.rows, 0.0);
-            draft.off.push((place, [run.from, run.to]));
+            draft.found.off.push((place, [run.from, run.to]));
         }
         self.tops.retain(|run| !runs.iter().any(|off| off.is(run)));
         self.stuck.retain(|run| !runs.iter().any(|off| off.is(run)));
-        let effect = |rows: u64, times: usize| {
-            format!(
-                "{} of exactly 0 while the joint moves: data of a motor that is switched off, if the joint moves as the robot does without it; a fit finds out, and leaves the rows out if not",
-                rows_text(rows, times)
-            )
-        };
+        let effect = "of exactly 0 while the joint moves: data of a motor that is switched off, if the joint moves as the robot does without it; a fit finds out, and leaves the rows out if not";
         let remedy = "nothing where the motor was off; else check cable, sensor and recorder of this channel";
-        let name = Some(self.track.channel.name.as_str());
-        draft.stretches(FaultKind::MotorOff, Info, name, &episodes, &effect, remedy);
+        let fault = (Info, FaultKind::MotorOff, Some(self.track));
+        draft.rows(fault, &episodes, effect, remedy);
     }
 
-    fn report(&self, track: &Track, draft: &mut FaultList) {
-        let name = Some(track.channel.name.as_str());
+    fn report(&self, draft: &mut FaultList) {
+        let track = self.track;
         let role = track.channel.role;
-        let used = matches!(role, ChannelRole::Position | ChannelRole::Torque);
-        let then = if used {
-            "these rows are left out of a fit"
-        } else {
-            "a fit does not read this channel"
-        };
+        let used = role.is_fitted();
+        let severity = if used { Warning } else { Info };
         let gathered = |runs: &[FlatRun]| {
             let mut episodes = Episodes::default();
             for run in runs {
@@ -291,63 +255,48 @@ impl<'a> Flatness<'a> {
             }
             episodes
         };
-        let tops = gathered(&self.tops);
-        let kind = if role == ChannelRole::Torque {
-            FaultKind::Saturation
-        } else {
-            FaultKind::Clipping
-        };
         // What an amplifier gave at its limit is what acted.
         let applied = track.channel.saturates;
-        let effect = |rows: u64, times: usize| {
-            let then = match applied {
-                true => {
-                    "the amplifier gives no more; as what is logged is what was applied, a fit may use it"
-                }
-                false if used => {
-                    "the true values are beyond, so that these rows are left out of a fit"
-                }
-                false => "the true values are beyond; a fit does not read this channel",
-            };
-            format!(
-                "{} flat at {} or {}, which is never exceeded: {then}",
-                rows_text(rows, times),
-                track.low,
-                track.high
-            )
+        let then = match applied {
+            true => {
+                "the amplifier gives no more; as what is logged is what was applied, a fit may use it"
+            }
+            false if used => "the true values are beyond, so that these rows are left out of a fit",
+            false => "the true values are beyond; a fit does not read this channel",
         };
+        let effect = format!(
+            "flat at {} or {}, which is never exceeded: {then}",
+            track.low, track.high
+        );
         let remedy = match applied {
             true => "choose a slower motion where the robot should follow its reference",
             false => "choose a slower motion or a wider measuring range",
         };
-        let severity = if used { Warning } else { Info };
-        let of_tops = if applied { Info } else { severity };
-        // Reported as reaching the limit of the robot file where that is known.
-        if track.at_limit.is_empty() {
-            draft.stretches(kind, of_tops, name, &tops, &effect, remedy);
-        }
-        let stuck = gathered(&self.stuck);
-        let effect = |rows: u64, times: usize| {
-            format!(
-                "{} of one value while the joint moves: {then}",
-                rows_text(rows, times)
-            )
+        let kind = match role {
+            ChannelRole::Torque => FaultKind::Saturation,
+            _ => FaultKind::Clipping,
         };
+        let tops = gathered(&self.tops);
+        let of_tops = (if applied { Info } else { severity }, kind, Some(track));
+        // Reported as reaching the limit of the robot file where that is known.
+        if track.at_limit.list.is_empty() {
+            draft.rows(of_tops, &tops, &effect, remedy);
+        }
+        let then = match used {
+            true => "these rows are left out of a fit",
+            false => "a fit does not read this channel",
+        };
+        let effect = format!("of one value while the joint moves: {then}");
         let remedy =
             "check cable, sensor and recorder of this channel; record again if much is lost";
-        draft.stretches(
-            FaultKind::StuckChannel,
-            severity,
-            name,
-            &stuck,
-            &effect,
-            remedy,
-        );
+        let stuck = gathered(&self.stuck);
+        let of_stuck = (severity, FaultKind::StuckChannel, Some(track));
+        draft.rows(of_stuck, &stuck, &effect, remedy);
         if used {
             if !applied {
-                draft.cut(kind, name, &tops);
+                draft.cut(of_tops, &tops);
             }
-            draft.cut(FaultKind::StuckChannel, name, &stuck);
+            draft.cut(of_stuck, &stuck);
         }
     }
 }
@@ -366,71 +315,54 @@ fn spikes(
         false => track.spikes.nearly_all(),
     };
     let grain = track.flat.steps.quantile_not_zero(0.05);
-    let least = (SPIKE * usual)
-        .max(ABRUPT_STEPS * grain)
-        .max(match track.channel.role {
-            // A row that is off makes twice its height of the second difference.
-            ChannelRole::Position => 0.5 * position::drive(track, clock),
-            _ => SPIKE_SHARE * track.deviation(),
-        });
+    let of_motion = match track.channel.role {
+        // A row that is off makes twice its height of the second difference.
+        ChannelRole::Position => 0.5 * position::drive(track, clock),
+        _ => SPIKE_SHARE * track.deviation(),
+    };
+    let least = (SPIKE * usual).max(ABRUPT_STEPS * grain).max(of_motion);
     let shown = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
-    let all = track.spikes.found().iter();
-    let high: Vec<_> = all
-        .filter(|s| s.height.abs() > least && !shown(s.t))
-        .collect();
+    let mut high: Vec<_> = track.spikes.found.iter().collect();
+    high.retain(|spike| spike.height.abs() > least && !shown(spike.t));
     let mut episodes = Episodes::default();
     let mut highest = 0.0f64;
     for spike in &high {
         episodes.add(spike.t, spike.t, 1, 3.5 * clock.dt);
         highest = highest.max(spike.height.abs());
     }
-    if episodes.is_empty() {
+    if high.is_empty() {
         return;
     }
-    let used = matches!(
-        track.channel.role,
-        ChannelRole::Position | ChannelRole::Torque
-    );
-    let (severity, then) = if used {
-        (
+    let used = track.channel.role.is_fitted();
+    let (severity, then) = match used {
+        true => (
             Warning,
             "differentiated or squared they outweigh thousands of good rows; a fit bridges them by their neighbours",
-        )
-    } else {
-        (Info, "a fit does not read this channel")
+        ),
+        false => (Info, "a fit does not read this channel"),
     };
-    let effect = |rows: u64, times: usize| {
-        format!(
-            "{} off the rows about by up to {highest:.3e}: {then}",
-            rows_text(rows, times)
-        )
-    };
+    let effect = format!("off the rows about by up to {highest:.3e}: {then}");
     let remedy = "look for a loose cable, a lost bus message or a counter that overflows";
-    draft.stretches(
-        FaultKind::Spike,
-        severity,
-        Some(&track.channel.name),
-        &episodes,
-        &effect,
-        remedy,
-    );
-    if used && draft.acts(FaultKind::Spike, Some(&track.channel.name)) {
+    let fault = (severity, FaultKind::Spike, Some(track));
+    draft.rows(fault, &episodes, &effect, remedy);
+    if used && draft.acts(fault) {
         let bad = |t: f64| high.iter().any(|spike| spike.t == t);
         for spike in &high {
             match spike.bridge(&bad) {
-                Some(value) => draft.bridges.push((spike.t, place, value)),
+                Some(value) => draft.found.bridges.push(Bridge {
+                    t: spike.t,
+                    channel: place,
+                    value,
+                }),
                 None => draft.cuts.push(([spike.t; 2], FaultKind::Spike)),
             }
         }
     }
 }
 
-fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut FaultList) {
-    let index = judge
-        .tracks
-        .iter()
-        .position(|other| std::ptr::eq(other, track));
-    let Some(step) = index.and_then(|index| grain::step(judge.windows.iter(), index)) else {
+fn coarse(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
+    let track = &judge.tracks[place];
+    let Some(step) = grain::step(&judge.windows.kept, place) else {
         return;
     };
     let levels = track.travel() / step;
@@ -449,7 +381,7 @@ fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut Fault
             let band = judge.band_hz;
             let w = std::f64::consts::TAU * band;
             let noise = step * (clock.dt * band / 30.0).sqrt() * w * w;
-            let share = noise / excitation.acceleration_rms();
+            let share = noise / excitation.rms(0);
             if share > COARSE_ACCELERATION_SHARE {
                 let effect = format!(
                     "steps of {step:.3e}: below {band} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",

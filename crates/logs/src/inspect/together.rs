@@ -1,14 +1,16 @@
 //! Faults that show between channels: copies, rows that repeat, velocities that lag.
 
 use super::detectors::clock::ClockFacts;
+use super::detectors::flat::Flat;
 use super::detectors::grain;
 use super::detectors::velocity;
-use super::draft::{FaultList, rows_text, seconds};
+use super::draft::{FaultList, seconds};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind, LogFault};
 use super::judge::{Depth, LogJudge, Track};
 use super::lag;
 use super::words::ChannelRole;
+use crate::log::escape;
 use cft_ident_core::number;
 use std::f64::consts::{PI, TAU};
 
@@ -22,61 +24,51 @@ const SCALE_TOLERANCE: f64 = 0.1;
 /// Noise over range below which a position is no measurement.
 const NOISELESS_SHARE_OF_RANGE: f64 = 1e-8;
 
-/// The faults between channels.
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     copies(judge, draft);
     repeated_parts(judge, draft);
     if judge.depth == Depth::Whole {
         // At the gate the reader has left them out already.
         repeated_rows(judge, clock, draft);
-    }
-    if judge.depth == Depth::Whole {
         velocities(judge, clock, draft);
         lag::faults(judge, clock, draft);
         noiseless(judge, draft);
     }
 }
 
+/// The positions' own steps.
+fn flats(judge: &LogJudge) -> Vec<&Flat> {
+    let positions = judge.positions.iter();
+    positions.map(|index| &judge.tracks[*index].flat).collect()
+}
+
 /// Stretches in which everything is frozen.
 pub(super) fn stalls(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
-    let flats: Vec<_> = judge
-        .positions
-        .iter()
-        .map(|index| &judge.tracks[*index].flat)
-        .collect();
     let mut episodes = Episodes::default();
-    for stall in judge.repeats.stalls(&flats).iter() {
+    for stall in &judge.repeats.stalls(&flats(judge)).list {
         // The robot leaps on from the last frozen row to the next.
         episodes.add(stall.from, stall.to + clock.dt, stall.rows, 0.0);
     }
-    let effect = |rows: u64, times: usize| {
-        format!(
-            "{} in which positions, torques and velocities keep their last digit while the robot moves: controller or recorder froze, and these rows are left out of a fit",
-            rows_text(rows, times)
-        )
-    };
+    let effect = "in which positions, torques and velocities keep their last digit while the robot moves: controller or recorder froze, and these rows are left out of a fit";
     let remedy = "look for what held the controller up: a full disk, a blocked bus, another program; record again if much is lost";
-    draft.stretches(FaultKind::Stall, Warning, None, &episodes, &effect, remedy);
-    draft.stalls = episodes.iter().map(|e| [e.from, e.to]).collect();
-    draft.cut(FaultKind::Stall, None, &episodes);
+    let fault = (Warning, FaultKind::Stall, None);
+    draft.rows(fault, &episodes, effect, remedy);
+    draft.stalls = episodes.list.iter().map(|e| [e.from, e.to]).collect();
+    draft.cut(fault, &episodes);
 }
 
 fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
-    let flats: Vec<_> = judge
-        .positions
-        .iter()
-        .map(|index| &judge.tracks[*index].flat)
-        .collect();
-    let stale = judge.repeats.judge(&flats);
+    let stale = judge.repeats.judge(&flats(judge));
     if stale.moving == 0 {
         return;
     }
     let episodes = stale.episodes.merged();
-    let (from, to) = match (episodes.first(), episodes.last()) {
-        (Some((first, _)), Some((last, _))) => (first.from, last.to),
-        _ => return,
+    let (Some((begin, _)), Some((end, _))) = (episodes.first(), episodes.last()) else {
+        return;
     };
+    let (from, to) = (begin.from, end.to);
     let first = judge.clock.first.unwrap_or(0.0);
+    let remedy = "log each sample of the robot once, by the robot's own clock";
     if let Some(rows) = judge.repeats.hold(stale.moving) {
         let repeated = judge.repeats.repeated();
         let effect = format!(
@@ -84,19 +76,13 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             100.0 * repeated as f64 / judge.clock.rows.max(1) as f64,
             seconds(rows as f64 * clock.dt)
         );
-        let remedy = "log each sample of the robot once, by the robot's own clock";
-        draft.faults.push(LogFault {
+        let (kind, to_s) = (FaultKind::SampleAndHold, judge.clock.duration());
+        draft.found.faults.push(LogFault {
             rows: repeated,
-            ..LogFault::whole(
-                Warning,
-                FaultKind::SampleAndHold,
-                judge.clock.duration(),
-                effect,
-                remedy,
-            )
+            ..LogFault::whole(Warning, kind, to_s, effect, remedy)
         });
-        if draft.acts(FaultKind::SampleAndHold, None) {
-            draft.held = Some(rows);
+        if draft.acts((Warning, kind, None)) {
+            draft.found.held = Some(rows);
         }
         return;
     }
@@ -107,38 +93,23 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             rows => format!("{rows} rows repeat"),
         }
     );
-    let remedy = "log each sample of the robot once, by the robot's own clock";
-    draft.faults.push(LogFault {
+    let kind = FaultKind::RepeatedRows;
+    draft.found.faults.push(LogFault {
         from_s: from - first,
         rows: stale.rows,
-        ..LogFault::whole(Warning, FaultKind::RepeatedRows, to - first, effect, remedy)
+        ..LogFault::whole(Warning, kind, to - first, effect, remedy)
     });
-    if draft.acts(FaultKind::RepeatedRows, None) {
+    if draft.acts((Warning, kind, None)) {
         let cuts = stale.cuts.into_iter();
-        draft
-            .cuts
-            .extend(cuts.map(|span| (span, FaultKind::RepeatedRows)));
+        draft.cuts.extend(cuts.map(|span| (span, kind)));
     }
 }
 
-/// Stretches that stand in the log before.
 fn repeated_parts(judge: &LogJudge, draft: &mut FaultList) {
-    let episodes = judge.replays.found();
-    let effect = |rows: u64, times: usize| {
-        format!(
-            "{} that stand in the log before, number for number: a file was appended to itself, or a buffer written twice. Counted twice, they make intervals too narrow",
-            rows_text(rows, times)
-        )
-    };
+    let effect = "that stand in the log before, number for number: a file was appended to itself, or a buffer written twice. Counted twice, they make intervals too narrow";
     let remedy = "leave them out of a fit: `--leave-out FROM..TOs`; a simulation without noise repeats itself rightly";
-    draft.stretches(
-        FaultKind::RepeatedPart,
-        Warning,
-        None,
-        &episodes,
-        &effect,
-        remedy,
-    );
+    let fault = (Warning, FaultKind::RepeatedPart, None);
+    draft.rows(fault, &judge.replays.found(), effect, remedy);
 }
 
 fn copies(judge: &LogJudge, draft: &mut FaultList) {
@@ -146,56 +117,48 @@ fn copies(judge: &LogJudge, draft: &mut FaultList) {
         let track = |index: usize| &judge.tracks[judge.compared[index]];
         let (first, second) = (track(copy.first), track(copy.second));
         let (a, b) = (first.channel.role, second.channel.role);
-        let sign = if copy.opposite {
-            ", with the other sign,"
-        } else {
-            ""
+        let sign = match copy.opposite {
+            true => ", with the other sign,",
+            false => "",
         };
-        let name = |track: &Track| crate::log::escape(&track.channel.name);
+        let equals = |other: &Track| {
+            let name = escape(&other.channel.name);
+            format!("equals `{name}`{sign} in every row")
+        };
+        let copied = FaultKind::CopiedChannel;
+        use ChannelRole::{Command, Position, Torque, Velocity};
         let (severity, kind, of, effect, remedy) = match (a, b) {
-            (ChannelRole::Command, ChannelRole::Command) => continue,
-            (ChannelRole::Command, _) | (_, ChannelRole::Command) => {
+            (Command, Command) => continue,
+            (Command, _) | (_, Command) => {
                 let (command, measured) = match a {
-                    ChannelRole::Command => (first, second),
+                    Command => (first, second),
                     _ => (second, first),
                 };
-                let effect = format!(
-                    "equals `{}`{sign} in every row: it is the command and no measurement, and a fit takes tracking errors for forces",
-                    name(command)
-                );
+                let effect = equals(command)
+                    + ": it is the command and no measurement, and a fit takes tracking errors for forces";
                 let remedy = "log the measured value, or name the measured column in the [log] section of the robot file";
                 let kind = FaultKind::CommandAsMeasurement;
                 (Warning, kind, measured, effect, remedy)
             }
-            (ChannelRole::Position, ChannelRole::Position)
-            | (ChannelRole::Torque, ChannelRole::Torque) => {
-                let effect = format!(
-                    "equals `{}`{sign} in every row: one of the two is not what it says, and the data of a joint are missing",
-                    name(first)
-                );
+            (Position, Position) | (Torque, Torque) => {
+                let effect = equals(first)
+                    + ": one of the two is not what it says, and the data of a joint are missing";
                 let remedy = "check the columns of the recorder; name the right ones in the [log] section of the robot file";
-                (Error, FaultKind::CopiedChannel, second, effect, remedy)
+                (Error, copied, second, effect, remedy)
             }
-            (ChannelRole::Position, ChannelRole::Velocity)
-            | (ChannelRole::Velocity, ChannelRole::Position) => {
-                let effect = format!(
-                    "equals `{}`{sign} in every row: one of the two is not what it says, and a fit to it means nothing",
-                    name(first)
-                );
+            (Position, Velocity) | (Velocity, Position) => {
+                let effect = equals(first)
+                    + ": one of the two is not what it says, and a fit to it means nothing";
                 let remedy =
                     "name the column of the position in the [log] section of the robot file";
-                (Error, FaultKind::CopiedChannel, second, effect, remedy)
+                (Error, copied, second, effect, remedy)
             }
             _ => {
-                let effect = format!("equals `{}`{sign} in every row", name(first));
                 let remedy = "check the columns of the recorder";
-                (Warning, FaultKind::CopiedChannel, second, effect, remedy)
+                (Warning, copied, second, equals(first), remedy)
             }
         };
-        draft.whole(severity, kind, of, effect, remedy);
-        if let Some(fault) = draft.faults.last_mut() {
-            fault.rows = copy.rows;
-        }
+        draft.of_log((severity, kind, Some(of)), copy.rows, effect, remedy);
     }
 }
 
@@ -204,10 +167,10 @@ fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
         let (ChannelRole::Velocity, Some(position)) = (track.channel.role, track.position) else {
             continue;
         };
-        let Some(found) = velocity::follows(judge.windows.iter(), position, index) else {
+        let Some(found) = velocity::follows(&judge.windows.kept, position, index) else {
             continue;
         };
-        let of = crate::log::escape(&judge.tracks[position].channel.name);
+        let of = escape(&judge.tracks[position].channel.name);
         if found.best < -0.7 {
             let effect = format!(
                 "runs against the derivative of `{of}` (correlation {:.3}): one of the two has the wrong sign",
@@ -271,13 +234,13 @@ fn named_ratio(times: f64) -> Option<&'static str> {
 /// Names the joint whose velocity a channel really is.
 fn other_joint(judge: &LogJudge, (index, own): (usize, usize), draft: &mut FaultList) {
     let follows = |position: &&usize| {
-        let found = velocity::follows(judge.windows.iter(), **position, index);
+        let found = velocity::follows(&judge.windows.kept, **position, index);
         **position != own && found.is_some_and(|found| found.best.abs() > MIN_CORRELATION)
     };
     let Some(other) = judge.positions.iter().find(follows) else {
         return;
     };
-    let name = |place: usize| crate::log::escape(&judge.tracks[place].channel.name);
+    let name = |place: usize| escape(&judge.tracks[place].channel.name);
     let effect = format!(
         "is no derivative of `{}` but that of `{}`: velocities or positions are exchanged",
         name(own),
@@ -292,11 +255,11 @@ fn other_joint(judge: &LogJudge, (index, own): (usize, usize), draft: &mut Fault
 fn noiseless(judge: &LogJudge, draft: &mut FaultList) {
     for &index in &judge.positions {
         let track = &judge.tracks[index];
-        let noise = match grain::step(judge.windows.iter(), index) {
+        let noise = match grain::step(&judge.windows.kept, index) {
             Some(_) => continue,
-            None => grain::noise(judge.windows.iter(), index),
+            None => grain::noise(&judge.windows.kept, index),
         };
-        let shown = draft.faults.iter().any(|fault| {
+        let shown = draft.found.faults.iter().any(|fault| {
             fault.kind == FaultKind::CommandAsMeasurement
                 && fault.channel.as_ref() == Some(&track.channel.name)
         });

@@ -29,7 +29,6 @@ impl LogJudge {
     }
 }
 
-/// Everything there is to say.
 fn conclude(judge: &LogJudge) -> Findings {
     let clock = judge.clock.facts();
     let first = judge.clock.first.unwrap_or(0.0);
@@ -44,24 +43,12 @@ fn conclude(judge: &LogJudge) -> Findings {
     }
     together::faults(judge, &clock, &mut draft);
     let costs = costs(&draft, &clock);
-    let FaultList {
-        mut faults,
-        cuts,
-        mut bridges,
-        failed,
-        wraps,
-        off,
-        held,
-        ..
-    } = draft;
-    bridges.sort_by(|a, b| a.0.total_cmp(&b.0));
-    faults.sort_by(|a, b| {
-        let severity = b.severity.cmp(&a.severity);
-        severity
-            .then(a.from_s.total_cmp(&b.from_s))
-            .then(a.kind.cmp(&b.kind))
-    });
     let rate = (clock.dt > 0.0).then(|| 1.0 / clock.dt);
+    let gap = |[from, to]: &[f64; 2]| Gap {
+        from_s: from - first,
+        to_s: to - first,
+    };
+    let places = 0..judge.tracks.len();
     let mut found = Findings {
         rows: judge.clock.rows,
         begins_s: first,
@@ -69,30 +56,17 @@ fn conclude(judge: &LogJudge) -> Findings {
         rate_hz: rate,
         jitter: rate.map(|_| clock.jitter),
         even_rate_hz: even_rate(judge, &clock),
-        gaps: clock
-            .gaps
-            .iter()
-            .map(|[from, to]| Gap {
-                from_s: from - first,
-                to_s: to - first,
-            })
-            .collect(),
-        channels: judge
-            .tracks
-            .iter()
-            .enumerate()
-            .map(|(index, track)| channel_facts(judge, index, track, rate))
+        gaps: clock.gaps.iter().map(gap).collect(),
+        channels: places
+            .map(|place| channel_facts(judge, place, rate))
             .collect(),
         joints: joints(judge),
-        faults,
         costs,
-        cuts: joined(cuts.into_iter().map(|(span, _)| span).collect()),
-        bridges,
-        failed,
-        wraps,
-        off,
-        held,
+        cuts: joined(draft.cuts.into_iter().map(|(span, _)| span).collect()),
+        ..draft.found
     };
+    found.bridges.sort_by(|a, b| a.t.total_cmp(&b.t));
+    found.sort();
     found.place();
     found
 }
@@ -106,70 +80,59 @@ fn costs(draft: &FaultList, clock: &ClockFacts) -> Vec<RowCost> {
         let spans = draft.cuts.iter().filter(|(_, of)| *of == kind);
         let spans = joined(spans.map(|(span, _)| *span).collect());
         let rows = |[from, to]: &[f64; 2]| ((to - from) / clock.dt).round().clamp(0.0, 1e15) as u64;
-        RowCost {
-            kind,
-            rows: spans.iter().map(|span| rows(span) + 1).sum(),
-            fate: RowFate::LeftOut,
-        }
+        let rows = spans.iter().map(|span| rows(span) + 1).sum();
+        (kind, rows, RowFate::LeftOut)
     };
-    let mut costs: Vec<RowCost> = causes.into_iter().map(left_out).collect();
-    if !draft.bridges.is_empty() {
-        let mut times: Vec<f64> = draft.bridges.iter().map(|(t, ..)| *t).collect();
-        times.sort_by(f64::total_cmp);
-        times.dedup();
-        costs.push(RowCost {
-            kind: FaultKind::Spike,
-            rows: times.len() as u64,
-            fate: RowFate::Bridged,
-        });
-    }
-    if !draft.failed.is_empty() {
-        costs.push(RowCost {
-            kind: FaultKind::FailedRead,
-            rows: draft.failed.len() as u64,
-            fate: RowFate::LeftOut,
-        });
-    }
-    let held = draft
-        .faults
-        .iter()
-        .find(|fault| fault.kind == FaultKind::SampleAndHold);
-    costs.extend(held.filter(|fault| fault.cut).map(|fault| RowCost {
-        kind: fault.kind,
-        rows: fault.rows,
-        fate: RowFate::LeftOut,
-    }));
-    costs.sort_by(|a, b| b.rows.cmp(&a.rows).then(a.kind.cmp(&b.kind)));
+    let found = &draft.found;
+    let mut bridged: Vec<f64> = found.bridges.iter().map(|bridge| bridge.t).collect();
+    bridged.sort_by(f64::total_cmp);
+    bridged.dedup();
+    let mut faults = found.faults.iter();
+    let held = faults.find(|fault| fault.kind == FaultKind::SampleAndHold);
+    let held = held.filter(|fault| fault.cut).map_or(0, |fault| fault.rows);
+    let others = [
+        (FaultKind::Spike, bridged.len() as u64, RowFate::Bridged),
+        (
+            FaultKind::FailedRead,
+            found.failed.len() as u64,
+            RowFate::LeftOut,
+        ),
+        (FaultKind::SampleAndHold, held, RowFate::LeftOut),
+    ];
+    let others = others.into_iter().filter(|(_, rows, _)| *rows > 0);
+    let all = causes.into_iter().map(left_out).chain(others);
+    let mut costs: Vec<RowCost> = all
+        .map(|(kind, rows, fate)| RowCost { kind, rows, fate })
+        .collect();
+    RowCost::sort(&mut costs);
     costs
 }
 
 /// Rows in which every channel reads one number.
 fn failed_reads(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
-    let (times, value) = (judge.failed.times(), judge.failed.value());
+    let (times, value) = (&judge.failed.times, judge.failed.value);
     let mut episodes = Episodes::default();
     for t in times {
         episodes.add(*t, *t, 1, 1.5 * clock.dt);
     }
-    let effect = |rows: u64, times: usize| {
-        format!(
-            "{} in which every channel reads {value} while the robot is elsewhere: nothing was read, and a fit leaves them out",
-            rows_text(rows, times)
-        )
-    };
+    let effect = format!(
+        "in which every channel reads {value} while the robot is elsewhere: nothing was read, and a fit leaves them out"
+    );
     let remedy = "look for lost messages of the bus; log rows that were read, and no others";
-    let kind = FaultKind::FailedRead;
-    draft.stretches(kind, Warning, None, &episodes, &effect, remedy);
-    if !times.is_empty() && draft.acts(kind, None) {
-        draft.failed = times.to_vec();
+    let fault = (Warning, FaultKind::FailedRead, None);
+    draft.rows(fault, &episodes, &effect, remedy);
+    if !times.is_empty() && draft.acts(fault) {
+        draft.found.failed = times.to_vec();
     }
 }
 
-fn channel_facts(judge: &LogJudge, index: usize, track: &Track, rate: Option<f64>) -> ChannelFacts {
+fn channel_facts(judge: &LogJudge, place: usize, rate: Option<f64>) -> ChannelFacts {
+    let track = &judge.tracks[place];
     let number = |x: f64| x.is_finite().then_some(x);
     let share = track.rows as f64 / judge.clock.rows.max(1) as f64;
     let step = match judge.depth {
         Depth::Gate => None,
-        Depth::Whole => grain::step(judge.windows.iter(), index),
+        Depth::Whole => grain::step(&judge.windows.kept, place),
     };
     ChannelFacts {
         name: track.channel.name.clone(),
@@ -185,20 +148,19 @@ fn channel_facts(judge: &LogJudge, index: usize, track: &Track, rate: Option<f64
 
 fn joints(judge: &LogJudge) -> Vec<JointMotion> {
     let tracks = judge.positions.iter().map(|index| &judge.tracks[*index]);
-    tracks
-        .filter_map(|track| {
-            let name = match track.channel.joint.as_deref() {
-                None | Some("") => &track.channel.name,
-                Some(joint) => joint,
-            };
-            let excitation = track.excitation.as_ref()?;
-            let moves = judge.moves(track);
-            Some(JointMotion {
-                unit: track.channel.unit.clone(),
-                ..excitation.facts(name, &track.channel.name, track.travel(), moves)
-            })
+    let facts = tracks.filter_map(|track| {
+        let name = match track.channel.joint.as_deref() {
+            None | Some("") => &track.channel.name,
+            Some(joint) => joint,
+        };
+        let excitation = track.excitation.as_ref()?;
+        let moves = judge.moves(track);
+        Some(JointMotion {
+            unit: track.channel.unit.clone(),
+            ..excitation.facts(name, &track.channel.name, track.travel(), moves)
         })
-        .collect()
+    });
+    facts.collect()
 }
 
 /// The rate of the rows where the clock is too coarse for them.
@@ -218,16 +180,13 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             rows_text(seen.without_time, 1)
         );
         let remedy = "delete these rows, or name the right time column in the [log] section of the robot file";
-        draft.of_log(Error, FaultKind::Nan, seen.without_time, effect, remedy);
+        let fault = (Error, FaultKind::Nan, None);
+        draft.of_log(fault, seen.without_time, effect, remedy);
     }
     let effect = |rows: u64, times: usize| {
-        let which = if times > 1 {
-            format!("{times} times, ")
-        } else {
-            String::new()
-        };
         format!(
-            "{which}{} at the time of the row before: no velocity can be formed, and the log is refused",
+            "{}{} at the time of the row before: no velocity can be formed, and the log is refused",
+            often(times, "times, "),
             rows_text(rows, 1)
         )
     };
@@ -238,39 +197,22 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
         ),
         None => "delete duplicate rows; where rows lie evenly, `rate_hz = ..` in [log] of the robot file, in place of `time`".to_owned(),
     };
-    draft.stretches(
-        FaultKind::RepeatedTime,
-        Error,
-        None,
-        &seen.repeated,
-        &effect,
-        remedy,
-    );
+    let fault = (Error, FaultKind::RepeatedTime, None);
+    draft.stretches(fault, &seen.repeated, &effect, remedy);
     let effect = |_: u64, times: usize| {
-        let which = if times > 1 {
-            format!("{times} times ")
-        } else {
-            String::new()
-        };
         format!(
-            "time runs {which}backwards: derivatives across it are wrong, and the log is refused"
+            "time runs {}backwards: derivatives across it are wrong, and the log is refused",
+            often(times, "times ")
         )
     };
     let remedy = "sort the rows by time, or split the file where a second recording begins";
-    draft.stretches(
-        FaultKind::BackwardTime,
-        Error,
-        None,
-        &seen.backward,
-        &effect,
-        remedy,
-    );
+    let fault = (Error, FaultKind::BackwardTime, None);
+    draft.stretches(fault, &seen.backward, &effect, remedy);
     gap_faults(clock, draft);
     if clock.uneven > UNEVEN_STEPS_SHARE || clock.jitter > JITTER_SHARE {
-        let severity = if clock.uneven > UNEVEN_STEPS_SHARE {
-            Warning
-        } else {
-            Info
+        let severity = match clock.uneven > UNEVEN_STEPS_SHARE {
+            true => Warning,
+            false => Info,
         };
         let effect = format!(
             "steps from {} to {}, median {}, {:.1} % of them off it by more than a tenth: samples are interpolated onto an even clock, which is right as far as the times are those of the measurements",
@@ -280,13 +222,15 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             100.0 * clock.uneven
         );
         let remedy = "log the time at which a sample was taken, not at which it was written";
-        draft.of_log(
-            severity,
-            FaultKind::IrregularClock,
-            seen.rows,
-            effect,
-            remedy,
-        );
+        let fault = (severity, FaultKind::IrregularClock, None);
+        draft.of_log(fault, seen.rows, effect, remedy);
+    }
+}
+
+fn often(times: usize, what: &str) -> String {
+    match times {
+        0 | 1 => String::new(),
+        many => format!("{many} {what}"),
     }
 }
 
@@ -298,18 +242,15 @@ fn gap_faults(clock: &ClockFacts, draft: &mut FaultList) {
         gaps.add(*from, *to, lost.clamp(0.0, 1e15) as u64, -1.0);
     }
     let effect = |rows: u64, times: usize| {
-        let many = if times > 1 {
-            format!("{times} gaps, ")
-        } else {
-            String::new()
-        };
         format!(
-            "{many}about {} lost: a gap that the filter's band does not see is interpolated, a longer one parts the log and the ends of its stretches are given up",
+            "{}about {} lost: a gap that the filter's band does not see is interpolated, a longer one parts the log and the ends of its stretches are given up",
+            often(times, "gaps, "),
             rows_text(rows, 1)
         )
     };
     let remedy = "record with a larger buffer or a lower rate; a few gaps in a long log do no harm";
-    draft.stretches(FaultKind::Dropout, Warning, None, &gaps, &effect, remedy);
+    let fault = (Warning, FaultKind::Dropout, None);
+    draft.stretches(fault, &gaps, &effect, remedy);
 }
 
 /// Positions that move faster than the robot can, where no velocity of the joint was logged that says so itself.
@@ -325,29 +266,16 @@ fn speed_faults(judge: &LogJudge, place: usize, draft: &mut FaultList) {
         return;
     }
     let unit = track.channel.unit.as_deref().unwrap_or_default();
-    let effect = |rows: u64, times: usize| {
-        format!(
-            "{} in which it moves faster than {limit} {unit}/s, the limit of its joint: unit, encoder or limit is wrong, or the times are",
-            rows_text(rows, times)
-        )
-    };
-    let remedy = "check the unit of this channel and of the time in [log], and `speed` in [limits] of the robot file";
-    draft.stretches(
-        FaultKind::BeyondLimits,
-        Warning,
-        Some(&track.channel.name),
-        &motion.too_fast,
-        &effect,
-        remedy,
+    let effect = format!(
+        "in which it moves faster than {limit} {unit}/s, the limit of its joint: unit, encoder or limit is wrong, or the times are"
     );
+    let remedy = "check the unit of this channel and of the time in [log], and `speed` in [limits] of the robot file";
+    let fault = (Warning, FaultKind::BeyondLimits, Some(track));
+    draft.rows(fault, &motion.too_fast, &effect, remedy);
 }
 
 fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
-    let name = Some(track.channel.name.as_str());
-    let used = matches!(
-        track.channel.role,
-        ChannelRole::Position | ChannelRole::Torque
-    );
+    let used = track.channel.role.is_fitted();
     if track.rows == 0 && !used {
         // A column of words is no channel.
         return;
@@ -361,9 +289,7 @@ fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
         ),
         _ => (Info, "a fit does not read this channel"),
     };
-    let effect = |rows: u64, times: usize| {
-        format!("{} without a finite number: {then}", rows_text(rows, times))
-    };
+    let effect = format!("without a finite number: {then}");
     let remedy = match messages {
         true => {
             "nothing where each message holds some of the joints; else look at what publishes them"
@@ -372,46 +298,22 @@ fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
             "delete the rows without a measurement: a gap in time is handled, a made-up number is not"
         }
     };
-    draft.stretches(
-        FaultKind::Nan,
-        severity,
-        name,
-        &track.missing,
-        &effect,
-        remedy,
+    let fault = (severity, FaultKind::Nan, Some(track));
+    draft.rows(fault, &track.missing, &effect, remedy);
+    let Some([low, high]) = track.channel.limits else {
+        return;
+    };
+    let effect = format!(
+        "outside [{low}, {high}], reaching {} and {}: unit, sign, offset or limit is wrong, or the machine was driven too far",
+        track.low, track.high
     );
-    if let Some([low, high]) = track.channel.limits {
-        let effect = |rows: u64, times: usize| {
-            format!(
-                "{} outside [{low}, {high}], reaching {} and {}: unit, sign, offset or limit is wrong, or the machine was driven too far",
-                rows_text(rows, times),
-                track.low,
-                track.high
-            )
-        };
-        let remedy = "check the unit and offset of this channel in [log], and the limit in [limits] of the robot file";
-        draft.stretches(
-            FaultKind::BeyondLimits,
-            Warning,
-            name,
-            &track.beyond,
-            &effect,
-            remedy,
-        );
-        let effect = |rows: u64, times: usize| {
-            format!(
-                "{} at the limit of [{low}, {high}]: the amplifier gives no more; as what is logged is what was applied, a fit may use it",
-                rows_text(rows, times)
-            )
-        };
-        let remedy = "choose a slower motion where the robot should follow its reference";
-        draft.stretches(
-            FaultKind::Saturation,
-            Info,
-            name,
-            &track.at_limit,
-            &effect,
-            remedy,
-        );
-    }
+    let remedy = "check the unit and offset of this channel in [log], and the limit in [limits] of the robot file";
+    let fault = (Warning, FaultKind::BeyondLimits, Some(track));
+    draft.rows(fault, &track.beyond, &effect, remedy);
+    let effect = format!(
+        "at the limit of [{low}, {high}]: the amplifier gives no more; as what is logged is what was applied, a fit may use it"
+    );
+    let remedy = "choose a slower motion where the robot should follow its reference";
+    let fault = (Info, FaultKind::Saturation, Some(track));
+    draft.rows(fault, &track.at_limit, &effect, remedy);
 }

@@ -26,6 +26,18 @@ pub enum ChannelRole {
     Other,
 }
 
+impl ChannelRole {
+    /// Whether it is the motion or what drives it, whose shape is looked at.
+    pub(super) fn has_shape(self) -> bool {
+        matches!(self, Self::Position | Self::Velocity | Self::Torque)
+    }
+
+    /// Whether a fit reads it.
+    pub(super) fn is_fitted(self) -> bool {
+        matches!(self, Self::Position | Self::Torque)
+    }
+}
+
 /// A word of a name: letters alone in lower case, or digits alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Word {
@@ -81,17 +93,13 @@ pub fn words(name: &str) -> Vec<Word> {
                 });
             }
         }
-        small = match c.is_lowercase() {
-            true => small + 1,
-            false => 0,
-        };
+        small = if c.is_lowercase() { small + 1 } else { 0 };
         before = Some(c);
     }
     out
 }
 
-/// Words that make a command of whatever they stand in; the arm that leads another one is no measurement
-/// of the arm that follows.
+/// Words that make a command of whatever they stand in; an arm that leads is no measurement of the one that follows.
 const COMMANDS: &str = "\
     ref refs reference cmd cmds command commands commanded des desired target setpoint goal \
     wanted sp leader master operator teleop action ctrl soll sollwert setp demand";
@@ -156,11 +164,12 @@ pub fn slides(words: &[Word]) -> bool {
     has(words, SLIDING) && !has(words, "actuator")
 }
 
-fn lists(known: &str, word: &str) -> bool {
+/// Whether a list, whose words are parted by spaces, has this one.
+pub fn lists(known: &str, word: &str) -> bool {
     known.split_whitespace().any(|one| one == word)
 }
 
-/// Whether one of these words is in a list, whose words are parted by spaces.
+/// Whether one of these words is in a list.
 pub fn has(words: &[Word], known: &str) -> bool {
     words.iter().any(|word| lists(known, &word.text))
 }
@@ -222,19 +231,26 @@ const NOISE: &str = "\
     alpha ai ma jnt actuator counts count ticks turn turns rev revs revolutions mrad milliamps \
     newton amperes";
 
-/// A name without the words of a joint, where it has them in a row.
-pub fn without_joint(name: &str, joint: &str) -> String {
-    let (spoken, joint) = (words(name), words(joint));
+/// Where the words of a joint stand in those of a name, in a row [bytes].
+pub fn place_of(spoken: &[Word], joint: &str) -> Option<Range<usize>> {
+    let joint = words(joint);
     let same = |at: &&[Word]| at.iter().zip(&joint).all(|(a, b)| a.text == b.text);
-    match spoken.windows(joint.len().max(1)).find(same) {
-        Some([first, .., last]) => format!("{}#{}", &name[..first.at.start], &name[last.at.end..]),
-        Some([only]) => format!("{}#{}", &name[..only.at.start], &name[only.at.end..]),
-        _ => name.to_owned(),
-    }
+    let found = spoken.windows(joint.len().max(1)).find(same)?;
+    Some(found.first()?.at.start..found.last()?.at.end)
 }
 
-/// The signs of a name without the words of units, `#` kept: columns that differ in their units alone look the
-/// same.
+/// A name with `#` for what stands at a place.
+pub fn marked(name: &str, at: Range<usize>) -> String {
+    format!("{}#{}", &name[..at.start], &name[at.end..])
+}
+
+/// A name without the words of a joint, where it has them in a row.
+pub fn without_joint(name: &str, joint: &str) -> String {
+    let at = place_of(&words(name), joint);
+    at.map_or_else(|| name.to_owned(), |at| marked(name, at))
+}
+
+/// The signs of a name without the words of units, `#` kept: columns that differ in their units alone look the same.
 pub fn without_units(name: &str) -> String {
     const UNITS: &str = "\
         deg degs degree degrees rad rads mrad m mm cm nm mnm knm ncm n kn a v ma rpm per s turns \

@@ -5,8 +5,7 @@ use serde::Serialize;
 
 use super::column::LogColumn;
 use super::family::{How, temperatures};
-use super::fitting::{Taken, best, without_common_head};
-use super::left::{left, offered};
+use super::fitting::{Taken, best, left, offered, without_common_head};
 use super::look::{ClockSource, SeenColumns};
 use super::shown::{Known, shown};
 use super::units::{of_positions, of_torques, other_velocity, stated_position};
@@ -50,7 +49,7 @@ pub struct JointColumns {
 }
 
 /// The joints, each with its columns, and what is to be looked at.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mapping {
     pub joints: Vec<JointColumns>,
     /// How the columns were found, in words.
@@ -79,21 +78,13 @@ impl Mapping {
     /// The columns of the joints of a URDF, or of those that the log shows.
     pub fn of(known: Option<&[Known]>, seen: Option<&SeenColumns>) -> Self {
         let columns: &[LogColumn] = seen.map_or(&[], |seen| &seen.columns);
-        let joints: Vec<Known> = match known {
-            Some(known) => known.to_vec(),
-            None => shown(columns),
-        };
+        let joints = known.map_or_else(|| shown(columns), <[Known]>::to_vec);
         let names: Vec<&str> = joints.iter().map(|joint| joint.name.as_str()).collect();
         let mut out = Self {
             joints: joints.iter().map(plain).collect(),
             how: "by their names",
-            checks: Vec::new(),
-            others: Vec::new(),
             torque_is: "joint",
-            torque_check: None,
-            warnings: Vec::new(),
-            lacking: Vec::new(),
-            offered: Vec::new(),
+            ..Self::default()
         };
         let Some(seen) = seen else {
             return out;
@@ -139,52 +130,41 @@ impl Mapping {
         if seen.by_content {
             out.how = "by what they hold, for no name says it: CHECK IT";
         }
-        let [position, velocity, torque] = all;
         // words of a joint's name are no units
         let short = without_common_head(&names);
-        let beside = |columns: &[Option<LogColumn>]| -> Vec<Option<LogColumn>> {
+        let beside = |columns: &[Option<&LogColumn>]| -> Vec<Option<LogColumn>> {
+            let own = |(column, (joint, short)): (&Option<&LogColumn>, (&&str, &String))| {
+                let mut column = (*column)?.clone();
+                let bare = without_joint(&column.name, joint);
+                column.name = match bare == column.name {
+                    true => without_joint(&bare, short),
+                    false => bare,
+                };
+                Some(column)
+            };
             let pairs = columns.iter().zip(names.iter().zip(&short));
-            pairs
-                .map(|(column, (joint, short))| {
-                    let mut column = column.clone()?;
-                    let bare = without_joint(&column.name, joint);
-                    column.name = match bare == column.name {
-                        true => without_joint(&bare, short),
-                        false => bare,
-                    };
-                    Some(column)
-                })
-                .collect()
+            pairs.map(own).collect()
         };
-        let columns_of = |taken: &Option<Taken>| -> Vec<Option<LogColumn>> {
-            let none = vec![None; names.len()];
-            let cloned = |t: &Taken| t.columns.iter().map(|c| c.cloned()).collect();
-            taken.as_ref().map_or(none, cloned)
-        };
-        let (q, mut dq, tau) = (
-            columns_of(&position),
-            columns_of(&velocity),
-            columns_of(&torque),
-        );
+        let [q, mut dq, tau] = all.map(|taken| match taken {
+            Some(taken) => taken.columns,
+            None => vec![None; names.len()],
+        });
         if out.units(&joints, [&beside(&q), &beside(&dq), &beside(&tau)]) {
-            dq.iter_mut().for_each(|column| *column = None);
+            dq.fill(None);
         }
         let warm = temperatures(columns, &names);
         for (k, joint) in out.joints.iter_mut().enumerate() {
             joint.temperature = warm.as_ref().map(|columns| columns[k].clone());
-            let name = |column: &Option<LogColumn>| {
-                let column = column.as_ref()?;
-                Some(column.path.as_ref().unwrap_or(&column.name).clone())
-            };
-            joint.by_path = q[k].as_ref().is_some_and(|column| column.path.is_some());
-            (joint.position, joint.velocity, joint.torque) =
-                (name(&q[k]), name(&dq[k]), name(&tau[k]));
-            joint.wrap = q[k].as_ref().and_then(|c| c.wrap);
+            let name = |column: &LogColumn| column.path.as_ref().unwrap_or(&column.name).clone();
+            joint.by_path = q[k].is_some_and(|column| column.path.is_some());
+            joint.position = q[k].map(name);
+            joint.velocity = dq[k].map(name);
+            joint.torque = tau[k].map(name);
+            joint.wrap = q[k].and_then(|column| column.wrap);
             if seen.is_recording() {
-                let in_messages = q[k].as_ref().and_then(|c| c.name.strip_prefix("q_"));
-                joint.in_messages = in_messages
-                    .filter(|name| *name != joint.joint)
-                    .map(str::to_owned);
+                let other = q[k].and_then(|column| column.name.strip_prefix("q_"));
+                let other = other.filter(|name| *name != joint.joint);
+                joint.in_messages = other.map(str::to_owned);
             }
         }
         out.check_position(seen, &beside(&q));
@@ -217,43 +197,37 @@ impl Mapping {
     /// Says how a family was taken.
     fn note(&mut self, taken: &Taken, what: &str, joints: usize, by_content: bool) {
         let pattern = escape(&taken.pattern);
-        match taken.how {
-            _ if by_content => self
-                .checks
-                .push(format!("{what}: found by what the columns hold")),
-            How::Fits => {}
+        let check = match taken.how {
+            _ if by_content => Some("found by what the columns hold".to_owned()),
+            How::Fits => None,
             How::InOrder => {
                 self.how = "in the order of the columns, for their names say nothing: CHECK IT";
-                self.checks
-                    .push(format!("{what}: {pattern} in the order of the joints"));
+                Some(format!("{pattern} in the order of the joints"))
             }
             How::InPart => {
                 self.how = "as far as their names fit: CHECK IT";
                 let found = taken.columns.iter().flatten().count();
-                self.checks.push(format!(
-                    "{what}: {pattern} does not fit the {joints} joints in number and order; {found} were mapped; where a URDF has joints that the log has not, --tip LINK ends the arm before them"
-                ));
+                Some(format!(
+                    "{pattern} does not fit the {joints} joints in number and order; {found} were mapped; where a URDF has joints that the log has not, --tip LINK ends the arm before them"
+                ))
             }
-        }
-        if taken.tie {
-            self.checks.push(format!(
-                "{what}: {pattern} or {}?",
-                escape(&taken.others[0])
-            ));
-        }
-        let others = taken.others.iter().map(|other| escape(other));
+        };
+        let others: Vec<String> = taken.others.iter().map(|other| escape(other)).collect();
+        let tie = taken.tie.then(|| format!("{pattern} or {}?", others[0]));
+        let checks = check.into_iter().chain(tie);
+        self.checks
+            .extend(checks.map(|check| format!("{what}: {check}")));
         self.others.extend(others);
     }
 
     /// Units of positions and torques; whether velocities are in units that do not go with those of the positions.
     fn units(&mut self, known: &[Known], [q, dq, tau]: [&[Option<LogColumn>]; 3]) -> bool {
-        let paired = |columns: &[Option<LogColumn>]| -> Vec<usize> {
-            (0..columns.len())
-                .filter(|k| columns[*k].is_some())
-                .collect()
-        };
-        let found = paired(q);
-        let columns: Vec<&LogColumn> = found.iter().filter_map(|k| q[*k].as_ref()).collect();
+        fn paired(columns: &[Option<LogColumn>]) -> (Vec<usize>, Vec<&LogColumn>) {
+            let all = columns.iter().enumerate();
+            all.filter_map(|(k, column)| Some((k, column.as_ref()?)))
+                .unzip()
+        }
+        let (found, columns) = paired(q);
         let kinds: Vec<JointKind> = found.iter().map(|k| known[*k].kind).collect();
         for (k, unit) in found.iter().zip(of_positions(&columns, &kinds)) {
             let joint = &mut self.joints[*k];
@@ -261,18 +235,14 @@ impl Mapping {
             self.check(unit.check.map(|text| format!("positions: {text}")));
         }
         let position = |k: &usize| q[*k].as_ref().and_then(stated_position);
-        let other = |k: &usize| {
-            let velocity = dq[*k].as_ref();
-            velocity.is_some_and(|velocity| other_velocity(velocity, position(k)))
-        };
-        let apart = paired(dq).iter().any(other);
-        let found = paired(tau);
-        let columns: Vec<&LogColumn> = found.iter().filter_map(|k| tau[*k].as_ref()).collect();
+        let (with_velocity, velocities) = paired(dq);
+        let mut pairs = with_velocity.iter().zip(velocities);
+        let apart = pairs.any(|(k, velocity)| other_velocity(velocity, position(k)));
+        let (found, columns) = paired(tau);
         let limits: Vec<Option<f64>> = found.iter().map(|k| known[*k].torque).collect();
         let units = of_torques(&columns, &limits);
-        let current = units
-            .iter()
-            .any(|unit| unit.drive && unit.unit == Some("A"));
+        let mut each = units.iter();
+        let current = each.any(|unit| unit.drive && unit.unit == Some("A"));
         for (k, unit) in found.iter().zip(units) {
             let joint = &mut self.joints[*k];
             (joint.torque_unit, joint.torque_scale) = (unit.unit, unit.scale);
@@ -299,10 +269,8 @@ impl Mapping {
         let unstated = |(joint, column): (&JointColumns, &Option<LogColumn>)| {
             let own = joint.position.as_deref() == Some(&format!("q_{}", joint.joint));
             let taken = joint.kind == JointKind::Revolute && joint.position_unit.is_none() && !own;
-            taken
-                && column
-                    .as_ref()
-                    .is_some_and(|column| stated_position(column).is_none())
+            let unstated = |column: &LogColumn| stated_position(column).is_none();
+            taken && column.as_ref().is_some_and(unstated)
         };
         if !seen.is_recording() && self.joints.iter().zip(columns).any(unstated) {
             let text = "positions: rad is taken, for no name states a unit; else position_unit = \"deg\" or \"turns\"";
@@ -331,17 +299,11 @@ impl Mapping {
 
     /// Whether nothing in the file is a guess.
     pub fn is_sure(&self, seen: Option<&SeenColumns>) -> bool {
-        let clock = seen.map(|seen| &seen.clock);
-        let guessed = matches!(
-            clock,
-            Some(
-                ClockSource::Column { guessed: true, .. }
-                    | ClockSource::Rate {
-                        coarse: Some(_),
-                        ..
-                    }
-            )
-        );
+        let guessed = seen.is_some_and(|seen| match &seen.clock {
+            ClockSource::Messages => false,
+            ClockSource::Column { guessed, .. } => *guessed,
+            ClockSource::Rate { coarse, .. } => coarse.is_some(),
+        });
         self.checks.is_empty() && self.torque_check.is_none() && !guessed
     }
 

@@ -2,9 +2,9 @@
 
 use crate::inspect::ChannelRole;
 
-/// A clock is known from more rows than this, and too coarse where it moves by more than this share of a step at once;
-/// its longer and its shorter steps have at least this share each.
+/// Rows from which a clock is known.
 const MIN_CLOCK_ROWS: usize = 100;
+/// It is too coarse where it moves by more than this share of a step at once; longer and shorter steps have it each.
 const MIN_SHARE_OF_EACH_STEP: f64 = 0.1;
 /// Likeness of a column to the differences of another that makes it its velocity.
 const VELOCITY_CORRELATION: f64 = 0.9;
@@ -20,14 +20,11 @@ pub(super) fn is_clock(numbers: &[f64]) -> bool {
     let counts = steps.iter().all(|step| *step == 1.0) && matches!(numbers[0], 0.0 | 1.0);
     steps.sort_by(f64::total_cmp);
     let middle = steps[steps.len() / 2];
-    let even = steps
-        .iter()
-        .filter(|s| (0.3..3.0).contains(&(**s / middle)));
-    !counts && 10 * even.count() >= 9 * steps.len()
+    let even = |step: &&f64| (0.3..3.0).contains(&(**step / middle));
+    !counts && 10 * steps.iter().filter(even).count() >= 9 * steps.len()
 }
 
-/// The step of rows that lie evenly, where their times are rounded to what is more than a tenth of it: all lie within
-/// one rounding of an even line.
+/// The step of even rows, where their times are rounded to more than a tenth of it: they lie within that of a line.
 pub(super) fn rounded_step(times: &[f64]) -> Option<f64> {
     let (first, last) = (times.first()?, times.last()?);
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
@@ -72,18 +69,16 @@ fn roughness(numbers: &[f64]) -> f64 {
     let n = finite.len().max(1) as f64;
     let mean = finite.iter().sum::<f64>() / n;
     let spread = finite.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
-    let steps = finite
-        .windows(2)
-        .map(|p| (p[1] - p[0]).powi(2))
-        .sum::<f64>();
+    let steps = finite.windows(2).map(|p| (p[1] - p[0]).powi(2));
+    let steps = steps.sum::<f64>();
     match spread > 0.0 {
         true => steps / spread,
         false => f64::INFINITY,
     }
 }
 
-/// Role and joint of each column of a log that names none, times left out: the blocks `q dq tau` or
-/// `q tau`, joint after joint in each, or the three of each joint together.
+/// Role and joint of each column of a log that names none, times left out.
+// The blocks `q dq tau` or `q tau`, joint after joint in each, or the three of each joint together.
 pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRole, String)> {
     let m = columns.len();
     let mut out = vec![(ChannelRole::Other, String::new()); m];
@@ -92,11 +87,7 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
             *place = (role, (joint + 1).to_string());
         }
     };
-    let (p, v, t) = (
-        ChannelRole::Position,
-        ChannelRole::Velocity,
-        ChannelRole::Torque,
-    );
+    use ChannelRole::{Position, Torque, Velocity};
     if let Some((first, n, stride)) = with_velocities(columns, joints) {
         let by = if stride == 1 { n } else { 1 };
         let place = |joint: usize, what: usize| first + joint * stride + what * by;
@@ -109,9 +100,10 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
         let accelerations =
             stride == 1 && (0..n).filter(rises).count() as f64 >= MIN_SHARE_OF_JOINTS * n as f64;
         for joint in 0..n {
-            set(place(joint, 0), p, joint);
-            set(place(joint, 1), v, joint);
-            set(place(joint, if accelerations { 3 } else { 2 }), t, joint);
+            set(place(joint, 0), Position, joint);
+            set(place(joint, 1), Velocity, joint);
+            let torque = if accelerations { 3 } else { 2 };
+            set(place(joint, torque), Torque, joint);
         }
         return out;
     }
@@ -126,8 +118,8 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
             true => (n + joint, joint),
             false => (joint, n + joint),
         };
-        set(q, p, joint);
-        set(tau, t, joint);
+        set(q, Position, joint);
+        set(tau, Torque, joint);
     }
     out
 }
@@ -136,10 +128,6 @@ pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRo
 fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, usize, usize)> {
     let m = columns.len();
     let is_rate = |q: usize, dq: usize| likeness(columns[q], columns[dq]) > VELOCITY_CORRELATION;
-    let share = |pairs: &[(usize, usize)]| {
-        let like = pairs.iter().filter(|(q, dq)| is_rate(*q, *dq)).count();
-        like as f64 / pairs.len() as f64
-    };
     let mut best: Option<(f64, (usize, usize, usize))> = None;
     let mut consider = |first: usize, n: usize, stride: usize| {
         let by = if stride == 1 { n } else { 1 };
@@ -147,10 +135,8 @@ fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, 
         if n == 0 || last >= m || joints.is_some_and(|j| j != n) {
             return;
         }
-        let pairs: Vec<(usize, usize)> = (0..n)
-            .map(|j| (first + j * stride, first + j * stride + by))
-            .collect();
-        let like = share(&pairs);
+        let positions = (0..n).map(|j| first + j * stride);
+        let like = positions.filter(|q| is_rate(*q, q + by)).count() as f64 / n as f64;
         // of equal ones the one with more joints
         let score = like + 1e-3 * n as f64;
         if like >= MIN_SHARE_OF_JOINTS && best.is_none_or(|(found, _)| score > found) {
@@ -191,8 +177,12 @@ mod tests {
         (0..4000).map(at).collect()
     }
 
-    fn roles_of(order: &[(char, usize)], joints: Option<usize>) -> String {
-        let columns: Vec<Vec<f64>> = order.iter().map(|(kind, j)| column(*kind, *j)).collect();
+    fn roles_of(order: &str, joints: Option<usize>) -> String {
+        let one = |word: &str| {
+            let (kind, joint) = word.split_at(1);
+            column(kind.parse().unwrap(), joint.parse().unwrap())
+        };
+        let columns: Vec<Vec<f64>> = order.split(' ').map(one).collect();
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let letter = |(role, joint): (ChannelRole, String)| match role {
             ChannelRole::Position => format!("q{joint}"),
@@ -224,33 +214,21 @@ mod tests {
     }
 
     #[test]
-    fn blocks_and_joints_in_turn_are_told_by_their_velocities() {
-        let (q, v, t) = ('q', 'v', 't');
-        let blocks = [(q, 0), (q, 1), (v, 0), (v, 1), (t, 0), (t, 1)];
-        assert_eq!(roles_of(&blocks, None), "q1 q2 v1 v2 t1 t2");
-        let rates = [
-            (q, 0),
-            (q, 1),
-            (v, 0),
-            (v, 1),
-            ('a', 0),
-            ('a', 1),
-            (t, 0),
-            (t, 1),
-        ];
-        assert_eq!(roles_of(&rates, None), "q1 q2 v1 v2 - - t1 t2");
-        let in_turn = [(q, 0), (v, 0), (t, 0), (q, 1), (v, 1), (t, 1)];
-        assert_eq!(roles_of(&in_turn, None), "q1 v1 t1 q2 v2 t2");
-        assert_eq!(roles_of(&[(q, 0), (v, 0), (t, 0)], None), "q1 v1 t1");
+    fn blocks_and_joints_in_turn_are_known_by_their_velocities() {
+        for (columns, roles) in [
+            ("q0 q1 v0 v1 t0 t1", "q1 q2 v1 v2 t1 t2"),
+            ("q0 q1 v0 v1 a0 a1 t0 t1", "q1 q2 v1 v2 - - t1 t2"),
+            ("q0 v0 t0 q1 v1 t1", "q1 v1 t1 q2 v2 t2"),
+            ("q0 v0 t0", "q1 v1 t1"),
+        ] {
+            assert_eq!(roles_of(columns, None), roles);
+        }
     }
 
     #[test]
     fn without_velocities_positions_are_the_smoother_half() {
-        let (q, t) = ('q', 't');
-        let plain = [(q, 0), (q, 1), (t, 0), (t, 1)];
-        assert_eq!(roles_of(&plain, Some(2)), "q1 q2 t1 t2");
-        let turned = [(t, 0), (t, 1), (q, 0), (q, 1)];
-        assert_eq!(roles_of(&turned, None), "t1 t2 q1 q2");
+        assert_eq!(roles_of("q0 q1 t0 t1", Some(2)), "q1 q2 t1 t2");
+        assert_eq!(roles_of("t0 t1 q0 q1", None), "t1 t2 q1 q2");
     }
 
     #[test]

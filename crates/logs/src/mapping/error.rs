@@ -20,7 +20,6 @@ pub enum MappingError {
     NoTime {
         /// Name of the log.
         log: String,
-        /// The columns that it has.
         columns: String,
     },
     /// Several machines in one recording.

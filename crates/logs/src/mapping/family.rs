@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::column::LogColumn;
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, has, without_units, words};
+use crate::inspect::words::{Word, has, marked, place_of, without_units, words};
 use crate::log::nearest;
 
 /// What distinguishes a member of a family from the others.
@@ -81,31 +81,25 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
             add("#".to_owned(), key, column);
             continue;
         }
-        let without =
-            |at: std::ops::Range<usize>| format!("{}#{}", &name[..at.start], &name[at.end..]);
         let spoken = words(name);
-        for word in spoken.iter().filter(|word| word.number().is_some()) {
-            let (pattern, key) = (without(word.at.clone()), word.number().unwrap_or(0));
+        for word in &spoken {
+            let Some(number) = word.number() else {
+                continue;
+            };
+            let pattern = marked(name, word.at.clone());
             // `q_1 [rad]` and `q_3 [m]` are of one kind
             let plain = without_units(&pattern);
             if words(&plain).len() != words(&pattern).len() {
-                add(plain, Key::Number(key), column);
+                add(plain, Key::Number(number), column);
             }
-            add(pattern, Key::Number(key), column);
+            add(pattern, Key::Number(number), column);
         }
         // the names of the robot's joints, the longest that is in it
-        let part = |joint: &str| {
-            let joint = words(joint);
-            let same = |at: &&[Word]| at.iter().zip(&joint).all(|(a, b)| a.text == b.text);
-            let found = spoken.windows(joint.len().max(1)).find(same)?;
-            Some(found.first()?.at.start..found.last()?.at.end)
-        };
-        let named = joints
-            .iter()
-            .filter_map(|joint| Some((*joint, part(joint)?)));
+        let named = joints.iter();
+        let named = named.filter_map(|joint| Some((*joint, place_of(&spoken, joint)?)));
         let longest = named.max_by_key(|(joint, _)| joint.len());
         if let Some((joint, at)) = longest {
-            let pattern = without(at);
+            let pattern = marked(name, at);
             // `J1_pos_deg` and `Z_pos_mm` are of one kind
             let plain = without_units(&pattern);
             if plain != pattern {
@@ -121,25 +115,24 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
             let axis = word.text.len() == 1 && word.number().is_none() && k > 0;
             if axis && alone && word.text != column.joint {
                 let key = Key::Name(word.text.clone());
-                add(without(word.at.clone()), key, column);
+                add(marked(name, word.at.clone()), key, column);
             }
         }
         if column.joint.is_empty() {
             add(name.clone(), Key::Name(String::new()), column);
         } else if column.joint.parse::<u32>().is_err()
-            && let Some(at) = part(&column.joint)
+            && let Some(at) = place_of(&spoken, &column.joint)
         {
-            add(without(at), Key::Name(column.joint.clone()), column);
+            add(marked(name, at), Key::Name(column.joint.clone()), column);
         }
     }
     let family = |pattern: String| {
         let members = found.remove(&pattern)?;
         let keys: BTreeSet<&Key> = members.iter().map(|(key, _)| key).collect();
         let role = members.first()?.1.role;
-        let letters =
-            |(key, _): &(Key, &LogColumn)| matches!(key, Key::Name(name) if name.len() == 1);
         // a letter that all names share is no axis
-        let shared = members.len() == 1 && members.iter().all(letters) && joints.len() != 1;
+        let letter = matches!(&members[..], [(Key::Name(name), _)] if name.len() == 1);
+        let shared = letter && joints.len() != 1;
         (keys.len() == members.len() && !shared).then(|| Family {
             penalty: penalty(&words(&pattern), role),
             pattern,
@@ -155,10 +148,9 @@ fn numbers(names: &[&str]) -> Option<Vec<u32>> {
         let one = |name: &&str| {
             let spoken = words(name);
             let mut numbers = spoken.iter().filter_map(Word::number);
-            if last {
-                numbers.next_back()
-            } else {
-                numbers.next()
+            match last {
+                true => numbers.next_back(),
+                false => numbers.next(),
             }
         };
         let found = names.iter().map(one).collect::<Option<Vec<u32>>>()?;
@@ -180,7 +172,7 @@ fn numbered_alike(joints: &[&str], count: usize) -> Option<Vec<usize>> {
     for (k, joint) in joints.iter().enumerate() {
         for word in words(joint) {
             if let Some(number) = word.number() {
-                let pattern = format!("{}#{}", &joint[..word.at.start], &joint[word.at.end..]);
+                let pattern = marked(joint, word.at.clone());
                 groups.entry(pattern).or_default().push((number, k));
             }
         }
@@ -215,81 +207,71 @@ pub(super) fn fit<'a>(
         let found = family.members.iter().find(|(own, _)| own == key);
         found.map(|(_, column)| *column)
     };
-    let named: Vec<Option<&LogColumn>> = joints
-        .iter()
-        .map(|joint| {
-            let is = |key: &Key| matches!(key, Key::Name(name) if bare(name) == bare(joint));
-            let found = family.members.iter().find(|(key, _)| is(key));
-            found.map(|(_, column)| *column)
-        })
-        .collect();
+    let named = joints.iter().map(|joint| {
+        let is = |key: &Key| matches!(key, Key::Name(name) if bare(name) == bare(joint));
+        let found = family.members.iter().find(|(key, _)| is(key));
+        found.map(|(_, column)| *column)
+    });
+    let named: Vec<Option<&LogColumn>> = named.collect();
     if named.iter().all(Option::is_some) {
         return Some((How::Fits, named));
     }
-    let mut own: Vec<u32> = Vec::new();
-    for (key, _) in &family.members {
-        if let Key::Number(number) = key {
-            own.push(*number);
-        }
-    }
+    let keys = family.members.iter();
+    let numbered = keys.filter_map(|(key, _)| match key {
+        Key::Number(number) => Some(*number),
+        Key::Name(_) => None,
+    });
+    let mut own: Vec<u32> = numbered.collect();
     own.sort_unstable();
     if own.len() == family.members.len() && !own.is_empty() {
         let base = own[0];
         let from_start = in_a_row(&own) && base <= 1;
         let of_joints = numbers(joints);
-        let from_one = |of: &[u32]| {
-            let mut sorted = of.to_vec();
-            sorted.sort_unstable();
-            sorted.first().copied().filter(|_| in_a_row(&sorted))
-        };
+        let in_order = of_joints.clone().map(|mut of| {
+            of.sort_unstable();
+            of
+        });
+        let in_order = in_order.filter(|sorted| in_a_row(sorted));
+        let first = in_order.and_then(|sorted| sorted.first().copied());
         let whole = from_start && own.len() == joints.len();
-        return Some(
-            match (&of_joints, of_joints.as_deref().and_then(from_one)) {
-                // the joints have numbers in a row: the first column is the first joint's
-                (Some(of), Some(first)) if whole => {
-                    let place = |n: &u32| by_key(&Key::Number(n - first + base));
-                    (How::Fits, of.iter().map(place).collect())
-                }
-                (None, _) if whole => {
-                    let place = |k: usize| by_key(&Key::Number(base + k as u32));
-                    let how = if joints.len() == 1 {
-                        How::Fits
-                    } else {
-                        How::InOrder
-                    };
-                    (how, (0..joints.len()).map(place).collect())
-                }
-                // other numbers, or not all: by the same number where the joints have one
-                (Some(of), _)
-                    if of.iter().all(|n| own.contains(n)) && own.len() == joints.len() =>
-                {
-                    let place = |n: &u32| by_key(&Key::Number(*n));
-                    (How::Fits, of.iter().map(place).collect())
-                }
-                (Some(of), first) => {
-                    let shift = first.map_or(0, |first| i64::from(base) - i64::from(first));
-                    let shift = if base <= 1 { shift } else { 0 };
-                    let place = |n: &u32| {
-                        let number = u32::try_from(i64::from(*n) + shift).ok()?;
-                        by_key(&Key::Number(number))
-                    };
-                    (How::InPart, of.iter().map(place).collect())
-                }
-                (None, _) if own.len() >= joints.len() => {
-                    let place = |k: usize| by_key(&Key::Number(own[k]));
-                    (How::InPart, (0..joints.len()).map(place).collect())
-                }
-                (None, _) => {
-                    // as many joints as columns have numbers in a row: an arm without its fingers
-                    let of = numbered_alike(joints, own.len()).filter(|_| from_start)?;
-                    let place = |k: usize| {
-                        let at = of.iter().position(|joint| *joint == k)?;
-                        by_key(&Key::Number(base + at as u32))
-                    };
-                    (How::InPart, (0..joints.len()).map(place).collect())
-                }
-            },
-        );
+        let of_joint = |at: usize| Some(base + at as u32);
+        let (how, numbers): (How, Vec<Option<u32>>) = match (of_joints, first) {
+            // the joints have numbers in a row: the first column is the first joint's
+            (Some(of), Some(first)) if whole => (
+                How::Fits,
+                of.iter().map(|n| Some(n - first + base)).collect(),
+            ),
+            (None, _) if whole => {
+                let how = match joints.len() {
+                    1 => How::Fits,
+                    _ => How::InOrder,
+                };
+                (how, (0..joints.len()).map(of_joint).collect())
+            }
+            // other numbers, or not all: by the same number where the joints have one
+            (Some(of), _) if of.iter().all(|n| own.contains(n)) && own.len() == joints.len() => {
+                (How::Fits, of.into_iter().map(Some).collect())
+            }
+            (Some(of), first) => {
+                let first = first.filter(|_| base <= 1);
+                let shift = first.map_or(0, |first| i64::from(base) - i64::from(first));
+                let shifted = |n: &u32| u32::try_from(i64::from(*n) + shift).ok();
+                (How::InPart, of.iter().map(shifted).collect())
+            }
+            (None, _) if own.len() >= joints.len() => {
+                let numbers = own[..joints.len()].iter().copied();
+                (How::InPart, numbers.map(Some).collect())
+            }
+            (None, _) => {
+                // as many joints as columns have numbers in a row: an arm without its fingers
+                let of = numbered_alike(joints, own.len()).filter(|_| from_start)?;
+                let place = |k: usize| of.iter().position(|joint| *joint == k);
+                let number = |k: usize| place(k).and_then(of_joint);
+                (How::InPart, (0..joints.len()).map(number).collect())
+            }
+        };
+        let column = |number: Option<u32>| by_key(&Key::Number(number?));
+        return Some((how, numbers.into_iter().map(column).collect()));
     }
     // one joint, one column
     if let ([_], [(_, only)]) = (joints, &family.members[..]) {
@@ -302,18 +284,14 @@ pub(super) fn fit<'a>(
             Key::Number(_) => None,
         })
         .collect();
-    let near: Vec<Option<&LogColumn>> = joints
-        .iter()
-        .map(|joint| {
-            let near = nearest(joint, names.iter().copied())?;
-            by_key(&Key::Name(near.to_owned()))
-        })
-        .collect();
+    let near = joints.iter().map(|joint| {
+        let near = nearest(joint, names.iter().copied())?;
+        by_key(&Key::Name(near.to_owned()))
+    });
+    let near: Vec<Option<&LogColumn>> = near.collect();
     let mut seen = BTreeSet::new();
-    let twice = near
-        .iter()
-        .flatten()
-        .any(|column| !seen.insert(&column.name));
+    let mut columns = near.iter().flatten();
+    let twice = columns.any(|column| !seen.insert(&column.name));
     if near.iter().any(Option::is_some) && !twice {
         return Some((How::InPart, near));
     }
@@ -325,12 +303,8 @@ pub(super) fn fit<'a>(
 
 /// A column of temperatures for every joint, where a family of them fits.
 pub(super) fn temperatures(columns: &[LogColumn], joints: &[&str]) -> Option<Vec<String>> {
-    let said = |c: &&LogColumn| {
-        let spoken = words(&c.name);
-        let warm =
-            |word: &Word| ["temp", "temps", "temperature", "temperatures"].contains(&&*word.text);
-        !c.commanded && spoken.iter().any(warm)
-    };
+    let warm = "temp temps temperature temperatures";
+    let said = |c: &&LogColumn| !c.commanded && has(&words(&c.name), warm);
     let of: Vec<&LogColumn> = columns.iter().filter(said).collect();
     let mut found = families(&of, joints);
     found.sort_by_key(|family| family.penalty);

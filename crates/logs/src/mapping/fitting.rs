@@ -1,12 +1,15 @@
-//! Which families of columns fit the joints of a robot, by their names.
+//! Which families of columns fit the joints of a robot, by their names, and which may where names say nothing.
+
+use std::collections::BTreeSet;
 
 use super::column::LogColumn;
-use super::family::{How, families, fit, penalty};
+use super::family::{Family, How, families, fit, penalty};
 use crate::inspect::ChannelRole;
 use crate::inspect::words::{Word, without_joint, words};
 
-/// A family that was taken.
+/// A family that fits, and how well: a lower rank is better.
 pub(super) struct Taken<'a> {
+    pub(super) rank: (i32, i32),
     pub(super) pattern: String,
     pub(super) how: How,
     pub(super) columns: Vec<Option<&'a LogColumn>>,
@@ -15,8 +18,27 @@ pub(super) struct Taken<'a> {
     pub(super) tie: bool,
 }
 
+impl<'a> Taken<'a> {
+    /// The only one so far.
+    pub(super) fn new(pattern: String, how: How, columns: Vec<Option<&'a LogColumn>>) -> Self {
+        Self {
+            rank: (0, 0),
+            pattern,
+            how,
+            columns,
+            others: Vec::new(),
+            tie: false,
+        }
+    }
+
+    fn names(&self) -> Vec<&'a str> {
+        let columns = self.columns.iter().flatten();
+        columns.map(|column| column.name.as_str()).collect()
+    }
+}
+
 /// Words that two patterns share.
-pub(super) fn shared_words(a: &str, b: &str) -> i32 {
+fn shared_words(a: &str, b: &str) -> i32 {
     let b = words(b);
     let shared = words(a)
         .into_iter()
@@ -24,17 +46,8 @@ pub(super) fn shared_words(a: &str, b: &str) -> i32 {
     i32::try_from(shared.count()).unwrap_or(0)
 }
 
-/// A family that fits, and how well: less is better.
-pub(super) struct Fitting<'a> {
-    pub(super) rank: (i32, i32),
-    pub(super) pattern: String,
-    pub(super) how: How,
-    pub(super) columns: Vec<Option<&'a LogColumn>>,
-}
-
-/// For every joint the column that has its name, whatever else the names say: a joint that slides has a force where
-/// others have torques.
-pub(super) fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Fitting<'a>> {
+/// For every joint the column that has its name, whatever else it says: what slides has a force, others have torques.
+fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Taken<'a>> {
     let mut worst = 0;
     let mut own = |joint: &&str| {
         let has = |column: &&LogColumn| {
@@ -57,18 +70,11 @@ pub(super) fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option
         sure.then_some(Some(column))
     };
     let columns = joints.iter().map(&mut own).collect::<Option<Vec<_>>>()?;
-    let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
-    let apart = names
-        .iter()
-        .collect::<std::collections::BTreeSet<_>>()
-        .len()
-        == names.len();
-    (apart && joints.len() > 1).then(|| Fitting {
-        rank: (worst, i32::MAX),
-        pattern: names.join(", "),
-        how: How::Fits,
-        columns,
-    })
+    let mut taken = Taken::new(String::new(), How::Fits, columns);
+    let names = taken.names();
+    let apart = names.iter().collect::<BTreeSet<_>>().len() == names.len();
+    (taken.rank, taken.pattern) = ((worst, i32::MAX), names.join(", "));
+    (apart && joints.len() > 1).then_some(taken)
 }
 
 /// The names of joints without the words that all of them begin with: `left/upper` is `upper`.
@@ -94,8 +100,7 @@ pub(super) fn without_common_head(joints: &[&str]) -> Vec<String> {
     }
 }
 
-/// The family of a role that fits the joints best, by their names, else by what is left of those without the words
-/// that all begin with.
+/// The family of a role that fits the joints best, by their names, else by these without the words that all begin with.
 pub(super) fn best<'a>(
     columns: &'a [LogColumn],
     role: ChannelRole,
@@ -113,7 +118,7 @@ pub(super) fn best<'a>(
     by_short.filter(|taken| taken.how == How::Fits).or(whole)
 }
 
-pub(super) fn best_by<'a>(
+fn best_by<'a>(
     columns: &'a [LogColumn],
     role: ChannelRole,
     commanded: bool,
@@ -122,7 +127,7 @@ pub(super) fn best_by<'a>(
 ) -> Option<Taken<'a>> {
     let of_role = |c: &&LogColumn| c.role == role && c.commanded == commanded;
     let of_role: Vec<&LogColumn> = columns.iter().filter(of_role).collect();
-    let mut found: Vec<Fitting> = Vec::new();
+    let mut found: Vec<Taken> = Vec::new();
     for family in families(&of_role, joints) {
         if let Some((how, columns)) = fit(&family, joints)
             && columns.iter().any(Option::is_some)
@@ -134,55 +139,68 @@ pub(super) fn best_by<'a>(
             };
             let missing = columns.iter().filter(|c| c.is_none()).count() as i32;
             let near = beside.map_or(0, |beside| shared_words(&family.pattern, beside));
-            found.push(Fitting {
+            found.push(Taken {
                 rank: (off + family.penalty + missing, -near),
-                pattern: family.pattern,
-                how,
-                columns,
+                ..Taken::new(family.pattern, how, columns)
             });
         }
     }
-    if let Some(named) = by_names(&of_role, joints) {
-        found.push(named);
-    }
+    found.extend(by_names(&of_role, joints));
     // the first of equals
     found.sort_by_key(|fitting| fitting.rank);
     let mut found = found.into_iter();
-    let Fitting {
-        rank,
-        pattern,
-        how,
-        columns: given,
-    } = found.next()?;
-    let taken: Vec<&str> = given.iter().flatten().map(|c| c.name.as_str()).collect();
-    let (mut others, mut tie) = (Vec::new(), false);
+    let mut taken = found.next()?;
     let mut shown: Vec<Vec<&str>> = Vec::new();
     for other in found {
+        let names = other.names();
         // another reading of the same columns is no other family
-        let same = |c: &&LogColumn| taken.contains(&c.name.as_str());
-        let mut known = |columns: &[Option<&'a LogColumn>]| {
-            let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
-            let known = shown.contains(&names);
-            shown.push(names);
-            known
-        };
-        if other.columns.iter().flatten().all(same)
-            || other.how == How::InPart
-            || known(&other.columns)
-            || others.contains(&other.pattern)
-        {
+        let same = names.iter().all(|name| taken.names().contains(name));
+        if same || other.how == How::InPart {
             continue;
         }
-        tie |= others.is_empty() && other.rank == rank;
-        others.push(other.pattern);
+        let known = shown.contains(&names);
+        shown.push(names);
+        if !known && !taken.others.contains(&other.pattern) {
+            taken.tie |= taken.others.is_empty() && other.rank == taken.rank;
+            taken.others.push(other.pattern);
+        }
     }
-    Some(Taken {
-        pattern,
-        how,
-        columns: given,
-        others,
-        tie,
-    })
+    Some(taken)
+}
+
+/// Families that are offered at most.
+const OFFERED: usize = 6;
+
+/// Families of as many columns as joints whose names say nothing.
+fn unsaid<'a>(
+    columns: &'a [LogColumn],
+    joints: usize,
+    may_be: &dyn Fn(&LogColumn) -> bool,
+) -> Vec<Family<'a>> {
+    let unsaid = |c: &&LogColumn| c.is_unsaid() && may_be(c);
+    let unsaid: Vec<&LogColumn> = columns.iter().filter(unsaid).collect();
+    let mut found = families(&unsaid, &[]);
+    found.retain(|family| family.members.len() == joints);
+    found
+}
+
+/// Their names, for the user to choose from.
+pub(super) fn offered(columns: &[LogColumn], joints: usize) -> Vec<String> {
+    let found = unsaid(columns, joints, &|_| true).into_iter();
+    found.take(OFFERED).map(|family| family.pattern).collect()
+}
+
+/// The only one whose columns change, where there are several joints: what they lack, if they lack one kind alone.
+pub(super) fn left<'a>(columns: &'a [LogColumn], joints: &[&str]) -> Option<Taken<'a>> {
+    let mut found = unsaid(columns, joints.len(), &|column| column.span() > 0.0);
+    found.sort_by_key(|family| std::cmp::Reverse(family.pattern.len()));
+    let (only, others) = found.split_first().filter(|_| joints.len() > 1)?;
+    let of_only = |column: &LogColumn| only.members.iter().any(|(_, own)| own.name == column.name);
+    // another reading of the same columns is no other family
+    let same = |other: &Family| other.members.iter().all(|(_, column)| of_only(column));
+    let (_, columns) = fit(only, joints).filter(|_| others.iter().all(same))?;
+    // what is said of it says the order too
+    Some(Taken::new(only.pattern.clone(), How::Fits, columns))
 }
 
 #[cfg(test)]
@@ -195,14 +213,11 @@ mod tests {
 
     fn matched(joints: &[&str], names: &[&str]) -> (Vec<Option<String>>, Option<How>) {
         let columns = columns(names);
-        let found = best(&columns, ChannelRole::Position, false, joints, None);
-        match found {
-            None => (vec![None; joints.len()], None),
-            Some(taken) => {
-                let names = taken.columns.iter().map(|c| c.map(|c| c.name.clone()));
-                (names.collect(), Some(taken.how))
-            }
-        }
+        let Some(taken) = best(&columns, ChannelRole::Position, false, joints, None) else {
+            return (vec![None; joints.len()], None);
+        };
+        let names = taken.columns.iter().map(|c| c.map(|c| c.name.clone()));
+        (names.collect(), Some(taken.how))
     }
 
     fn some(names: &[&str]) -> Vec<Option<String>> {
@@ -211,17 +226,25 @@ mod tests {
 
     #[test]
     fn columns_go_by_name_before_number_and_by_number_before_order() {
-        let (found, how) = matched(&["elbow", "wrist"], &["q_wrist", "q_elbow"]);
-        assert_eq!(
-            (found, how),
-            (some(&["q_elbow", "q_wrist"]), Some(How::Fits))
-        );
-        let (found, how) = matched(&["joint_2", "joint_1"], &["q1", "q2"]);
-        assert_eq!((found, how), (some(&["q2", "q1"]), Some(How::Fits)));
-        let (found, how) = matched(&["joint_1", "joint_2"], &["q0", "q1"]);
-        assert_eq!((found, how), (some(&["q0", "q1"]), Some(How::Fits)));
-        let (found, how) = matched(&["pan", "lift"], &["q1", "q2"]);
-        assert_eq!((found, how), (some(&["q1", "q2"]), Some(How::InOrder)));
+        let numbered = ["joint_1", "joint_2"];
+        for (joints, columns, expected, how) in [
+            (
+                ["elbow", "wrist"],
+                ["q_wrist", "q_elbow"],
+                ["q_elbow", "q_wrist"],
+                How::Fits,
+            ),
+            (
+                ["joint_2", "joint_1"],
+                ["q1", "q2"],
+                ["q2", "q1"],
+                How::Fits,
+            ),
+            (numbered, ["q0", "q1"], ["q0", "q1"], How::Fits),
+            (["pan", "lift"], ["q1", "q2"], ["q1", "q2"], How::InOrder),
+        ] {
+            assert_eq!(matched(&joints, &columns), (some(&expected), Some(how)));
+        }
         // one column too few is no order
         let (found, _) = matched(&["pan", "lift"], &["q1"]);
         assert_eq!(found, [None, None]);
@@ -237,10 +260,10 @@ mod tests {
         assert_eq!(found[..2], some(&["q1", "q2"]));
         assert_eq!(
             (&found[2..], how),
-            (&[None, None, None][..], Some(How::InPart))
+            (&[const { None }; 3][..], Some(How::InPart))
         );
         // one too many may begin anywhere
-        let (found, how) = matched(&["joint_1", "joint_2"], &["q0", "q1", "q2"]);
+        let (found, how) = matched(&numbered, &["q0", "q1", "q2"]);
         assert_eq!(found.len(), 2);
         assert_eq!(how, Some(How::InPart));
     }

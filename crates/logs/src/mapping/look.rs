@@ -94,16 +94,14 @@ pub fn look(
     // the time of a recording is its first column
     let at = at.or_else(|| log.is_recording().then_some(0));
     let numbers: Vec<usize> = (0..log.names().len()).filter(|k| Some(*k) != at).collect();
-    let mut columns: Vec<LogColumn> = numbers
-        .iter()
-        .map(|k| LogColumn {
-            unit: log.unit(*k).map(str::to_owned),
-            whole: is_whole(&sample[*k]),
-            wrap: wrap_of(&sample[*k]),
-            path: log.label(*k).map(|_| log.names()[*k].clone()),
-            ..LogColumn::named(log.label(*k).unwrap_or(&log.names()[*k]))
-        })
-        .collect();
+    let column = |k: &usize| LogColumn {
+        unit: log.unit(*k).map(str::to_owned),
+        whole: is_whole(&sample[*k]),
+        wrap: wrap_of(&sample[*k]),
+        path: log.label(*k).map(|_| log.names()[*k].clone()),
+        ..LogColumn::named(log.label(*k).unwrap_or(&log.names()[*k]))
+    };
+    let mut columns: Vec<LogColumn> = numbers.iter().map(column).collect();
     let by_content = headerless || unsaid(&columns, joints);
     if by_content {
         let held: Vec<&[f64]> = numbers.iter().map(|k| sample[*k].as_slice()).collect();
@@ -131,8 +129,8 @@ pub fn look(
     };
     let findings = inspect::look(&mut log, &plan, stop)?.ok_or(MappingError::Interrupted)?;
     // by name: a log may have ten thousands of columns
-    let facts = findings.channels.iter().rev().map(|f| (&f.name, f));
-    let facts: BTreeMap<_, _> = facts.collect();
+    let facts = findings.channels.iter().rev();
+    let facts: BTreeMap<_, _> = facts.map(|f| (&f.name, f)).collect();
     for column in &mut columns {
         let fact = facts.get(&column.name);
         if let Some((low, high)) = fact.and_then(|f| f.min.zip(f.max)) {
@@ -146,10 +144,8 @@ pub fn look(
         let rate = 1.0 / step;
         Some(log::round_within(rate, rate / times.len() as f64))
     });
-    let own_rate = match log.is_recording() {
-        true => rate_of_positions(&columns, &numbers, &sample),
-        false => None,
-    };
+    let messages = log.is_recording();
+    let own_rate = messages.then(|| rate_of_positions(&columns, &numbers, &sample));
     let clock = match (time, even_rate_hz) {
         (Some((at, ..)), Some(hz)) => ClockSource::Rate {
             hz,
@@ -175,7 +171,7 @@ pub fn look(
         },
         topic,
         by_content,
-        rate_hz: even_rate_hz.or(own_rate).or(findings.rate_hz),
+        rate_hz: even_rate_hz.or(own_rate.flatten()).or(findings.rate_hz),
         duration_s: findings.duration_s,
         name,
         provenance: log.provenance()?,
@@ -199,8 +195,7 @@ fn unsaid(columns: &[LogColumn], joints: Option<usize>) -> bool {
     joints.is_some_and(as_many) && columns.iter().all(LogColumn::is_unsaid)
 }
 
-/// The topic of the machine that was measured, where a recording holds several; leaders and commands are
-/// no measurements.
+/// The topic of the machine that was measured, where a recording holds several; leaders and commands are none.
 fn chosen(groups: &[StateGroup], name: &str) -> Result<Option<String>, MappingError> {
     if groups.len() < 2 {
         return Ok(None);
@@ -219,7 +214,6 @@ fn chosen(groups: &[StateGroup], name: &str) -> Result<Option<String>, MappingEr
     })
 }
 
-/// The first numbers of every column.
 fn sample(log: &mut RawReader) -> Result<Vec<Vec<f64>>, MappingError> {
     let width = log.names().len();
     let mut out = vec![Vec::new(); width];
@@ -242,23 +236,16 @@ fn time_of(
 ) -> Result<(usize, f64, bool), MappingError> {
     let named = log.names().iter().position(|name| inspect::is_time(name));
     let named = named.or(log.split_clock());
-    let found = match named {
-        Some(at) => Some((at, false)),
-        None => {
-            let runs = |k: &usize| content::is_clock(&sample[*k]);
-            (0..sample.len()).find(runs).map(|at| (at, true))
-        }
-    };
-    let Some((at, guessed)) = found else {
+    let runs = |k: &usize| content::is_clock(&sample[*k]);
+    let Some(at) = named.or_else(|| (0..sample.len()).find(runs)) else {
         return Err(MappingError::NoTime {
             log: name.to_owned(),
             columns: list(log.names().iter().map(String::as_str)),
         });
     };
     let of_name = log.unit(at).map(str::to_owned);
-    let suffix = log.names()[at]
-        .rsplit_once('_')
-        .map(|(_, unit)| unit.to_owned());
+    let suffix = log.names()[at].rsplit_once('_');
+    let suffix = suffix.map(|(_, unit)| unit.to_owned());
     let stated = [of_name, suffix].into_iter().flatten().find_map(|unit| {
         Some(match unit.to_lowercase().as_str() {
             "s" | "sec" => 1.0,
@@ -272,7 +259,7 @@ fn time_of(
         Some(seconds) => seconds,
         None => log.set_time_by_numbers(at)?,
     };
-    Ok((at, seconds, guessed))
+    Ok((at, seconds, named.is_none()))
 }
 
 fn is_whole(numbers: &[f64]) -> bool {

@@ -6,7 +6,7 @@
 //! | `look` | a log as its columns: names, roles, ranges, times, and the topic of a recording |
 //! | `content` | roles of columns without names, by what they hold |
 //! | `family` | columns whose names differ in a number or a joint's name alone, and how well they fit |
-//! | `left` | columns whose names say nothing |
+//! | `fitting` | the family that fits best, and columns whose names say nothing |
 //! | `shown` | the joints of a URDF, or those that a log shows |
 //! | `choose` | one family each for positions, velocities and torques |
 //! | `units` | units that names state, or that numbers suggest |
@@ -19,7 +19,6 @@ mod content;
 mod error;
 mod family;
 mod fitting;
-mod left;
 mod look;
 mod shown;
 mod units;

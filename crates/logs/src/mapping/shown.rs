@@ -16,8 +16,7 @@ pub struct Known {
     pub torque: Option<f64>,
 }
 
-/// The joints that a log shows: the members of the family of positions that has torques beside it and is
-/// the likeliest to have been measured; else the largest one.
+/// The joints of the family of positions that has torques beside it and is likeliest measured, else of the largest.
 pub(super) fn shown(columns: &[LogColumn]) -> Vec<Known> {
     let one = |name: &str, kind| Known {
         name: name.to_owned(),
@@ -37,11 +36,9 @@ pub(super) fn shown(columns: &[LogColumn]) -> Vec<Known> {
     };
     let rank = |family: &Family| {
         let own = keys(family);
-        let partner = torques.iter().any(|other| keys(other) == own);
-        let contract = family.pattern == "q_#"
-            && torques
-                .iter()
-                .any(|other| other.pattern == "tau_#" && keys(other) == own);
+        let partners = || torques.iter().filter(|other| keys(other) == own);
+        let partner = partners().next().is_some();
+        let contract = family.pattern == "q_#" && partners().any(|other| other.pattern == "tau_#");
         let size = family.members.len() as i32;
         (!contract, !partner, family.penalty - size)
     };
@@ -49,26 +46,20 @@ pub(super) fn shown(columns: &[LogColumn]) -> Vec<Known> {
     let Some(best) = found.iter().min_by_key(|family| rank(family)) else {
         return vec![one("q1", JointKind::Revolute)];
     };
-    let heads: Vec<Vec<String>> = best
-        .members
-        .iter()
-        .map(|(key, _)| match key {
-            Key::Name(name) => words(name).into_iter().map(|w| w.text).collect(),
-            Key::Number(_) => Vec::new(),
-        })
-        .collect();
+    let heads = best.members.iter().map(|(key, _)| match key {
+        Key::Name(name) => words(name).into_iter().map(|w| w.text).collect(),
+        Key::Number(_) => Vec::new(),
+    });
+    let heads: Vec<Vec<String>> = heads.collect();
     // `joint_states.elbow` is the elbow: words that all names begin with are none of the joints'
-    let common = |k: usize| {
-        heads
-            .iter()
-            .all(|head| head.len() > k + 1 && head[k] == heads[0][k])
-    };
+    let same = |head: &Vec<String>, k: usize| head.len() > k + 1 && head[k] == heads[0][k];
+    let common = |k: usize| heads.iter().all(|head| same(head, k));
     // `q_<joint>` of the contract has the joint's whole name
     let named = |(_, column): &(Key, &LogColumn)| own_name(&column.name).is_some();
-    let begins = match heads.len() {
-        _ if best.pattern == "q_#" && best.members.iter().all(named) => 0,
-        0 | 1 => 0,
-        _ => (0..).take_while(|k| common(*k)).count(),
+    let whole = best.pattern == "q_#" && best.members.iter().all(named);
+    let begins = match whole || heads.len() < 2 {
+        true => 0,
+        false => (0..).take_while(|k| common(*k)).count(),
     };
     let mut members: Vec<&(Key, &LogColumn)> = best.members.iter().collect();
     if members.iter().all(|(key, _)| matches!(key, Key::Number(_))) {
@@ -77,10 +68,9 @@ pub(super) fn shown(columns: &[LogColumn]) -> Vec<Known> {
     let of_member = |(key, column): &&(Key, &LogColumn)| {
         let name = match key {
             // of `q_fer_joint1` the joint is what the contract says, where all of it names a joint
-            Key::Number(_) if own_name(&column.name).is_some() => {
-                joint_name(own_name(&column.name).unwrap_or_default())
+            Key::Number(number) => {
+                own_name(&column.name).map_or_else(|| format!("q{number}"), joint_name)
             }
-            Key::Number(number) => format!("q{number}"),
             Key::Name(name) if begins == 0 => joint_name(name),
             Key::Name(name) => {
                 let left = words(name).into_iter().skip(begins).map(|w| w.text);
@@ -93,8 +83,7 @@ pub(super) fn shown(columns: &[LogColumn]) -> Vec<Known> {
         });
         one(&name, kind_of(column, torque))
     };
-    let joints: Vec<Known> = members.iter().map(of_member).collect();
-    joints
+    members.iter().map(of_member).collect()
 }
 
 /// The joint of a column `q_<joint>`, where every word of it is of a name and one is no number.
@@ -111,12 +100,11 @@ fn kind_of(position: &LogColumn, torque: Option<&LogColumn>) -> JointKind {
     let force = torque.and_then(stated_torque);
     let pushed = torque.is_some_and(|torque| slides(&words(&torque.name)));
     // the joint of `q_base_turn` is not in turns
-    let bare = |column: &LogColumn| LogColumn {
-        name: own_name(&column.name).map_or_else(|| column.name.clone(), |_| "q_#".to_owned()),
-        ..column.clone()
-    };
-    let position = &bare(position);
-    let slid = match (stated_position(position), force) {
+    let mut position = position.clone();
+    if own_name(&position.name).is_some() {
+        position.name = "q_#".to_owned();
+    }
+    let slid = match (stated_position(&position), force) {
         (Some("m" | "mm" | "cm"), _) => true,
         (Some(_), _) => false,
         (None, Some("N" | "kN")) => true,
@@ -131,14 +119,11 @@ fn kind_of(position: &LogColumn, torque: Option<&LogColumn>) -> JointKind {
 
 /// A joint's name as a robot file may hold it: a number alone is `q1`.
 fn joint_name(joint: &str) -> String {
-    let kept: String = joint
-        .chars()
-        .map(|c| match c.is_alphanumeric() || "_-.".contains(c) {
-            true => c,
-            false => '_',
-        })
-        .take(48)
-        .collect();
+    let plain = |c: char| match c.is_alphanumeric() || "_-.".contains(c) {
+        true => c,
+        false => '_',
+    };
+    let kept: String = joint.chars().map(plain).take(48).collect();
     match kept.chars().next() {
         None => "q1".to_owned(),
         Some(c) if c.is_ascii_digit() => format!("q{kept}"),
@@ -150,15 +135,13 @@ fn joint_name(joint: &str) -> String {
 mod tests {
     use super::*;
 
-    fn columns(names: &[&str]) -> Vec<LogColumn> {
-        names.iter().map(|name| LogColumn::named(name)).collect()
+    fn names(all: &[&str]) -> Vec<String> {
+        let columns: Vec<LogColumn> = all.iter().map(|name| LogColumn::named(name)).collect();
+        shown(&columns).into_iter().map(|k| k.name).collect()
     }
 
     #[test]
     fn a_log_of_both_sides_of_the_gears_has_the_joints_that_have_torques() {
-        let names = |all: &[&str]| -> Vec<String> {
-            shown(&columns(all)).into_iter().map(|k| k.name).collect()
-        };
         let both = ["x_c1", "x_c2", "q_a", "q_b", "u_1", "u_2", "tau_a", "tau_b"];
         assert_eq!(names(&both), ["a", "b"]);
         // torques of the other side alone: the joints are of that side
@@ -167,26 +150,23 @@ mod tests {
 
     #[test]
     fn joints_without_a_urdf_have_the_names_and_numbers_of_the_columns() {
-        let names = |all: &[&str]| -> Vec<String> {
-            shown(&columns(all)).into_iter().map(|k| k.name).collect()
-        };
-        assert_eq!(names(&["positions_0", "positions_1"]), ["q0", "q1"]);
-        assert_eq!(
-            names(&["joint_2_position", "joint_1_position"]),
-            ["q1", "q2"]
-        );
-        let dotted = ["joint_states.pan.position", "joint_states.lift.position"];
-        assert_eq!(names(&dotted), ["pan", "lift"]);
-        assert_eq!(names(&["t", "Position", "Iq"]), ["q1"]);
-        let of_messages = [
-            "q_fer_joint1",
-            "q_fer_joint2",
-            "tau_fer_joint1",
-            "tau_fer_joint2",
-        ];
-        assert_eq!(names(&of_messages), ["fer_joint1", "fer_joint2"]);
-        let measured = ["q_meas_1", "q_meas_2", "tau_meas_1", "tau_meas_2"];
-        assert_eq!(names(&measured), ["q1", "q2"]);
+        for (columns, joints) in [
+            ("positions_0 positions_1", "q0 q1"),
+            ("joint_2_position joint_1_position", "q1 q2"),
+            (
+                "joint_states.pan.position joint_states.lift.position",
+                "pan lift",
+            ),
+            ("t Position Iq", "q1"),
+            (
+                "q_fer_joint1 q_fer_joint2 tau_fer_joint1 tau_fer_joint2",
+                "fer_joint1 fer_joint2",
+            ),
+            ("q_meas_1 q_meas_2 tau_meas_1 tau_meas_2", "q1 q2"),
+        ] {
+            let columns: Vec<&str> = columns.split(' ').collect();
+            assert_eq!(names(&columns).join(" "), joints);
+        }
         assert_eq!(joint_name("left elbow/[x]"), "left_elbow__x_");
     }
 }

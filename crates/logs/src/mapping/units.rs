@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::column::LogColumn;
-use crate::inspect::words::{NamedDrive, drive, words};
+use crate::inspect::words::{NamedDrive, drive, lists, words};
 use crate::log::escape;
 use cft_ident_core::robot::JointKind;
 
@@ -28,72 +28,56 @@ pub(super) struct Unit {
 }
 
 /// Words that name a unit of positions and nothing else, and the unit; `m` and `rad` are the tool's own.
-const POSITIONS: [(&str, &[&str]); 7] = [
-    ("deg", &["deg", "degs", "degree", "degrees", "°"]),
-    ("mm", &["mm", "millimeter", "millimetre"]),
-    ("cm", &["cm", "centimeter", "centimetre"]),
-    ("turns", &["turn", "turns", "rev", "revs", "revolutions"]),
-    (
-        "counts",
-        &[
-            "counts",
-            "count",
-            "ticks",
-            "tick",
-            "inc",
-            "increments",
-            "pulses",
-        ],
-    ),
-    ("rad", &["rad", "rads", "radian", "radians"]),
-    ("m", &["meter", "meters", "metre", "metres"]),
+const POSITIONS: [(&str, &str); 7] = [
+    ("deg", "deg degs degree degrees °"),
+    ("mm", "mm millimeter millimetre"),
+    ("cm", "cm centimeter centimetre"),
+    ("turns", "turn turns rev revs revolutions"),
+    ("counts", "counts count ticks tick inc increments pulses"),
+    ("rad", "rad rads radian radians"),
+    ("m", "meter meters metre metres"),
 ];
 /// The same of torques, currents and voltages.
-const TORQUES: [(&str, &[&str]); 10] = [
-    ("mNm", &["mnm", "nmm"]),
-    ("kNm", &["knm"]),
-    ("Ncm", &["ncm"]),
-    ("kN", &["kn"]),
-    ("%", &["percent", "pct", "%", "load", "utilization"]),
-    ("Nm", &["nm", "n·m", "n*m", "n.m"]),
-    ("N", &["newton", "newtons"]),
-    ("mA", &["milliamps"]),
-    ("A", &["amp", "amps", "ampere", "amperes"]),
-    ("V", &["volt", "volts"]),
+const TORQUES: [(&str, &str); 10] = [
+    ("mNm", "mnm nmm"),
+    ("kNm", "knm"),
+    ("Ncm", "ncm"),
+    ("kN", "kn"),
+    ("%", "percent pct % load utilization"),
+    ("Nm", "nm n·m n*m n.m"),
+    ("N", "newton newtons"),
+    ("mA", "milliamps"),
+    ("A", "amp amps ampere amperes"),
+    ("V", "volt volts"),
 ];
 /// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of axes.
 const SHORT_UNITS: [(&str, &str); 5] =
     [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
 
 /// Words that name parts of robots too: units in brackets alone.
-const AMBIGUOUS: [&str; 5] = ["turn", "load", "count", "inc", "tick"];
+const AMBIGUOUS: &str = "turn load count inc tick";
 
-/// The units that the names of columns of one kind state. In words they are units where all of these columns state
-/// one: in `q_base_turn` beside `q_upper` the word is the joint's.
+/// The units that the names of columns of one kind state: in words where all do; in `q_base_turn` it is the joint's.
 fn stated_by_all(
     columns: &[&LogColumn],
     alike: &dyn Fn(usize, usize) -> bool,
-    known: &[(&'static str, &[&str])],
+    known: &[(&'static str, &str)],
 ) -> Vec<Option<&'static str>> {
     let each: Vec<_> = columns.iter().map(|column| stated(column, known)).collect();
     let all = |k: usize| {
-        let mut others = each
-            .iter()
-            .enumerate()
-            .filter(|(other, _)| alike(k, *other));
-        others.all(|(_, unit)| unit.is_some())
+        let mut others = (0..each.len()).filter(|other| alike(k, *other));
+        others.all(|other| each[other].is_some())
     };
     let holds = |k: usize| columns[k].unit.is_some() || all(k);
-    (0..each.len())
-        .map(|k| each[k].filter(|_| holds(k)))
-        .collect()
+    let kept = (0..each.len()).map(|k| each[k].filter(|_| holds(k)));
+    kept.collect()
 }
 
 /// The unit that the name of a column states: in brackets, or in a word that means nothing else.
-fn stated(column: &LogColumn, known: &[(&'static str, &[&str])]) -> Option<&'static str> {
+fn stated(column: &LogColumn, known: &[(&'static str, &str)]) -> Option<&'static str> {
     let of = |word: &str| {
         let mut all = known.iter();
-        Some(all.find(|(_, words)| words.contains(&word))?.0)
+        Some(all.find(|(_, words)| lists(words, word))?.0)
     };
     let bracket = column.unit.as_deref().unwrap_or_default().to_lowercase();
     let short = SHORT_UNITS.iter().find(|(short, _)| *short == bracket);
@@ -105,10 +89,8 @@ fn stated(column: &LogColumn, known: &[(&'static str, &[&str])]) -> Option<&'sta
     of(&bracket)
         .or(short.map(|(_, unit)| *unit))
         .or_else(|| {
-            let sure = spoken
-                .iter()
-                .filter(|word| !AMBIGUOUS.contains(&&*word.text));
-            sure.into_iter().find_map(|word| of(&word.text))
+            let mut sure = spoken.iter().filter(|word| !lists(AMBIGUOUS, &word.text));
+            sure.find_map(|word| of(&word.text))
         })
         .or_else(|| milli.and_then(|_| of("milliamps")))
 }
@@ -138,42 +120,40 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
         plain.map(|k| columns[k].largest()).fold(0.0, f64::max)
     };
     let (turned, slid) = (of(JointKind::Revolute), of(JointKind::Prismatic));
-    let plain = columns
-        .iter()
-        .zip(&stated)
-        .filter(|(_, unit)| unit.is_none());
-    let plain = plain.map(|(column, _)| column);
+    let plain = columns.iter().zip(&stated);
+    let plain = plain
+        .filter(|(_, unit)| unit.is_none())
+        .map(|(column, _)| column);
     let whole = plain.clone().all(|c| c.whole) && turned.max(slid) > 400.0;
     let first = plain.clone().next().map(|column| &column.name);
     let guessed = |kind: JointKind, column: &LogColumn| {
-        // one sentence for all of them
-        let shown = |text: String| Some(text).filter(|_| first == Some(&column.name));
         let (unit, check) = match kind {
             _ if whole => (
-                Some("counts"),
+                "counts",
                 format!(
                     "whole numbers up to {}: counts? then give position_scale, rad or m per count",
                     turned.max(slid)
                 ),
             ),
             JointKind::Revolute if turned > MAX_POSITION_RAD => (
-                Some("deg"),
+                "deg",
                 format!(
                     "deg is guessed: positions go to {turned:.0}, and no joint turns that far in rad"
                 ),
             ),
             JointKind::Prismatic if slid > MAX_TRAVEL_M => (
-                Some("mm"),
+                "mm",
                 format!(
                     "mm is guessed: positions go to {slid:.0}, and no joint slides that far in m"
                 ),
             ),
             _ => return Unit::default(),
         };
+        // one sentence for all of them
+        let check = Some(check).filter(|_| first == Some(&column.name));
         Unit {
-            unit,
-            check: shown(check),
-            ..Unit::default()
+            check,
+            ..Unit::of(unit)
         }
     };
     let each = columns.iter().zip(kinds).zip(&stated);
@@ -181,26 +161,19 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
         None => guessed(*kind, column),
         Some("rad" | "m") => Unit::default(),
         Some("counts") => Unit {
-            unit: Some("counts"),
             check: Some("counts: give position_scale, rad or m per count".to_owned()),
+            ..Unit::of("counts")
+        },
+        Some(unit) if matches!(unit, "mm" | "cm") == (*kind == JointKind::Prismatic) => {
+            Unit::of(unit)
+        }
+        Some(unit) => Unit {
+            check: Some(format!(
+                "`{}` is in {unit}, which does not go with the kind of its joint",
+                escape(&column.name)
+            )),
             ..Unit::default()
         },
-        Some(unit) => {
-            let length = matches!(unit, "mm" | "cm");
-            match length == (*kind == JointKind::Prismatic) {
-                true => Unit {
-                    unit: Some(unit),
-                    ..Unit::default()
-                },
-                false => Unit {
-                    check: Some(format!(
-                        "`{}` is in {unit}, which does not go with the kind of its joint",
-                        escape(&column.name)
-                    )),
-                    ..Unit::default()
-                },
-            }
-        }
     })
     .collect()
 }
@@ -210,25 +183,17 @@ pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<
     let guessed = guessed_torque(columns, limits);
     let stated = stated_by_all(columns, &|_, _| true, &TORQUES);
     let of = |(k, column): (usize, &&LogColumn)| {
-        match (
-        stated[k],
-        drive(&words(&column.name)),
-    ) {
-        (Some("A"), NamedDrive::Unsaid | NamedDrive::Current)
-        | (None, NamedDrive::Current) => driving("A"),
+        match (stated[k], drive(&words(&column.name))) {
         (Some("mA"), _) => Unit {
             scale: Some(1e-3),
             check: Some("currents in mA, which the scale makes A: give torque constant times gear ratio times 0.001 for Nm".to_owned()),
             ..driving("A")
         },
-        (Some("A"), _) => driving("A"),
+        (Some("A"), _) | (None, NamedDrive::Current) => driving("A"),
         (Some("V"), _) | (None, NamedDrive::Voltage) => driving("V"),
         (Some("%"), _) => rated("percent of a rated torque", "100"),
         (Some("Nm" | "N"), _) => Unit::default(),
-        (Some(unit), _) => Unit {
-            unit: Some(unit),
-            ..Unit::default()
-        },
+        (Some(unit), _) => Unit::of(unit),
         // one sentence for all of them
         (None, _) => Unit {
             check: guessed.check.clone().filter(|_| k == 0),
@@ -239,11 +204,19 @@ pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<
     columns.iter().enumerate().map(of).collect()
 }
 
+impl Unit {
+    fn of(unit: &'static str) -> Self {
+        Self {
+            unit: Some(unit),
+            ..Self::default()
+        }
+    }
+}
+
 fn driving(unit: &'static str) -> Unit {
     Unit {
-        unit: Some(unit),
         drive: true,
-        ..Unit::default()
+        ..Unit::of(unit)
     }
 }
 
@@ -273,10 +246,8 @@ fn guessed_torque(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
         return rated(&format!("whole numbers up to {most}: percent?"), "100");
     }
     if whole && most <= 3000.0 && known.iter().all(|ratio| *ratio > 1.5) {
-        return rated(
-            &format!("whole numbers up to {most}: thousandths of a rated torque?"),
-            "1000",
-        );
+        let what = format!("whole numbers up to {most}: thousandths of a rated torque?");
+        return rated(&what, "1000");
     }
     if beyond {
         return Unit {
@@ -290,8 +261,7 @@ fn guessed_torque(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
     Unit::default()
 }
 
-/// The range after which a position begins anew: a turn in rad or deg, or a power of two of counts, where
-/// single steps of nearly that size stand among small ones.
+/// The range after which a position begins anew, where single steps of nearly that size stand among small ones.
 pub(super) fn wrap_of(numbers: &[f64]) -> Option<f64> {
     let finite = || numbers.iter().copied().filter(|x| x.is_finite());
     let (low, high) = finite().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
@@ -308,9 +278,8 @@ pub(super) fn wrap_of(numbers: &[f64]) -> Option<f64> {
         |range: f64| span <= range * 1.0001 && range - span <= (3.0 * usual).max(0.001 * range);
     let powers = (8..=32).map(|power| f64::from(power).exp2());
     let mut known = [TAU, 360.0].into_iter().chain(powers);
-    known
-        .find(|range| near(*range))
-        .filter(|range| usual < 0.1 * range)
+    let found = known.find(|range| near(*range));
+    found.filter(|range| usual < 0.1 * range)
 }
 
 #[cfg(test)]
@@ -331,62 +300,47 @@ mod tests {
 
     #[test]
     fn names_state_units_and_else_sizes_suggest_them() {
-        let turn = [JointKind::Revolute];
-        let position =
-            |name: &str, largest| one(of_positions(&[&column(name, largest, false)], &turn));
-        assert_eq!(position("act_pos_mot_deg_1", 2.0).unit, Some("deg"));
-        assert_eq!(position("act_pos_mot_deg_1", 2.0).check, None);
-        assert_eq!(position("q1", 3.1), Unit::default());
-        assert_eq!(position("q1", 170.0).unit, Some("deg"));
-        assert!(position("q1", 170.0).check.is_some());
-        let slide = one(of_positions(
-            &[&column("q1", 400.5, false)],
-            &[JointKind::Prismatic],
-        ));
+        let revolute = JointKind::Revolute;
+        let position = |name: &str, largest, whole, kind| {
+            one(of_positions(&[&column(name, largest, whole)], &[kind]))
+        };
+        let deg = position("act_pos_mot_deg_1", 2.0, false, revolute);
+        assert_eq!((deg.unit, deg.check), (Some("deg"), None));
+        assert_eq!(position("q1", 3.1, false, revolute), Unit::default());
+        let guessed = position("q1", 170.0, false, revolute);
+        assert!(guessed.unit == Some("deg") && guessed.check.is_some());
+        let slide = position("q1", 400.5, false, JointKind::Prismatic);
         assert_eq!(slide.unit, Some("mm"));
-        let counts = one(of_positions(&[&column("q1", 90_000.0, true)], &turn));
+        let counts = position("q1", 90_000.0, true, revolute);
         assert_eq!(counts.unit, Some("counts"));
+        // a word that is a joint's, or a part's
+        for names in [["q_base_turn", "q_upper"], ["q_rev_deg", "q_count"]] {
+            let both = names.map(|name| column(name, 1.0, false));
+            let found = of_positions(&[&both[0], &both[1]], &[revolute; 2]);
+            assert_eq!(found, vec![Unit::default(); 2]);
+        }
         let torque =
             |name: &str, largest, whole| one(of_torques(&[&column(name, largest, whole)], &[None]));
-        // a word that is a joint's, or a part's
-        let base = [
-            column("q_base_turn", 1.0, false),
-            column("q_upper", 1.0, false),
-        ];
-        let found = of_positions(&[&base[0], &base[1]], &[JointKind::Revolute; 2]);
-        assert_eq!(found, vec![Unit::default(); 2]);
-        let deg = [
-            column("q_rev_deg", 1.0, false),
-            column("q_count", 1.0, false),
-        ];
-        let found = of_positions(&[&deg[0], &deg[1]], &[JointKind::Revolute; 2]);
-        assert_eq!(found, vec![Unit::default(); 2]);
-        assert_eq!(torque("load_torque_1", 2.5, false), Unit::default());
+        for (name, largest, whole) in [
+            ("load_torque_1", 2.5, false),
+            ("Torque_A1", 2.5, false),
+            ("torque_V1", 2.5, false),
+            ("torque_nm_1", 2e3, true),
+            ("tau_1", 150.3, false),
+        ] {
+            assert_eq!(torque(name, largest, whole), Unit::default(), "{name}");
+        }
         assert_eq!(torque("tau_mnm_1", 2e3, false).unit, Some("mNm"));
         assert_eq!(torque("force_kN", 2.5, false).unit, Some("kN"));
-        assert_eq!(torque("Torque_A1", 2.5, false), Unit::default());
-        assert_eq!(torque("torque_V1", 2.5, false), Unit::default());
-        assert_eq!(torque("torque_nm_1", 2e3, true), Unit::default());
-        assert_eq!(torque("tau_1", 150.3, false), Unit::default());
-        assert!(
-            torque("tau_1", 87.0, true)
-                .check
-                .unwrap()
-                .contains("percent")
-        );
-        assert!(
-            torque("load_percent_1", 8.3, false)
-                .check
-                .unwrap()
-                .contains("percent")
-        );
+        for (name, largest, whole) in [("tau_1", 87.0, true), ("load_percent_1", 8.3, false)] {
+            let check = torque(name, largest, whole).check.unwrap();
+            assert!(check.contains("percent"), "{check}");
+        }
         assert_eq!(torque("tau_1", 150_300.5, false).scale, Some(1e-3));
         assert!(torque("actual_current_0", 4.0, false).drive);
         // beside the limits of the robot
-        let small = one(of_torques(
-            &[&column("tau_1", 9000.5, false)],
-            &[Some(12.0)],
-        ));
+        let tau = column("tau_1", 9000.5, false);
+        let small = one(of_torques(&[&tau], &[Some(12.0)]));
         assert_eq!(small.scale, Some(1e-3));
     }
 

@@ -6,7 +6,6 @@
 //! | `<kind>_<joint>` of every joint, e.g. `tau_hat_q1` | `/<kind>` | effort for torques, else position |
 //! | all others | `/columns`, the names of columns for those of joints | position |
 
-/// Array of a `JointState`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Array {
     Position,
@@ -22,7 +21,6 @@ pub(super) struct TopicColumns {
     pub(super) arrays: Vec<(Array, Vec<usize>)>,
 }
 
-/// Topic of the joints.
 pub(super) const JOINTS: &str = "/joint_states";
 /// Topic of the columns that belong to no joint.
 pub(super) const COLUMNS: &str = "/columns";
@@ -71,13 +69,10 @@ pub(super) fn topics(columns: &[String]) -> Vec<TopicColumns> {
             continue;
         }
         let Some(found) = take(kind) else { continue };
-        let torque = ["tau", "residual", "band"]
-            .iter()
-            .any(|begins| kind.starts_with(begins));
-        let array = if torque {
-            Array::Effort
-        } else {
-            Array::Position
+        let torques = ["tau", "residual", "band"];
+        let array = match torques.iter().any(|begins| kind.starts_with(begins)) {
+            true => Array::Effort,
+            false => Array::Position,
         };
         out.push(TopicColumns {
             name: format!("/{kind}"),
@@ -106,10 +101,8 @@ fn kind_of<'c>(column: &'c str, joint: &str) -> Option<&'c str> {
 /// The joints: those that have a position, else those that have a torque.
 fn joints(columns: &[String]) -> Vec<String> {
     let with = |prefix: &str| -> Vec<String> {
-        let names = columns
-            .iter()
-            .skip(1)
-            .filter_map(|c| c.strip_prefix(prefix));
+        let names = columns.iter().skip(1);
+        let names = names.filter_map(|column| column.strip_prefix(prefix));
         let names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
         // `tau_hat_q1` is no torque of a joint `hat_q1` where there is a joint `q1`.
         let of_another = |name: &str| {
@@ -124,11 +117,9 @@ fn joints(columns: &[String]) -> Vec<String> {
         }
         out
     };
-    let joints = with("q_");
-    if joints.is_empty() {
-        with("tau_")
-    } else {
-        joints
+    match with("q_") {
+        none if none.is_empty() => with("tau_"),
+        joints => joints,
     }
 }
 
@@ -154,35 +145,24 @@ mod tests {
         };
         let found = of("t,q_a,q_b_c,tau_a,tau_b_c,dq_a,u_1,ddq_b_c,ddq_a,q_ref_a");
         let both: &[&str] = &["a", "b_c"];
+        let states: [(Array, &[usize]); 2] = [(Position, &[1, 2]), (Effort, &[3, 4])];
+        let left = ["dq_a", "u_1", "q_ref_a"];
         let expected = [
-            topic(
-                "/joint_states",
-                both,
-                &[(Position, &[1, 2]), (Effort, &[3, 4])],
-            ),
+            topic("/joint_states", both, &states),
             topic("/ddq", both, &[(Position, &[8, 7])]),
-            topic(
-                "/columns",
-                &["dq_a", "u_1", "q_ref_a"],
-                &[(Position, &[5, 6, 9])],
-            ),
+            topic("/columns", &left, &[(Position, &[5, 6, 9])]),
         ];
         assert_eq!(found, expected);
         let residual = of(
             "t,tau_q1,tau_q2,tau_hat_q1,tau_hat_q2,residual_q1,residual_q2,band_lower_q1,band_lower_q2",
         );
-        let topics: Vec<&str> = residual.iter().map(|t| t.name.as_str()).collect();
-        assert_eq!(
-            topics,
-            ["/joint_states", "/tau_hat", "/residual", "/band_lower"]
-        );
-        assert!(
-            residual
-                .iter()
-                .all(|t| t.arrays[0].0 == Effort && t.names == ["q1", "q2"])
-        );
+        let topics = ["/joint_states", "/tau_hat", "/residual", "/band_lower"];
+        assert_eq!(residual.len(), topics.len());
+        for (found, name) in residual.iter().zip(topics) {
+            assert_eq!((&*found.name, found.arrays[0].0), (name, Effort));
+            assert_eq!(found.names, ["q1", "q2"]);
+        }
         let other = of("time,Position,Iq");
-        assert_eq!(other[0].name, "/columns");
-        assert_eq!(other.len(), 1);
+        assert_eq!((other.len(), &*other[0].name), (1, "/columns"));
     }
 }

@@ -4,11 +4,10 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::mcap::McapLog;
+use super::mcap::{self, McapLog};
 #[cfg(feature = "parquet")]
 use super::parquet::ParquetLog;
-use super::text::Text;
-use super::{AtomicFile, OutputError};
+use super::{AtomicFile, OutputError, text};
 use crate::log::Instant;
 
 /// What a log file is, by the end of its name.
@@ -49,13 +48,10 @@ impl LogForm {
     /// By the name of the file; `None` for any other ending.
     pub fn of(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_lowercase();
-        let (name, packing) = if let Some(name) = name.strip_suffix(".gz") {
-            (name, Packing::Gzip)
-        } else if let Some(name) = name.strip_suffix(".zst") {
-            (name, Packing::Zstd)
-        } else {
-            (name.as_str(), Packing::None)
-        };
+        let packed = [(".gz", Packing::Gzip), (".zst", Packing::Zstd)];
+        let mut packed = packed.into_iter();
+        let found = packed.find_map(|(end, packing)| Some((name.strip_suffix(end)?, packing)));
+        let (name, packing) = found.unwrap_or((&name, Packing::None));
         let kind = match Path::new(name).extension()?.to_str()? {
             "csv" => Kind::Text,
             "mcap" => Kind::Messages,
@@ -67,7 +63,6 @@ impl LogForm {
     }
 }
 
-/// A file, compressed on the way.
 pub(super) enum Packed {
     Plain(AtomicFile),
     Gzip(flate2::write::GzEncoder<AtomicFile>),
@@ -91,6 +86,14 @@ impl Packed {
         })
     }
 
+    fn writer(&mut self) -> &mut dyn Write {
+        match self {
+            Self::Plain(file) => file,
+            Self::Gzip(encoder) => encoder,
+            Self::Zstd(encoder) => encoder,
+        }
+    }
+
     fn finish(self) -> io::Result<AtomicFile> {
         match self {
             Self::Plain(file) => Ok(file),
@@ -102,24 +105,16 @@ impl Packed {
 
 impl Write for Packed {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Plain(file) => file.write(buffer),
-            Self::Gzip(encoder) => encoder.write(buffer),
-            Self::Zstd(encoder) => encoder.write(buffer),
-        }
+        self.writer().write(buffer)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Plain(file) => file.flush(),
-            Self::Gzip(encoder) => encoder.flush(),
-            Self::Zstd(encoder) => encoder.flush(),
-        }
+        self.writer().flush()
     }
 }
 
 enum Sink {
-    Text(Box<Text<io::BufWriter<Packed>>>),
+    Text(Box<io::BufWriter<Packed>>),
     Messages(Box<McapLog<Packed>>),
     #[cfg(feature = "parquet")]
     Parquet(Box<ParquetLog<Packed>>),
@@ -139,9 +134,8 @@ pub struct LogWriter {
 
 impl fmt::Debug for LogWriter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("LogWriter")
-            .field("path", &self.path)
-            .finish_non_exhaustive()
+        let mut shown = f.debug_struct("LogWriter");
+        shown.field("path", &self.path).finish_non_exhaustive()
     }
 }
 
@@ -173,10 +167,14 @@ impl LogWriter {
         let begun = Packed::new(file, form.packing).and_then(|packed| {
             Ok(match form.kind {
                 Kind::Text => {
-                    let buffered = io::BufWriter::with_capacity(1 << 16, packed);
-                    Sink::Text(Box::new(Text::new(buffered, &columns, notes)?))
+                    let mut buffered = io::BufWriter::with_capacity(1 << 16, packed);
+                    text::begin(&mut buffered, &columns, notes)?;
+                    Sink::Text(Box::new(buffered))
                 }
-                Kind::Messages => Sink::Messages(Box::new(McapLog::new(packed, &columns, notes)?)),
+                Kind::Messages => {
+                    let recording = McapLog::new(packed, &columns, notes).map_err(mcap::plain)?;
+                    Sink::Messages(Box::new(recording))
+                }
                 #[cfg(feature = "parquet")]
                 Kind::Parquet => Sink::Parquet(Box::new(ParquetLog::new(packed, &columns, notes))),
             })
@@ -208,8 +206,11 @@ impl LogWriter {
             Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
         } else {
             match &mut self.sink {
-                Sink::Text(text) => text.row(self.origin, &self.row),
-                Sink::Messages(recording) => recording.row(self.origin, &self.row),
+                Sink::Text(text) => text::row(text, self.origin, &self.row),
+                Sink::Messages(recording) => {
+                    let written = recording.row(self.origin, &self.row);
+                    written.map_err(mcap::plain)
+                }
                 #[cfg(feature = "parquet")]
                 Sink::Parquet(file) => file.row(self.origin, &self.row),
             }
@@ -228,12 +229,8 @@ impl LogWriter {
     /// The file with all rows in it, which lacks its name.
     pub(super) fn finish(self) -> Result<AtomicFile, OutputError> {
         let packed = match self.sink {
-            Sink::Text(text) => text.finish().and_then(|buffered| {
-                buffered
-                    .into_inner()
-                    .map_err(io::IntoInnerError::into_error)
-            }),
-            Sink::Messages(recording) => recording.finish(),
+            Sink::Text(text) => text.into_inner().map_err(io::IntoInnerError::into_error),
+            Sink::Messages(recording) => recording.finish().map_err(mcap::plain),
             #[cfg(feature = "parquet")]
             Sink::Parquet(file) => file.finish(),
         };
@@ -247,7 +244,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_ending_tells_the_form_and_anything_else_is_none() {
+    fn the_ending_says_the_form_and_anything_else_is_none() {
         let of = |name: &str| LogForm::of(Path::new(name));
         let form = |kind, packing| Some(LogForm { kind, packing });
         assert_eq!(of("a/b.csv"), form(Kind::Text, Packing::None));
@@ -280,10 +277,7 @@ mod tests {
         log.row([0.0, 1.0]).unwrap();
         log.row([0.001, f64::NAN]).unwrap();
         log.commit().unwrap();
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert_eq!(
-            text,
-            "t,q_q1\n1714566896.123456789,1.0\n1714566896.124456789,\n"
-        );
+        let expected = "t,q_q1\n1714566896.123456789,1.0\n1714566896.124456789,\n";
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);
     }
 }

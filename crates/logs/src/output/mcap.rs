@@ -9,7 +9,7 @@ use std::io::{self, Write};
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
-use mcap::{Compression, McapError, WriteOptions, Writer};
+use mcap::{Compression, McapError, McapResult, WriteOptions, Writer};
 
 use super::columns::{self, Array, TopicColumns};
 use crate::log::Instant;
@@ -36,7 +36,6 @@ uint32 nanosec
 /// `std_msgs/msg/Float64`.
 const FLOAT: &str = "float64 data\n";
 
-/// Rows as messages.
 pub(super) struct McapLog<W: Write> {
     writer: Writer<NoSeek<W>>,
     topics: Vec<(u16, TopicColumns, Vec<u8>)>,
@@ -48,25 +47,18 @@ pub(super) struct McapLog<W: Write> {
 
 impl<W: Write> McapLog<W> {
     /// Begins a recording of these columns, of which the first is the time.
-    pub(super) fn new(out: W, columns: &[String], notes: &[String]) -> io::Result<Self> {
-        let mut writer = options().create(NoSeek::new(out)).map_err(plain)?;
-        let schema = writer
-            .add_schema(
-                "sensor_msgs/msg/JointState",
-                "ros2msg",
-                JOINT_STATE.as_bytes(),
-            )
-            .map_err(plain)?;
+    pub(super) fn new(out: W, columns: &[String], notes: &[String]) -> McapResult<Self> {
+        let mut writer = options().create(NoSeek::new(out))?;
+        let kind = "sensor_msgs/msg/JointState";
+        let schema = writer.add_schema(kind, "ros2msg", JOINT_STATE.as_bytes())?;
         let mut topics = Vec::new();
         for topic in columns::topics(columns) {
-            let channel = writer
-                .add_channel(schema, &topic.name, "cdr", &quality())
-                .map_err(plain)?;
+            let channel = writer.add_channel(schema, &topic.name, "cdr", &quality())?;
             let names = cdr_names(&topic.names);
             topics.push((channel, topic, names));
         }
         if !notes.is_empty() {
-            writer.write_metadata(&metadata(notes)).map_err(plain)?;
+            writer.write_metadata(&metadata(notes))?;
         }
         Ok(Self {
             writer,
@@ -77,54 +69,60 @@ impl<W: Write> McapLog<W> {
         })
     }
 
-    /// Writes the messages of a row.
-    pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> io::Result<()> {
+    pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> McapResult<()> {
         let t = row.first().copied().unwrap_or(f64::NAN);
         let (stamp, exact) = stamp(origin, t)?;
-        let log_time = u64::try_from(stamp).unwrap_or(0);
         self.sequence = self.sequence.wrapping_add(1);
-        let header = |channel_id: u16, sequence: u32| MessageHeader {
-            channel_id,
-            sequence,
-            log_time,
-            publish_time: log_time,
-        };
+        let header = |channel_id| header(channel_id, self.sequence, stamp);
         if !exact {
             let channel = match self.times {
                 Some(channel) => channel,
                 None => {
-                    let schema = self
-                        .writer
-                        .add_schema("std_msgs/msg/Float64", "ros2msg", FLOAT.as_bytes())
-                        .map_err(plain)?;
-                    let added = self.writer.add_channel(schema, TIMES, "cdr", &quality());
-                    *self.times.insert(added.map_err(plain)?)
+                    let channel = channel(&mut self.writer, TIMES, "std_msgs/msg/Float64", FLOAT)?;
+                    *self.times.insert(channel)
                 }
             };
             self.body.clear();
             self.body.extend([0, 1, 0, 0]);
             self.body.extend(t.to_le_bytes());
-            self.writer
-                .write_to_known_channel(&header(channel, self.sequence), &self.body)
-                .map_err(plain)?;
+            let header = header(channel);
+            self.writer.write_to_known_channel(&header, &self.body)?;
         }
         for (channel, topic, names) in &self.topics {
             message(&mut self.body, stamp, topic, names, row);
-            self.writer
-                .write_to_known_channel(&header(*channel, self.sequence), &self.body)
-                .map_err(plain)?;
+            let header = header(*channel);
+            self.writer.write_to_known_channel(&header, &self.body)?;
         }
         Ok(())
     }
 
-    /// Ends the recording.
-    pub(super) fn finish(mut self) -> io::Result<W> {
-        self.writer.finish().map_err(plain)?;
+    pub(super) fn finish(mut self) -> McapResult<W> {
+        self.writer.finish()?;
         Ok(self.writer.into_inner().into_inner())
     }
 }
 
-/// Notes, numbered.
+fn channel<W: Write>(
+    writer: &mut Writer<NoSeek<W>>,
+    topic: &str,
+    kind: &str,
+    definition: &str,
+) -> McapResult<u16> {
+    let schema = writer.add_schema(kind, "ros2msg", definition.as_bytes())?;
+    writer.add_channel(schema, topic, "cdr", &quality())
+}
+
+/// The header of a message at a time [ns].
+fn header(channel_id: u16, sequence: u32, stamp: i128) -> MessageHeader {
+    let log_time = u64::try_from(stamp).unwrap_or(0);
+    MessageHeader {
+        channel_id,
+        sequence,
+        log_time,
+        publish_time: log_time,
+    }
+}
+
 fn metadata(notes: &[String]) -> Metadata {
     let numbered = notes.iter().enumerate();
     Metadata {
@@ -142,25 +140,12 @@ pub(super) fn single_message(
     definition: &str,
     body: &[u8],
     notes: &[String],
-) -> io::Result<Vec<u8>> {
-    let mut writer = options().create(NoSeek::new(Vec::new())).map_err(plain)?;
-    let schema = writer
-        .add_schema(kind, "ros2msg", definition.as_bytes())
-        .map_err(plain)?;
-    let channel = writer
-        .add_channel(schema, topic, "cdr", &quality())
-        .map_err(plain)?;
-    let header = MessageHeader {
-        channel_id: channel,
-        sequence: 0,
-        log_time: 0,
-        publish_time: 0,
-    };
-    writer
-        .write_to_known_channel(&header, body)
-        .map_err(plain)?;
-    writer.write_metadata(&metadata(notes)).map_err(plain)?;
-    writer.finish().map_err(plain)?;
+) -> McapResult<Vec<u8>> {
+    let mut writer = options().create(NoSeek::new(Vec::new()))?;
+    let channel = channel(&mut writer, topic, kind, definition)?;
+    writer.write_to_known_channel(&header(channel, 0, 0), body)?;
+    writer.write_metadata(&metadata(notes))?;
+    writer.finish()?;
     Ok(writer.into_inner().into_inner())
 }
 
@@ -214,10 +199,8 @@ fn text(out: &mut Vec<u8>, text: &str) {
 fn message(out: &mut Vec<u8>, stamp_ns: i128, topic: &TopicColumns, names: &[u8], row: &[f64]) {
     out.clear();
     out.extend([0, 1, 0, 0]);
-    let (sec, nanosec) = (
-        stamp_ns.div_euclid(1_000_000_000),
-        stamp_ns.rem_euclid(1_000_000_000),
-    );
+    let second = 1_000_000_000;
+    let (sec, nanosec) = (stamp_ns.div_euclid(second), stamp_ns.rem_euclid(second));
     let sec = i32::try_from(sec).unwrap_or(if sec < 0 { i32::MIN } else { i32::MAX });
     out.extend(sec.to_le_bytes());
     out.extend((nanosec as u32).to_le_bytes());
@@ -227,22 +210,22 @@ fn message(out: &mut Vec<u8>, stamp_ns: i128, topic: &TopicColumns, names: &[u8]
     for array in [Array::Position, Array::Velocity, Array::Effort] {
         let columns = topic.arrays.iter().find(|(kind, _)| *kind == array);
         let columns = columns.map_or(&[][..], |(_, columns)| columns);
-        out.extend((columns.len() as u32).to_le_bytes());
-        if columns.is_empty() {
-            continue;
-        }
-        // Alignment counts from after the first four bytes.
-        while !(out.len() - 4).is_multiple_of(8) {
-            out.push(0);
-        }
-        for column in columns {
-            out.extend(row[*column].to_le_bytes());
-        }
+        doubles(out, columns.iter().map(|column| row[*column]));
     }
 }
 
+/// Appends a list of numbers to CDR.
+pub(super) fn doubles(out: &mut Vec<u8>, values: impl ExactSizeIterator<Item = f64>) {
+    out.extend((values.len() as u32).to_le_bytes());
+    // Alignment counts from after the first four bytes.
+    while values.len() > 0 && !(out.len() - 4).is_multiple_of(8) {
+        out.push(0);
+    }
+    values.for_each(|x| out.extend(x.to_le_bytes()));
+}
+
 /// The error of the system, or that of the format.
-fn plain(error: McapError) -> io::Error {
+pub(super) fn plain(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
         other => io::Error::other(other.to_string()),

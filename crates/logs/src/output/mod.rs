@@ -154,8 +154,7 @@ impl AtomicFile {
         files.commit()
     }
 
-    /// Brings the file to the disk, under its temporary name still, with the name that it is to have;
-    /// `None` where there is nothing to rename.
+    /// Brings the file to the disk, with the name that it is to have; `None` where there is nothing to rename.
     fn ready(mut self) -> Result<Option<(NamedTempFile, PathBuf)>, OutputError> {
         let target = self.target.take();
         let finished = match target.map(BufWriter::into_inner) {
@@ -187,10 +186,8 @@ fn open(path: &Path) -> io::Result<OutputTarget> {
     match &existing {
         Some(existing) if existing.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
         Some(existing) if !existing.is_file() => {
-            return File::options()
-                .write(true)
-                .open(path)
-                .map(OutputTarget::Direct);
+            let file = File::options().write(true).open(path);
+            return file.map(OutputTarget::Direct);
         }
         // A file that may not be written is not replaced either, though its folder would let us.
         Some(existing) if existing.permissions().readonly() => {
@@ -228,34 +225,35 @@ fn open(path: &Path) -> io::Result<OutputTarget> {
 /// The error of the system alone: the temporary file's own names a path that nobody asked for.
 fn plain(error: io::Error) -> io::Error {
     let inner = error.get_ref().and_then(|outer| outer.source());
-    let code = inner
-        .and_then(|inner| inner.downcast_ref::<io::Error>())
-        .and_then(io::Error::raw_os_error);
+    let inner = inner.and_then(|inner| inner.downcast_ref::<io::Error>());
+    let code = inner.and_then(io::Error::raw_os_error);
     code.map_or(error, io::Error::from_raw_os_error)
 }
 
 /// A temporary file that removes itself need not be removed by an interruption.
 fn forget(target: &OutputTarget) {
     if let OutputTarget::Temporary(file, _) = target {
-        let mut unfinished = unfinished();
-        unfinished.remove(file.path());
+        unfinished().remove(file.path());
+    }
+}
+
+impl OutputTarget {
+    /// The file itself, for its errors: see `plain`.
+    fn file(&mut self) -> &mut File {
+        match self {
+            Self::Temporary(file, _) => file.as_file_mut(),
+            Self::Direct(file) => file,
+        }
     }
 }
 
 impl Write for OutputTarget {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        match self {
-            // The file itself, for its errors: see `plain`.
-            Self::Temporary(file, _) => file.as_file_mut().write(buffer),
-            Self::Direct(file) => file.write(buffer),
-        }
+        self.file().write(buffer)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Temporary(file, _) => file.as_file_mut().flush(),
-            Self::Direct(file) => file.flush(),
-        }
+        self.file().flush()
     }
 }
 
@@ -302,9 +300,8 @@ mod tests {
 
     pub(super) fn names(folder: &Path) -> Vec<String> {
         let entries = std::fs::read_dir(folder).unwrap();
-        let mut names: Vec<String> = entries
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
         names.sort();
         names
     }
@@ -376,14 +373,12 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_full_disk_is_told_and_a_device_is_not_replaced() {
+    fn a_full_disk_is_reported_and_a_device_is_not_replaced() {
         let full = Path::new("/dev/full");
         let error = write_whole(full, |file| file.write_all(b"x")).unwrap_err();
         assert_eq!(error.source.kind(), io::ErrorKind::StorageFull);
-        assert!(
-            error.to_string().contains("/dev/full")
-                && error.to_string().contains("free some space")
-        );
+        let text = error.to_string();
+        assert!(text.contains("/dev/full") && text.contains("free some space"));
         assert!(!std::fs::metadata(full).unwrap().is_file());
         write_whole(Path::new("/dev/null"), |file| file.write_all(b"x")).unwrap();
         assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
@@ -402,13 +397,13 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_folder_and_a_folder_as_name_are_told_before_the_work() {
+    fn a_missing_folder_and_a_folder_as_name_are_reported_before_the_work() {
         let folder = folder();
-        let missing = AtomicFile::create(&folder.path().join("none/a.csv"))
-            .unwrap_err()
-            .to_string();
-        assert!(missing.contains("make the folder first"), "{missing}");
-        let named = AtomicFile::create(folder.path()).unwrap_err().to_string();
-        assert!(named.contains("name a file inside"), "{named}");
+        let missing = (folder.path().join("none/a.csv"), "make the folder first");
+        let named = (folder.path().to_owned(), "name a file inside");
+        for (path, said) in [missing, named] {
+            let error = AtomicFile::create(&path).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
     }
 }

@@ -16,24 +16,17 @@ use crate::log::Instant;
 
 /// Numbers that are held until they are written.
 const MAX_HELD_NUMBERS: usize = 1 << 20;
-/// Rows of a group at least.
 const MIN_GROUP_ROWS: usize = 1024;
 
-/// Rows as a Parquet file.
 pub(super) struct ParquetLog<W: Write + Send> {
     columns: Vec<String>,
     notes: Vec<String>,
-    state: State<W>,
+    /// Where the file goes until it is begun: whether times are stamps is not known before the first row.
+    out: Option<W>,
+    writer: Option<SerializedFileWriter<W>>,
     origin: Instant,
     /// Rows that are not written yet, column by column.
     held: Vec<Vec<f64>>,
-}
-
-enum State<W: Write + Send> {
-    /// Whether times are stamps is not known before the first row.
-    Waiting(W),
-    Begun(Box<SerializedFileWriter<W>>),
-    Ended,
 }
 
 impl<W: Write + Send> ParquetLog<W> {
@@ -42,13 +35,13 @@ impl<W: Write + Send> ParquetLog<W> {
         Self {
             columns: columns.to_vec(),
             notes: notes.to_vec(),
-            state: State::Waiting(out),
+            out: Some(out),
+            writer: None,
             origin: Instant::default(),
             held: vec![Vec::new(); columns.len()],
         }
     }
 
-    /// Writes a row.
     pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> io::Result<()> {
         self.origin = origin;
         for (column, value) in self.held.iter_mut().zip(row) {
@@ -56,7 +49,7 @@ impl<W: Write + Send> ParquetLog<W> {
         }
         let rows = self.held.first().map_or(0, Vec::len);
         match rows >= MIN_GROUP_ROWS && rows * self.columns.len() >= MAX_HELD_NUMBERS {
-            true => self.write().map_err(plain),
+            true => Ok(self.write()?),
             false => Ok(()),
         }
     }
@@ -67,10 +60,7 @@ impl<W: Write + Send> ParquetLog<W> {
 
     /// The writer, begun where it is not yet.
     fn begin(&mut self) -> Result<(), ParquetError> {
-        if !matches!(self.state, State::Waiting(_)) {
-            return Ok(());
-        }
-        let State::Waiting(out) = std::mem::replace(&mut self.state, State::Ended) else {
+        let Some(out) = self.out.take() else {
             return Ok(());
         };
         let notes = self.notes.iter().enumerate();
@@ -83,8 +73,11 @@ impl<W: Write + Send> ParquetLog<W> {
             .set_key_value_metadata(Some(notes.collect()))
             .build();
         let schema = schema(&self.columns, self.stamped())?;
-        let writer = SerializedFileWriter::new(out, schema, Arc::new(properties))?;
-        self.state = State::Begun(Box::new(writer));
+        self.writer = Some(SerializedFileWriter::new(
+            out,
+            schema,
+            Arc::new(properties),
+        )?);
         Ok(())
     }
 
@@ -92,7 +85,7 @@ impl<W: Write + Send> ParquetLog<W> {
     fn write(&mut self) -> Result<(), ParquetError> {
         self.begin()?;
         let (stamped, origin) = (self.stamped(), self.origin);
-        let State::Begun(writer) = &mut self.state else {
+        let Some(writer) = &mut self.writer else {
             return Ok(());
         };
         let mut group = writer.next_row_group()?;
@@ -100,24 +93,16 @@ impl<W: Write + Send> ParquetLog<W> {
             let Some(mut column) = group.next_column()? else {
                 break;
             };
-            match stamped && index == 0 {
-                true => {
-                    let stamp = |t: &f64| i64::try_from(origin.later(*t).nanoseconds());
-                    let stamps: Result<Vec<i64>, _> = values.iter().map(stamp).collect();
-                    let stamps = stamps.map_err(|_| {
-                        ParquetError::General(
-                            "a time is beyond the range of time stamps".to_owned(),
-                        )
-                    })?;
-                    column
-                        .typed::<Int64Type>()
-                        .write_batch(&stamps, None, None)?;
-                }
-                false => {
-                    column
-                        .typed::<DoubleType>()
-                        .write_batch(values, None, None)?;
-                }
+            if stamped && index == 0 {
+                let stamp = |t: &f64| i64::try_from(origin.later(*t).nanoseconds());
+                let stamps: Result<Vec<i64>, _> = values.iter().map(stamp).collect();
+                let beyond = |_| "a time is beyond the range of time stamps".to_owned();
+                let stamps = stamps.map_err(beyond).map_err(ParquetError::General)?;
+                let column = column.typed::<Int64Type>();
+                column.write_batch(&stamps, None, None)?;
+            } else {
+                let column = column.typed::<DoubleType>();
+                column.write_batch(values, None, None)?;
             }
             column.close()?;
             values.clear();
@@ -126,38 +111,33 @@ impl<W: Write + Send> ParquetLog<W> {
         Ok(())
     }
 
-    /// Ends the file.
     pub(super) fn finish(mut self) -> io::Result<W> {
         if self.held.iter().any(|column| !column.is_empty()) {
-            self.write().map_err(plain)?;
+            self.write()?;
         }
-        self.begin().map_err(plain)?;
-        match self.state {
-            State::Begun(writer) => writer.into_inner().map_err(plain),
-            _ => Err(io::ErrorKind::WriteZero.into()),
+        self.begin()?;
+        match self.writer {
+            Some(writer) => Ok(writer.into_inner()?),
+            None => Err(io::ErrorKind::WriteZero.into()),
         }
     }
 }
 
 fn schema(columns: &[String], stamped: bool) -> Result<TypePtr, ParquetError> {
     let field = |(index, name): (usize, &String)| {
-        let of = |physical| {
-            Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED)
+        let (physical, logical) = match stamped && index == 0 {
+            true => {
+                let stamp = LogicalType::timestamp(true, TimeUnit::NANOS);
+                (Physical::INT64, Some(stamp))
+            }
+            false => (Physical::DOUBLE, None),
         };
-        let built = match stamped && index == 0 {
-            true => of(Physical::INT64)
-                .with_logical_type(Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
-            false => of(Physical::DOUBLE),
-        };
-        built.build().map(Arc::new)
+        let built = Type::primitive_type_builder(name, physical).with_logical_type(logical);
+        let built = built.with_repetition(Repetition::REQUIRED).build();
+        built.map(Arc::new)
     };
-    let fields: Result<Vec<TypePtr>, ParquetError> =
-        columns.iter().enumerate().map(field).collect();
-    let root = Type::group_type_builder("log").with_fields(fields?);
+    let fields = columns.iter().enumerate().map(field);
+    let fields = fields.collect::<Result<Vec<TypePtr>, ParquetError>>()?;
+    let root = Type::group_type_builder("log").with_fields(fields);
     root.build().map(Arc::new)
-}
-
-/// The error of the system, or that of the format.
-fn plain(error: ParquetError) -> io::Error {
-    io::Error::other(error.to_string())
 }

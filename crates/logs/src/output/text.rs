@@ -4,47 +4,31 @@ use std::io::{self, Write};
 
 use crate::log::Instant;
 
-/// Rows as text.
-#[derive(Debug)]
-pub(super) struct Text<W> {
-    out: W,
+/// Writes the notes and the header.
+pub(super) fn begin(out: &mut impl Write, columns: &[String], notes: &[String]) -> io::Result<()> {
+    for note in notes {
+        writeln!(out, "# {note}")?;
+    }
+    let names: Vec<String> = columns.iter().map(|name| quoted(name)).collect();
+    writeln!(out, "{}", names.join(","))
 }
 
-impl<W: Write> Text<W> {
-    /// Writes the notes and the header.
-    pub(super) fn new(mut out: W, columns: &[String], notes: &[String]) -> io::Result<Self> {
-        for note in notes {
-            writeln!(out, "# {note}")?;
+/// Writes a row, its time first; what is no number is left empty.
+pub(super) fn row(out: &mut impl Write, origin: Instant, row: &[f64]) -> io::Result<()> {
+    let far = origin != Instant::default();
+    for (index, value) in row.iter().enumerate() {
+        if index > 0 {
+            out.write_all(b",")?;
         }
-        let names: Vec<String> = columns.iter().map(|name| quoted(name)).collect();
-        writeln!(out, "{}", names.join(","))?;
-        Ok(Self { out })
-    }
-
-    /// Writes a row, its time first; what is no number is left empty.
-    pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> io::Result<()> {
-        let far = origin != Instant::default();
-        for (index, value) in row.iter().enumerate() {
-            if index > 0 {
-                self.out.write_all(b",")?;
-            }
-            if index == 0 && far && value.is_finite() {
-                // To the nanosecond: seconds since 1970 have no f64 for it.
-                write!(self.out, "{}", origin.later(*value))?;
-            } else if value.is_nan() {
-            } else if value.is_infinite() {
-                self.out
-                    .write_all(if *value > 0.0 { b"inf" } else { b"-inf" })?;
-            } else {
-                write!(self.out, "{value:?}")?;
-            }
+        match value {
+            // To the nanosecond: seconds since 1970 have no f64 for it.
+            t if index == 0 && far && t.is_finite() => write!(out, "{}", origin.later(*t))?,
+            x if x.is_nan() => {}
+            // `inf` and `-inf` among them
+            x => write!(out, "{x:?}")?,
         }
-        self.out.write_all(b"\n")
     }
-
-    pub(super) fn finish(self) -> io::Result<W> {
-        Ok(self.out)
-    }
+    out.write_all(b"\n")
 }
 
 /// A name as a CSV field.

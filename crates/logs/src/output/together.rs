@@ -33,13 +33,6 @@ struct Ready {
     named: PathBuf,
 }
 
-/// A file that has its name.
-struct Renamed {
-    path: PathBuf,
-    /// What had the name before, under another.
-    old: Option<SecondName>,
-}
-
 /// A second name of a file that is replaced, held for as long as this value lives.
 struct SecondName {
     name: PathBuf,
@@ -84,12 +77,10 @@ impl Together {
     /// # Errors
     /// What the system says.
     pub fn make_folder(&self, path: &Path) -> std::io::Result<()> {
-        let missing: Vec<PathBuf> = path
-            .ancestors()
-            .filter(|folder| !folder.as_os_str().is_empty())
-            .take_while(|folder| !folder.exists())
-            .map(Path::to_owned)
-            .collect();
+        let named = path.ancestors();
+        let named = named.filter(|folder| !folder.as_os_str().is_empty());
+        let missing = named.take_while(|folder| !folder.exists());
+        let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         unfinished().extend(missing.iter().cloned());
         // the deepest first, as they are removed
         self.lock().folders.splice(0..0, missing);
@@ -105,7 +96,8 @@ impl Together {
         let several = ready.len() > 1;
         // Under the lock: an interruption finds all of them finished or none.
         let mut unfinished = unfinished();
-        let mut renamed: Vec<Renamed> = Vec::with_capacity(ready.len());
+        // with what had their names before, under other ones
+        let mut renamed: Vec<(PathBuf, Option<SecondName>)> = Vec::with_capacity(ready.len());
         for Ready { file, path, named } in ready {
             let temporary = file.path().to_owned();
             unfinished.remove(&temporary);
@@ -115,14 +107,21 @@ impl Together {
             };
             if let Err(error) = file.persist(&path) {
                 // what stands under the other name is the same file
-                old.iter()
-                    .for_each(|old| drop(std::fs::remove_file(&old.name)));
-                renamed.into_iter().rev().for_each(Renamed::undo);
+                if let Some(old) = old {
+                    let _ = std::fs::remove_file(old.name);
+                }
+                for (path, old) in renamed.into_iter().rev() {
+                    // As far as the system lets us: it has just refused something.
+                    let _ = match old {
+                        Some(old) => std::fs::rename(old.name, path),
+                        None => std::fs::remove_file(path),
+                    };
+                }
                 return Err(OutputError::new(&named, error.error));
             }
-            renamed.push(Renamed { path, old });
+            renamed.push((path, old));
         }
-        for old in renamed.into_iter().filter_map(|file| file.old) {
+        for old in renamed.into_iter().filter_map(|(_, old)| old) {
             // one that is left is a file too many, and no half one
             let _ = std::fs::remove_file(old.name);
         }
@@ -134,21 +133,11 @@ impl Together {
     }
 }
 
-impl Renamed {
-    fn undo(self) {
-        // As far as the system lets us: it has just refused something.
-        let _ = match self.old {
-            Some(old) => std::fs::rename(old.name, self.path),
-            None => std::fs::remove_file(self.path),
-        };
-    }
-}
-
-/// A second name for the file at `path`, where there is one and the disk knows second names. It is held before it is
-/// named, so that no other run takes it for abandoned.
+/// A second name for the file at `path`, where there is one and the disk knows second names.
 fn kept(path: &Path, temporary: &Path) -> Option<SecondName> {
     let own = temporary.file_name()?.to_str()?.strip_suffix(SUFFIX)?;
     let name = temporary.with_file_name(format!("{own}_old{SUFFIX}"));
+    // held before it is named, so that no other run takes it for abandoned
     let held = File::open(path).ok();
     let _ = held.as_ref().map(File::try_lock);
     std::fs::hard_link(path, &name).ok()?;
@@ -230,16 +219,16 @@ mod tests {
     fn what_is_dropped_leaves_neither_files_nor_folders() {
         let folder = tempfile::tempdir().unwrap();
         let inside = folder.path().join("runs").join("monday");
-        let files = Together::default();
-        files.make_folder(&inside).unwrap();
-        files.write(&inside.join("a"), b"new").unwrap();
-        drop(files);
-        assert!(names(folder.path()).is_empty());
-        let files = Together::default();
-        files.make_folder(&inside).unwrap();
-        files.write(&inside.join("a"), b"new").unwrap();
-        files.commit().unwrap();
-        drop(files);
+        for commits in [false, true] {
+            let files = Together::default();
+            files.make_folder(&inside).unwrap();
+            files.write(&inside.join("a"), b"new").unwrap();
+            if commits {
+                files.commit().unwrap();
+            }
+            drop(files);
+            assert_eq!(names(folder.path()).is_empty(), !commits);
+        }
         assert_eq!(names(&inside), ["a"]);
     }
 }

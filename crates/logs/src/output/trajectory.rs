@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::io;
 
-use super::mcap::{cdr_names, single_message};
+use super::mcap::{cdr_names, doubles, plain, single_message};
 
 /// `trajectory_msgs/msg/JointTrajectory` with what it is made of, as ROS 2 defines them.
 const DEFINITION: &str = "\
@@ -48,7 +48,6 @@ pub struct JointTrajectory {
     pub points: Vec<[Vec<f64>; 3]>,
 }
 
-/// Numbers between brackets.
 fn list(values: &[f64]) -> String {
     let all: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
     format!("[{}]", all.join(", "))
@@ -62,8 +61,10 @@ impl JointTrajectory {
     }
 
     fn comments(&self) -> String {
-        let lines = self.notes.iter().map(|line| format!("# {line}\n"));
-        lines.collect()
+        self.notes
+            .iter()
+            .map(|line| format!("# {line}\n"))
+            .collect()
     }
 
     /// The message as YAML, as `ros2 topic pub` takes it.
@@ -102,14 +103,7 @@ impl JointTrajectory {
         body.extend((self.points.len() as u32).to_le_bytes());
         for (k, point) in self.points.iter().enumerate() {
             for values in point {
-                body.extend((values.len() as u32).to_le_bytes());
-                // alignment counts from after the first four bytes
-                while !values.is_empty() && !(body.len() - 4).is_multiple_of(8) {
-                    body.push(0);
-                }
-                for x in values {
-                    body.extend(x.to_le_bytes());
-                }
+                doubles(&mut body, values.iter().copied());
             }
             // no efforts
             body.extend(0u32.to_le_bytes());
@@ -118,7 +112,7 @@ impl JointTrajectory {
             body.extend((nanosec as u32).to_le_bytes());
         }
         let kind = "trajectory_msgs/msg/JointTrajectory";
-        single_message(TOPIC, kind, DEFINITION, &body, &self.notes)
+        single_message(TOPIC, kind, DEFINITION, &body, &self.notes).map_err(plain)
     }
 
     /// A program in URScript: a slow move to the first point, then a target for each sample.
@@ -130,10 +124,10 @@ impl JointTrajectory {
         }
         let step = format!("{:?}", 1.0 / self.rate_hz);
         for [q, ..] in &self.points {
+            let q = list(q);
             let _ = writeln!(
                 out,
-                "  servoj({}, t={step}, lookahead_time=0.03, gain=500)",
-                list(q)
+                "  servoj({q}, t={step}, lookahead_time=0.03, gain=500)"
             );
         }
         out.push_str("  stopj(1.0)\nend\n\ncft_ident_motion()\n");
@@ -168,10 +162,8 @@ mod tests {
     #[test]
     fn a_program_moves_slowly_to_the_first_point_and_ends_at_rest() {
         let text = two().urscript();
-        assert!(
-            text.contains("  movej([0.0, -1.0], a=0.5, v=0.3)\n"),
-            "{text}"
-        );
+        let first = "  movej([0.0, -1.0], a=0.5, v=0.3)\n";
+        assert!(text.contains(first), "{text}");
         assert_eq!(text.matches("servoj(").count(), 3);
         assert!(text.contains("t=0.008,"));
         assert!(text.contains("  stopj(1.0)\nend\n"));
@@ -179,12 +171,8 @@ mod tests {
 
     #[test]
     fn the_message_has_the_length_that_cdr_asks_for() {
-        let bytes = two().mcap().unwrap();
-        assert_eq!(
-            bytes,
-            two().mcap().unwrap(),
-            "the same motion gives the same bytes"
-        );
+        let [bytes, again] = [two(), two()].map(|motion| motion.mcap().unwrap());
+        assert_eq!(bytes, again, "the same motion gives the same bytes");
         assert_eq!(&bytes[..5], b"\x89MCAP");
     }
 }

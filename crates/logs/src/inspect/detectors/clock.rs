@@ -4,7 +4,7 @@ use super::histogram::Histogram;
 use crate::inspect::fault::Episodes;
 
 /// A step longer than this many median ones is a gap (as `motion::FilterSettings::gap_factor`).
-pub(in crate::inspect) const GAP: f64 = 2.5;
+pub(crate) const GAP: f64 = 2.5;
 /// A step within this share of the median is even.
 const EVEN_STEP_TOLERANCE: f64 = 0.10;
 /// Long steps that are kept until the median is known.
@@ -12,7 +12,7 @@ const MAX_LONG_STEPS: usize = 1 << 16;
 
 /// What a row's time is to the row before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::inspect) enum RowStep {
+pub(crate) enum RowStep {
     /// The next row of the same stretch.
     Next,
     /// The first row of a stretch: the first at all, after a gap, or after time ran back.
@@ -24,56 +24,52 @@ pub(in crate::inspect) enum RowStep {
 }
 
 impl RowStep {
-    pub(in crate::inspect) fn is_usable(self) -> bool {
+    pub(crate) fn is_usable(self) -> bool {
         !matches!(self, Self::Unusable | Self::Unread)
     }
 }
 
 /// The times of a log, seen one after the other.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct LogClock {
-    pub(in crate::inspect) rows: u64,
-    pub(in crate::inspect) first: Option<f64>,
+pub(crate) struct LogClock {
+    pub(crate) rows: u64,
+    pub(crate) first: Option<f64>,
     /// Time of the last row that had one [s].
-    pub(in crate::inspect) last: f64,
+    pub(crate) last: f64,
     steps: Histogram,
     /// Steps from, to [s] that may be gaps.
     long: Vec<[f64; 2]>,
     /// What is long for now.
     long_from: f64,
-    pub(in crate::inspect) repeated: Episodes,
-    pub(in crate::inspect) backward: Episodes,
-    pub(in crate::inspect) without_time: u64,
+    pub(crate) repeated: Episodes,
+    pub(crate) backward: Episodes,
+    pub(crate) without_time: u64,
 }
 
-/// What the clock was like.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::inspect) struct ClockFacts {
+pub(crate) struct ClockFacts {
     /// Median step [s]; 0 where there is none.
-    pub(in crate::inspect) dt: f64,
+    pub(crate) dt: f64,
     /// Half the range that the middle 90 % of the steps take, over the median.
-    pub(in crate::inspect) jitter: f64,
+    pub(crate) jitter: f64,
     /// Share of the steps that are off the median by more than a tenth, gaps aside.
-    pub(in crate::inspect) uneven: f64,
+    pub(crate) uneven: f64,
     /// From, to [s].
-    pub(in crate::inspect) gaps: Vec<[f64; 2]>,
-    pub(in crate::inspect) least: f64,
-    pub(in crate::inspect) largest: f64,
+    pub(crate) gaps: Vec<[f64; 2]>,
+    pub(crate) least: f64,
+    pub(crate) largest: f64,
 }
 
 impl LogClock {
     /// Takes the times of some rows, and says for each what it is to the row before.
-    pub(in crate::inspect) fn take(&mut self, times: &[f64], steps: &mut Vec<RowStep>) {
-        steps.clear();
-        if self.rows == 0 {
-            self.long_from = GAP * typical_step(times);
-        } else {
-            self.long_from = GAP * self.steps.quantile_not_zero(0.5);
-        }
-        for &t in times {
-            self.rows += 1;
-            steps.push(self.step(t));
-        }
+    pub(crate) fn take(&mut self, times: &[f64]) -> Vec<RowStep> {
+        self.long_from = GAP
+            * match self.rows {
+                0 => typical_step(times),
+                _ => self.steps.quantile_not_zero(0.5),
+            };
+        self.rows += times.len() as u64;
+        times.iter().map(|t| self.step(*t)).collect()
     }
 
     fn step(&mut self, t: f64) -> RowStep {
@@ -119,31 +115,27 @@ impl LogClock {
         }
     }
 
-    /// Median step of the rows so far [s].
-    pub(in crate::inspect) fn step_so_far(&self) -> f64 {
+    pub(crate) fn step_so_far(&self) -> f64 {
         self.steps.quantile(0.5)
     }
 
     /// Time from the first to the last row [s].
-    pub(in crate::inspect) fn duration(&self) -> f64 {
+    pub(crate) fn duration(&self) -> f64 {
         self.first.map_or(0.0, |first| self.last - first)
     }
 
-    /// What is known at the end.
-    pub(in crate::inspect) fn facts(&self) -> ClockFacts {
+    pub(crate) fn facts(&self) -> ClockFacts {
         let dt = self.steps.quantile(0.5);
         if dt <= 0.0 {
             return ClockFacts::default();
         }
         let gaps = self.long.iter().filter(|[a, b]| b - a > GAP * dt);
         let (low, high) = (self.steps.quantile(0.05), self.steps.quantile(0.95));
+        let even = |side: f64| (1.0 + side * EVEN_STEP_TOLERANCE) * dt;
         ClockFacts {
             dt,
             jitter: 0.5 * (high - low) / dt,
-            uneven: self.steps.share_outside(
-                (1.0 - EVEN_STEP_TOLERANCE) * dt,
-                (1.0 + EVEN_STEP_TOLERANCE) * dt,
-            ),
+            uneven: (self.steps).share_outside(even(-1.0), even(1.0)),
             gaps: gaps.copied().collect(),
             least: self.steps.quantile(0.0),
             largest: self.steps.quantile(1.0),
@@ -152,7 +144,7 @@ impl LogClock {
 }
 
 /// Median of the steps forward between some times [s]; 0 where there is none.
-pub(in crate::inspect) fn typical_step(times: &[f64]) -> f64 {
+pub(crate) fn typical_step(times: &[f64]) -> f64 {
     let pairs = times.windows(2).map(|pair| pair[1] - pair[0]);
     let mut steps: Vec<f64> = pairs.filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
@@ -164,23 +156,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gaps_repeats_and_steps_back_are_told_apart_and_placed() {
+    fn gaps_repeats_and_steps_back_are_set_apart_and_placed() {
         let mut clock = LogClock::default();
         let mut times: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.001).collect();
         times.drain(500..550);
         times[100] = times[99];
         times[200] = 0.15;
         times[300] = f64::NAN;
-        let mut steps = Vec::new();
-        clock.take(&times, &mut steps);
+        let steps = clock.take(&times);
         let facts = clock.facts();
         assert!((facts.dt - 0.001).abs() < 1e-6, "{facts:?}");
         assert_eq!((steps[0], steps[1]), (RowStep::Apart, RowStep::Next));
-        assert_eq!(
-            (steps[100], steps[300]),
-            (RowStep::Unusable, RowStep::Unusable)
-        );
-        assert_eq!((steps[200], steps[500]), (RowStep::Apart, RowStep::Apart));
+        assert_eq!([steps[100], steps[300]], [RowStep::Unusable; 2]);
+        assert_eq!([steps[200], steps[500]], [RowStep::Apart; 2]);
         assert_eq!(clock.repeated.rows(), 1);
         assert_eq!(clock.backward.rows(), 1);
         // from 0.15 back up to 0.201, and over the rows that are gone
@@ -194,16 +182,12 @@ mod tests {
         let times: Vec<f64> = (0..20_000)
             .map(|k| f64::from(k) * 0.01 + if k % 2 == 0 { 0.001 } else { -0.001 })
             .collect();
-        clock.take(&times, &mut Vec::new());
+        clock.take(&times);
         let facts = clock.facts();
-        assert!(
-            (facts.jitter - 0.2 / facts.dt * 0.01).abs() < 0.02,
-            "{facts:?}"
-        );
-        assert!(
-            facts.uneven > 0.9 || (facts.dt - 0.01).abs() > 0.001,
-            "{facts:?}"
-        );
+        let jitter = 0.2 / facts.dt * 0.01;
+        assert!((facts.jitter - jitter).abs() < 0.02, "{facts:?}");
+        let off = (facts.dt - 0.01).abs() > 0.001;
+        assert!(facts.uneven > 0.9 || off, "{facts:?}");
         assert!(facts.gaps.is_empty());
     }
 }

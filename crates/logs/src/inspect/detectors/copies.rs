@@ -5,10 +5,9 @@ const EQUAL_ROWS_SHARE: f64 = 0.999;
 /// Rows in which a channel changes before its equality means anything.
 const CHANGES: u64 = 50;
 
-/// Counts for every pair of channels the rows in which both changed, and those of them in which they were
-/// equal, or equal but for the sign.
+/// Counts for every pair of channels the rows in which one changed, and those of them in which they were equal.
 #[derive(Debug, Clone)]
-pub(in crate::inspect) struct Copies {
+pub(crate) struct Copies {
     channels: usize,
     pairs: Vec<PairCounts>,
     previous: Vec<f64>,
@@ -22,18 +21,17 @@ struct PairCounts {
     opposite: u64,
 }
 
-/// A pair of channels that hold the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::inspect) struct CopiedChannel {
-    pub(in crate::inspect) first: usize,
-    pub(in crate::inspect) second: usize,
+pub(crate) struct CopiedChannel {
+    pub(crate) first: usize,
+    pub(crate) second: usize,
     /// Equal but for the sign.
-    pub(in crate::inspect) opposite: bool,
-    pub(in crate::inspect) rows: u64,
+    pub(crate) opposite: bool,
+    pub(crate) rows: u64,
 }
 
 impl Copies {
-    pub(in crate::inspect) fn new(channels: usize) -> Self {
+    pub(crate) fn new(channels: usize) -> Self {
         Self {
             channels,
             pairs: vec![PairCounts::default(); channels * channels.saturating_sub(1) / 2],
@@ -42,9 +40,8 @@ impl Copies {
         }
     }
 
-    /// Takes row `k` of some columns.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, columns: &[&[f64]], k: usize) {
+    pub(crate) fn take(&mut self, columns: &[&[f64]], k: usize) {
         for (value, column) in self.row.iter_mut().zip(columns) {
             *value = column[k];
         }
@@ -63,8 +60,7 @@ impl Copies {
         self.previous.copy_from_slice(&self.row);
     }
 
-    /// Pairs that are copies.
-    pub(in crate::inspect) fn found(&self) -> Vec<CopiedChannel> {
+    pub(crate) fn found(&self) -> Vec<CopiedChannel> {
         let mut found = Vec::new();
         let mut pairs = self.pairs.iter();
         for first in 0..self.channels {
@@ -103,11 +99,8 @@ mod tests {
         for k in 0..1000 {
             copies.take(&columns, k);
         }
-        let found: Vec<_> = copies
-            .found()
-            .iter()
-            .map(|c| (c.first, c.second, c.opposite))
-            .collect();
+        let found = copies.found().into_iter();
+        let found: Vec<_> = found.map(|c| (c.first, c.second, c.opposite)).collect();
         assert_eq!(found, [(0, 1, true), (0, 2, false), (1, 2, true)]);
     }
 }

@@ -53,9 +53,8 @@ pub struct JointMotion {
     pub condition: Option<f64>,
 }
 
-/// Follows one position channel.
 #[derive(Debug, Clone)]
-pub(in crate::inspect) struct Excitation {
+pub(crate) struct Excitation {
     /// Rows between the three positions that a speed and an acceleration are formed from.
     spacing: usize,
     times: Vec<f64>,
@@ -72,18 +71,17 @@ pub(in crate::inspect) struct Excitation {
     /// Largest speed by the robot file, how many speeds in a row are beyond it, and when they were.
     limit: Option<f64>,
     fast: u32,
-    pub(in crate::inspect) too_fast: Episodes,
+    pub(crate) too_fast: Episodes,
     /// First and last time [s] of the rows of the highest accelerations, and their sizes.
     highest: Vec<[f64; 3]>,
 }
 
 impl Excitation {
     /// For rows `dt` apart [s] of a joint that may be so fast.
-    pub(in crate::inspect) fn new(dt: f64, limit: Option<f64>) -> Self {
-        let spacing = if dt > 0.0 {
-            ((SPACING_S / dt).round() as usize).clamp(1, MAX_SPAN_ROWS)
-        } else {
-            1
+    pub(crate) fn new(dt: f64, limit: Option<f64>) -> Self {
+        let spacing = match dt > 0.0 {
+            true => ((SPACING_S / dt).round() as usize).clamp(1, MAX_SPAN_ROWS),
+            false => 1,
         };
         Self {
             spacing,
@@ -103,9 +101,8 @@ impl Excitation {
         }
     }
 
-    /// Takes the next row.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
+    pub(crate) fn take(&mut self, t: f64, value: f64) {
         let length = self.times.len();
         let at = self.count % length;
         self.times[at] = t;
@@ -116,8 +113,7 @@ impl Excitation {
         }
     }
 
-    /// The next row belongs to another stretch.
-    pub(in crate::inspect) fn part(&mut self) {
+    pub(crate) fn part(&mut self) {
         self.count = 0;
         self.fast = 0;
         self.direction = 0.0;
@@ -166,9 +162,8 @@ impl Excitation {
         }
     }
 
-    /// The largest acceleration that no event at these times took part in; where all that are
-    /// remembered did, the smallest of them. 0 where there is none.
-    pub(in crate::inspect) fn highest_apart(&self, events: &[f64]) -> f64 {
+    /// The largest acceleration in which no event at these times took part, else the smallest of all; 0 without any.
+    pub(crate) fn highest_apart(&self, events: &[f64]) -> f64 {
         let inside = |[from, to, _]: &[f64; 3]| events.iter().any(|t| from <= t && t <= to);
         let apart = self.highest.iter().filter(|point| !inside(point));
         let all = || self.highest.iter().map(|point| point[2]);
@@ -176,17 +171,13 @@ impl Excitation {
         found.or_else(|| all().reduce(f64::min)).unwrap_or(0.0)
     }
 
-    /// Root mean square of the acceleration.
-    pub(in crate::inspect) fn acceleration_rms(&self) -> f64 {
-        self.rms(0)
-    }
-
-    fn rms(&self, column: usize) -> f64 {
+    /// Root mean square of the acceleration, or of column 1, the speed.
+    pub(crate) fn rms(&self, column: usize) -> f64 {
         (self.gram[column][column] / self.points.max(1) as f64).sqrt()
     }
 
     /// What is known at the end; `travel` of the channel, `moves` as judged among all joints.
-    pub(in crate::inspect) fn facts(
+    pub(crate) fn facts(
         &self,
         joint: &str,
         channel: &str,
@@ -194,9 +185,8 @@ impl Excitation {
         moves: bool,
     ) -> JointMotion {
         let speed_max = self.speeds.quantile(1.0);
-        let moving = self
-            .speeds
-            .share_outside(0.0, MOVING_SPEED_SHARE * speed_max);
+        let slow = MOVING_SPEED_SHARE * speed_max;
+        let moving = self.speeds.share_outside(0.0, slow);
         JointMotion {
             joint: joint.to_owned(),
             channel: channel.to_owned(),
@@ -241,15 +231,10 @@ mod tests {
     fn speed_acceleration_and_reversals_of_a_sine_are_its_own() {
         let w = 4.0f64;
         let found = fed(|t| 0.5 * (w * t).sin());
-        assert!(
-            (found.speed_max / (0.5 * w) - 1.0).abs() < 0.03,
-            "{found:?}"
-        );
-        assert!(
-            (found.acceleration_max / (0.5 * w * w) - 1.0).abs() < 0.03,
-            "{found:?}"
-        );
-        assert!((found.speed_rms * 2f64.sqrt() / (0.5 * w) - 1.0).abs() < 0.02);
+        let off = |x: f64, y: f64| (x / y - 1.0).abs();
+        assert!(off(found.speed_max, 0.5 * w) < 0.03, "{found:?}");
+        assert!(off(found.acceleration_max, 0.5 * w * w) < 0.03, "{found:?}");
+        assert!(off(found.speed_rms * 2f64.sqrt(), 0.5 * w) < 0.02);
         assert_eq!(found.reversals, 25);
         assert!(found.moving_share > 0.97);
     }
@@ -275,9 +260,7 @@ mod tests {
     fn constant_speed_parts_less_than_speeds_that_vary() {
         let one = fed(|t| 0.1 * (t % 4.0 - 2.0).abs());
         let many = fed(|t| 0.1 * t.sin() + 0.03 * (3.1 * t).sin() + 0.01 * (7.3 * t).cos());
-        assert!(
-            one.condition.unwrap() > 3.0 * many.condition.unwrap(),
-            "{one:?} {many:?}"
-        );
+        let [less, more] = [&one, &many].map(|motion| motion.condition.unwrap());
+        assert!(less > 3.0 * more, "{one:?} {many:?}");
     }
 }

@@ -3,25 +3,24 @@
 
 /// A position that goes to such a number was no further from it than so many of its steps before, or of its smallest ones.
 const USUAL_STEPS: f64 = 10.0;
-/// Rows that are remembered.
 const MAX_ROWS: usize = 65_536;
 
-/// Looks for failed reads, row by row.
 #[derive(Debug, Clone)]
-pub(in crate::inspect) struct FailedReads {
+pub(crate) struct FailedReads {
     /// Positions of the last row that was read, and how far they went to it.
     before: Vec<f64>,
     steps: Vec<f64>,
     /// Smallest step of each that is not 0.
     grains: Vec<f64>,
     failing: bool,
-    times: Vec<f64>,
-    /// What the first of them reads.
-    value: f64,
+    /// Times of the rows that failed, in order [s].
+    pub(crate) times: Vec<f64>,
+    /// What the first of them reads, as it was logged.
+    pub(crate) value: f64,
 }
 
 impl FailedReads {
-    pub(in crate::inspect) fn new(positions: usize) -> Self {
+    pub(crate) fn new(positions: usize) -> Self {
         Self {
             before: vec![f64::NAN; positions],
             steps: vec![0.0; positions],
@@ -33,7 +32,7 @@ impl FailedReads {
     }
 
     /// Whether the next row is none that was read; positions and others as they were logged.
-    pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) -> bool {
+    pub(crate) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) -> bool {
         let one = positions.first().copied().unwrap_or(f64::NAN);
         let empty = !others.is_empty() && positions.iter().chain(others).all(|x| *x == one);
         if empty && (self.failing || self.far(one)) {
@@ -61,20 +60,8 @@ impl FailedReads {
 
     /// Whether a position cannot go to a number from where it was.
     fn far(&self, to: f64) -> bool {
-        let pairs = self.before.iter().zip(&self.steps).zip(&self.grains);
-        let mut far =
-            pairs.map(|((q, step), grain)| (q - to).abs() > USUAL_STEPS * step.max(*grain));
-        far.any(|far| far)
-    }
-
-    /// What the first of them reads, as it was logged.
-    pub(in crate::inspect) fn value(&self) -> f64 {
-        self.value
-    }
-
-    /// Times of the rows that failed, in order \[s\].
-    pub(in crate::inspect) fn times(&self) -> &[f64] {
-        &self.times
+        let mut pairs = self.before.iter().zip(&self.steps).zip(&self.grains);
+        pairs.any(|((q, step), grain)| (q - to).abs() > USUAL_STEPS * step.max(*grain))
     }
 }
 
@@ -87,27 +74,18 @@ mod tests {
         for (k, row) in rows.enumerate() {
             reads.take(k as f64, &row[..2], &row[2..]);
         }
-        reads.times().to_vec()
+        reads.times
     }
 
     #[test]
     fn rows_of_one_number_between_others_are_reads_that_failed_whatever_it_is() {
-        for sentinel in [-1.0, 32767.0] {
+        for (sentinel, torque) in [(-1.0, 2.0), (32767.0, 2.0), (0.0, 0.0)] {
             let row = |k: usize| match k {
                 7 | 20 | 21 | 39 => [sentinel; 3],
-                k => [0.5 + 0.01 * k as f64, (0.1 * k as f64).sin(), 2.0],
+                k => [0.5 + 0.01 * k as f64, (0.1 * k as f64).sin(), torque],
             };
             assert_eq!(failed((0..40).map(row)), [7.0, 20.0, 21.0, 39.0]);
         }
-    }
-
-    #[test]
-    fn rows_of_zeros_between_others_are_reads_that_failed() {
-        let row = |k: usize| match k {
-            7 | 20 | 21 | 39 => [0.0; 3],
-            k => [0.5 + 0.01 * k as f64, (0.1 * k as f64).sin(), 0.0],
-        };
-        assert_eq!(failed((0..40).map(row)), [7.0, 20.0, 21.0, 39.0]);
     }
 
     #[test]

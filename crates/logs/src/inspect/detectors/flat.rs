@@ -16,39 +16,39 @@ const LEVELS: usize = 8;
 
 /// Rows in which a channel kept one value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::inspect) struct FlatRun {
-    pub(in crate::inspect) value: f64,
-    pub(in crate::inspect) from: f64,
-    pub(in crate::inspect) to: f64,
-    pub(in crate::inspect) rows: u64,
+pub(crate) struct FlatRun {
+    pub(crate) value: f64,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    pub(crate) rows: u64,
     /// Change from the row before, and to the row after it; NaN where there is none.
-    pub(in crate::inspect) entry: f64,
-    pub(in crate::inspect) exit: f64,
+    pub(crate) entry: f64,
+    pub(crate) exit: f64,
     /// How far the joint's position went meanwhile.
-    pub(in crate::inspect) travel: f64,
+    pub(crate) travel: f64,
 }
 
 impl FlatRun {
     /// Whether it is the same run: edges may be no numbers.
-    pub(in crate::inspect) fn is(&self, other: &Self) -> bool {
+    pub(crate) fn is(&self, other: &Self) -> bool {
         (self.from, self.to) == (other.from, other.to)
     }
 }
 
-/// The runs of one channel.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct Flat {
+pub(crate) struct Flat {
     current: Option<Current>,
-    runs: Vec<FlatRun>,
+    /// The runs of three rows and more, in the order of time.
+    pub(crate) runs: Vec<FlatRun>,
     /// Rows of the shortest run that is kept, once there are too many.
     shortest: u64,
     /// Lengths of all runs, runs of one row too.
-    pub(in crate::inspect) lengths: Histogram,
+    pub(crate) lengths: Histogram,
     /// Sizes of the steps from row to row, and of their changes, where the channel moves.
-    pub(in crate::inspect) steps: Histogram,
-    pub(in crate::inspect) bends: Histogram,
-    pub(in crate::inspect) top: Levels,
-    pub(in crate::inspect) bottom: Levels,
+    pub(crate) steps: Histogram,
+    pub(crate) bends: Histogram,
+    pub(crate) top: Levels,
+    pub(crate) bottom: Levels,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -63,12 +63,11 @@ struct Current {
 impl Flat {
     /// Takes the next row: `position` is the joint's, where it is known and not this channel.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64, position: f64) {
+    pub(crate) fn take(&mut self, t: f64, value: f64, position: f64) {
         self.top.take(value);
         self.bottom.take(-value);
         let Some(current) = &mut self.current else {
-            self.begin(t, value, position, f64::NAN, f64::NAN);
-            return;
+            return self.begin(t, value, position, f64::NAN);
         };
         let step = value - current.run.value;
         if step == 0.0 {
@@ -86,23 +85,22 @@ impl Flat {
             self.bends.add(bend);
         }
         self.end(step);
-        self.begin(t, value, position, step, step);
+        self.begin(t, value, position, step);
     }
 
-    /// The next row belongs to another stretch.
-    pub(in crate::inspect) fn part(&mut self) {
+    pub(crate) fn part(&mut self) {
         self.end(f64::NAN);
         self.current = None;
     }
 
-    fn begin(&mut self, t: f64, value: f64, position: f64, entry: f64, step: f64) {
+    fn begin(&mut self, t: f64, value: f64, position: f64, step: f64) {
         self.current = Some(Current {
             run: FlatRun {
                 value,
                 from: t,
                 to: t,
                 rows: 1,
-                entry,
+                entry: step,
                 exit: f64::NAN,
                 travel: 0.0,
             },
@@ -131,16 +129,11 @@ impl Flat {
         }
         self.runs.push(run);
     }
-
-    /// The runs of three rows and more, in the order of time.
-    pub(in crate::inspect) fn runs(&self) -> &[FlatRun] {
-        &self.runs
-    }
 }
 
 /// The largest values of a channel, and how often each was there.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct Levels {
+pub(crate) struct Levels {
     /// Falling values.
     list: Vec<(f64, u64)>,
 }
@@ -149,10 +142,9 @@ impl Levels {
     #[inline]
     fn take(&mut self, value: f64) {
         let full = self.list.len() == LEVELS;
-        if full && self.list.last().is_some_and(|(least, _)| value < *least) {
-            return;
+        if !full || self.list.last().is_none_or(|(least, _)| value >= *least) {
+            self.insert(value);
         }
-        self.insert(value);
     }
 
     fn insert(&mut self, value: f64) {
@@ -169,13 +161,12 @@ impl Levels {
     }
 
     /// The largest value; NaN where there is none.
-    pub(in crate::inspect) fn extreme(&self) -> f64 {
+    pub(crate) fn extreme(&self) -> f64 {
         self.list.first().map_or(f64::NAN, |(value, _)| *value)
     }
 
-    /// Whether the largest value is there so much more often than those next to it that it must be
-    /// where something ends.
-    pub(in crate::inspect) fn piles_up(&self) -> bool {
+    /// Whether the largest value is there so much more often than those next to it that something ends there.
+    pub(crate) fn piles_up(&self) -> bool {
         let Some(((_, count), others)) = self.list.split_first() else {
             return false;
         };
@@ -202,8 +193,8 @@ mod tests {
     fn a_run_knows_its_rows_its_edges_and_how_far_the_joint_went() {
         let values = (0..100).map(|k| f64::from(k.clamp(20, 50)));
         let flat = fed(values);
-        assert_eq!(flat.runs().len(), 2);
-        let [first, second] = [flat.runs()[0], flat.runs()[1]];
+        assert_eq!(flat.runs.len(), 2);
+        let [first, second] = [flat.runs[0], flat.runs[1]];
         assert_eq!((first.rows, first.from, first.exit), (21, 0.0, 1.0));
         assert!(first.entry.is_nan());
         assert_eq!((second.value, second.rows, second.entry), (50.0, 50, 1.0));
@@ -226,11 +217,8 @@ mod tests {
     fn the_longest_runs_are_kept_where_there_are_too_many() {
         let values = (0..60_000).map(|k| f64::from(k / if k < 30_000 { 3 } else { 6 }));
         let flat = fed(values);
-        assert!(flat.runs().len() <= MAX_RUNS);
-        assert!(
-            flat.runs().iter().all(|run| run.rows == 6),
-            "{:?}",
-            flat.shortest
-        );
+        assert!(flat.runs.len() <= MAX_RUNS);
+        let all = flat.runs.iter().all(|run| run.rows == 6);
+        assert!(all, "{:?}", flat.shortest);
     }
 }

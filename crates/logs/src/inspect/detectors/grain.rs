@@ -12,12 +12,9 @@ const ORDER: usize = 8;
 const WHITE_NOISE_GAIN: f64 = 113.446;
 
 /// The step of a channel's numbers, where they have one: all differences from row to row are multiples of it.
-pub(in crate::inspect) fn step<'w>(
-    windows: impl Iterator<Item = &'w Window> + Clone,
-    channel: usize,
-) -> Option<f64> {
+pub(crate) fn step(windows: &[Window], channel: usize) -> Option<f64> {
     let differences = || {
-        windows.clone().flat_map(move |window| {
+        windows.iter().flat_map(move |window| {
             let column = &window.columns[channel];
             column.windows(2).map(|pair| {
                 let size = pair[0].abs().max(pair[1].abs());
@@ -27,14 +24,12 @@ pub(in crate::inspect) fn step<'w>(
     };
     // Differences of equal counts that were scaled leave rounding behind.
     let rounding = |size: f64| 1e-12 * size.max(f64::MIN_POSITIVE);
-    let least = differences()
-        .filter(|(step, size)| *step > rounding(*size))
-        .map(|(step, _)| step)
-        .fold(f64::INFINITY, f64::min);
+    let steps = differences().filter(|(step, size)| *step > rounding(*size));
+    let least = steps.map(|(step, _)| step).fold(f64::INFINITY, f64::min);
     if !least.is_finite() {
         return None;
     }
-    let values = windows.clone().flat_map(|window| &window.columns[channel]);
+    let values = windows.iter().flat_map(|window| &window.columns[channel]);
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
         (low.min(*x), high.max(*x))
     });
@@ -58,12 +53,8 @@ pub(in crate::inspect) fn step<'w>(
     (enough && high - low > 2.5 * least).then(|| sum / grains)
 }
 
-/// Deviation of the noise that a moving channel carries, by its differences of order eight; `None`
-/// where it does not move long enough to say.
-pub(in crate::inspect) fn noise<'w>(
-    windows: impl Iterator<Item = &'w Window>,
-    channel: usize,
-) -> Option<f64> {
+/// Deviation of the noise of a moving channel, by its differences of order eight; `None` where it moves too little.
+pub(crate) fn noise(windows: &[Window], channel: usize) -> Option<f64> {
     let mut sizes = Vec::new();
     for window in windows {
         for rows in window.columns[channel].windows(ORDER + 1) {
@@ -106,13 +97,13 @@ mod tests {
         let sine = |k: i32| (f64::from(k) * 0.003).sin();
         for grain in [8.8e-6, 1e-3, 0.25] {
             let coarse = window((0..4000).map(|k| (sine(k) / grain).round() * grain + 0.1));
-            let found = step(coarse.iter(), 0).unwrap();
+            let found = step(&coarse, 0).unwrap();
             assert!((found / grain - 1.0).abs() < 1e-6, "{found} for {grain}");
         }
         let smooth = window((0..4000).map(sine));
-        assert_eq!(step(smooth.iter(), 0), None);
+        assert_eq!(step(&smooth, 0), None);
         let flag = window((0..4000).map(|k| f64::from(k / 100 % 2)));
-        assert_eq!(step(flag.iter(), 0), None);
+        assert_eq!(step(&flag, 0), None);
     }
 
     #[test]
@@ -121,11 +112,11 @@ mod tests {
         let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut random = move || chance.random::<f64>() - 0.5;
         let noisy = window((0..4000u32).map(|k| (f64::from(k) * 0.003).sin() + 1e-3 * random()));
-        let found = noise(noisy.iter(), 0).unwrap();
+        let found = noise(&noisy, 0).unwrap();
         assert!((found / (1e-3 / 12f64.sqrt()) - 1.0).abs() < 0.1, "{found}");
         let smooth = window((0..4000u32).map(|k| (f64::from(k) * 0.003).sin()));
-        assert!(noise(smooth.iter(), 0).unwrap() < 1e-14);
+        assert!(noise(&smooth, 0).unwrap() < 1e-14);
         let rest = window((0..4000u32).map(|_| 1.0));
-        assert_eq!(noise(rest.iter(), 0), None);
+        assert_eq!(noise(&rest, 0), None);
     }
 }

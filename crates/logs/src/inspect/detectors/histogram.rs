@@ -1,6 +1,5 @@
 //! Quantiles of magnitudes in one pass and fixed memory.
 
-/// Bins per octave.
 const PER_OCTAVE: usize = 32;
 /// Magnitudes below 2^LOWEST count as 0.
 const LOWEST: i32 = -70;
@@ -8,21 +7,21 @@ const OCTAVES: usize = 120;
 /// Mantissa bits that number the bins of an octave.
 const SHIFT: u32 = 52 - PER_OCTAVE.trailing_zeros();
 
-/// Counts of magnitudes in bins that are 1/32 of an octave wide, so that a quantile is right to
-/// about 1 %.
+/// Counts of magnitudes in bins of 1/32 of an octave, so that a quantile is right to about 1 %.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct Histogram {
+pub(crate) struct Histogram {
     // Taken when the first number comes: most channels of a wide log have none.
     counts: Vec<u64>,
     sums: Vec<f64>,
     zeros: u64,
-    total: u64,
+    /// How many were counted.
+    pub(crate) total: u64,
 }
 
 impl Histogram {
     /// Counts the magnitude of a finite number.
     #[inline]
-    pub(in crate::inspect) fn add(&mut self, value: f64) {
+    pub(crate) fn add(&mut self, value: f64) {
         let magnitude = value.abs();
         self.total += 1;
         let lowest = ((1023 + LOWEST) as u64) << 52;
@@ -39,23 +38,18 @@ impl Histogram {
         self.sums[bin] += magnitude;
     }
 
-    /// How many were counted.
-    pub(in crate::inspect) fn total(&self) -> u64 {
-        self.total
-    }
-
     /// The magnitude that `share` (0..=1) of those counted do not exceed; 0 where there are none.
-    pub(in crate::inspect) fn quantile(&self, share: f64) -> f64 {
+    pub(crate) fn quantile(&self, share: f64) -> f64 {
         self.at(self.zeros, self.total, share)
     }
 
     /// The same among those that are not 0.
-    pub(in crate::inspect) fn quantile_not_zero(&self, share: f64) -> f64 {
+    pub(crate) fn quantile_not_zero(&self, share: f64) -> f64 {
         self.at(0, self.total - self.zeros, share)
     }
 
     /// Share of those counted that lie below `low` or above `high`, to the width of a bin.
-    pub(in crate::inspect) fn share_outside(&self, low: f64, high: f64) -> f64 {
+    pub(crate) fn share_outside(&self, low: f64, high: f64) -> f64 {
         if self.total == 0 {
             return 0.0;
         }
@@ -98,10 +92,8 @@ mod tests {
         }
         for share in [0.05, 0.5, 0.99] {
             let found = histogram.quantile(share);
-            assert!(
-                (found / (share * 1e-3) - 1.0).abs() < 0.02,
-                "{share}: {found}"
-            );
+            let off = found / (share * 1e-3) - 1.0;
+            assert!(off.abs() < 0.02, "{share}: {found}");
         }
     }
 

@@ -9,6 +9,7 @@ pub(super) mod grain;
 pub(super) mod histogram;
 pub(super) mod repeats;
 pub(super) mod replays;
+mod ring;
 pub(super) mod spike;
 pub(super) mod step;
 pub(super) mod turn;

@@ -22,13 +22,8 @@ const ABRUPT_BENDS: f64 = 6.0;
 /// Rows that repeat the positions of the row before them.
 #[derive(Debug, Clone)]
 struct RepeatRun {
-    /// Times of the first row that shows these positions, and of the last.
-    first: f64,
-    last: f64,
-    /// Times of the second row and of the last but one: what is left of the run without its first,
-    /// or without its last row.
-    second: f64,
-    before_last: f64,
+    /// Times of its first row, which shows these positions first, its second, its last but one and its last.
+    times: [f64; 4],
     rows: u32,
     /// Steps of each joint into the run and out of it.
     steps: Vec<[f32; 2]>,
@@ -38,7 +33,7 @@ struct RepeatRun {
 
 /// Watches the positions of all joints together.
 #[derive(Debug, Clone)]
-pub(in crate::inspect) struct Repeats {
+pub(crate) struct Repeats {
     joints: usize,
     previous: Vec<f64>,
     entry: Vec<f64>,
@@ -61,7 +56,7 @@ pub(in crate::inspect) struct Repeats {
 
 impl Repeats {
     /// For so many positions, and torques and velocities.
-    pub(in crate::inspect) fn new(joints: usize, others: usize) -> Self {
+    pub(crate) fn new(joints: usize, others: usize) -> Self {
         Self {
             joints,
             previous: vec![f64::NAN; joints],
@@ -81,10 +76,11 @@ impl Repeats {
 
     /// Takes the positions of the next row, and its torques and velocities.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
+    pub(crate) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
         let same = others == self.others;
         self.seen += 1;
         self.same += u64::from(same);
+        self.others.copy_from_slice(others);
         if self.rows > 0 && positions == self.previous {
             self.rows += 1;
             if self.rows == 2 {
@@ -93,28 +89,23 @@ impl Repeats {
             self.times[2] = self.times[3];
             self.times[3] = t;
             self.identical &= same;
-            self.others.copy_from_slice(others);
             return;
         }
         self.changed += 1;
         self.coincidences += u64::from(same);
-        self.others.copy_from_slice(others);
         if self.rows > 1 {
             self.end(positions);
         }
         self.identical = true;
-        for ((entry, previous), position) in
-            self.entry.iter_mut().zip(&mut self.previous).zip(positions)
-        {
-            *entry = *position - *previous;
-            *previous = *position;
+        for (joint, position) in positions.iter().enumerate() {
+            self.entry[joint] = position - self.previous[joint];
         }
+        self.previous.copy_from_slice(positions);
         self.times = [t, t, t, t];
         self.rows = 1;
     }
 
-    /// The next row belongs to another stretch.
-    pub(in crate::inspect) fn part(&mut self) {
+    pub(crate) fn part(&mut self) {
         if self.rows > MAX_RUN_ROWS {
             self.end(&vec![f64::NAN; self.joints]);
         }
@@ -133,23 +124,12 @@ impl Repeats {
         if full {
             return;
         }
-        let out = next
-            .iter()
-            .zip(&self.previous)
-            .map(|(next, last)| next - last);
-        let [first, second, before_last, last] = self.times;
+        let ends = next.iter().zip(&self.previous).zip(&self.entry);
+        let steps = ends.map(|((next, last), entry)| [*entry as f32, (next - last) as f32]);
         let run = RepeatRun {
-            first,
-            last,
-            second,
-            before_last,
+            times: self.times,
             rows: self.rows as u32 - 1,
-            steps: self
-                .entry
-                .iter()
-                .zip(out)
-                .map(|(entry, exit)| [*entry as f32, exit as f32])
-                .collect(),
+            steps: steps.collect(),
             identical: self.identical,
         };
         match long {
@@ -159,11 +139,10 @@ impl Repeats {
     }
 
     /// Stretches in which all channels froze while the robot moved; `channels` are the joints' own.
-    ///
-    /// Positions that stand still are a rest. They are frozen where torques and velocities, too, keep
-    /// their last digit, which they do not elsewhere, and the joints moved right before or after; or
-    /// where a joint stops or starts at once.
-    pub(in crate::inspect) fn stalls(&self, channels: &[&Flat]) -> Episodes {
+    pub(crate) fn stalls(&self, channels: &[&Flat]) -> Episodes {
+        // Positions that stand still are a rest. They are frozen where torques and velocities, too, keep their last
+        // digit, which they do not elsewhere, and the joints moved right before or after; or where a joint stops or
+        // starts at once.
         let rows = |run: &RepeatRun| u64::from(run.rows);
         let held: u64 = self.frozen.iter().map(rows).sum();
         let elsewhere = self.seen.saturating_sub(held);
@@ -180,20 +159,20 @@ impl Repeats {
         };
         let mut episodes = Episodes::default();
         for run in self.frozen.iter().filter(frozen) {
-            episodes.add(run.first, run.last, rows(run) + 1, 0.0);
+            let [first, .., last] = run.times;
+            episodes.add(first, last, rows(run) + 1, 0.0);
         }
         episodes
     }
 
     /// Rows that repeat everything, those of long stretches aside.
-    pub(in crate::inspect) fn repeated(&self) -> u64 {
+    pub(crate) fn repeated(&self) -> u64 {
         let runs = self.runs.iter().filter(|run| run.identical);
         runs.map(|run| u64::from(run.rows)).sum()
     }
 
-    /// Rows for which each sample was held, and the share of the rows that repeat: where at least
-    /// every other row of those that change is one that was held.
-    pub(in crate::inspect) fn hold(&self, repeated: u64) -> Option<usize> {
+    /// Rows for which each sample was held: where at least every other row of those that change is one that was held.
+    pub(crate) fn hold(&self, repeated: u64) -> Option<usize> {
         let held = self.repeated();
         let holds = repeated >= MIN_HELD_ROWS && 2 * held >= self.changed;
         let rows = 1.0 + held as f64 / self.changed.max(1) as f64;
@@ -201,12 +180,10 @@ impl Repeats {
     }
 
     /// What was found; `channels` are the joints' own, in the same order.
-    pub(in crate::inspect) fn judge(&self, channels: &[&Flat]) -> RepeatedRows {
+    pub(crate) fn judge(&self, channels: &[&Flat]) -> RepeatedRows {
         debug_assert_eq!(channels.len(), self.joints);
-        let least: Vec<f64> = channels
-            .iter()
-            .map(|flat| flat.steps.quantile_not_zero(0.05))
-            .collect();
+        let steps = channels.iter().map(|flat| &flat.steps);
+        let least: Vec<f64> = steps.map(|steps| steps.quantile_not_zero(0.05)).collect();
         // Whether the robot goes on in the same direction, in steps of so many usual least ones.
         let goes_on = |run: &RepeatRun, factor: f64| {
             run.steps.iter().zip(&least).any(|(&[entry, exit], least)| {
@@ -237,36 +214,32 @@ impl Repeats {
             ..RepeatedRows::default()
         };
         for run in self.runs.iter().filter(in_motion) {
-            stale
-                .episodes
-                .add(run.first, run.last, u64::from(run.rows), 0.0);
+            let [first, second, before_last, last] = run.times;
+            let episodes = &mut stale.episodes;
+            episodes.add(first, last, u64::from(run.rows), 0.0);
             // The leap is on the side where a sample is missing: what lies next to it is in time.
             let size = |side: usize| -> f64 {
-                let shares = run.steps.iter().zip(&least);
-                shares
-                    .map(|(steps, least)| f64::from(steps[side].abs()) / least)
-                    .sum()
+                let steps = run.steps.iter().zip(&least);
+                let shares = steps.map(|(steps, least)| f64::from(steps[side].abs()) / least);
+                shares.sum()
             };
-            let cut = if size(0) > size(1) {
-                [run.first, run.before_last]
-            } else {
-                [run.second, run.last]
-            };
-            stale.cuts.push(cut);
+            stale.cuts.push(match size(0) > size(1) {
+                true => [first, before_last],
+                false => [second, last],
+            });
         }
         stale
     }
 }
 
-/// Repeated rows of a log.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct RepeatedRows {
+pub(crate) struct RepeatedRows {
     /// All of them, and those at whose place the robot certainly moves.
-    pub(in crate::inspect) rows: u64,
-    pub(in crate::inspect) moving: u64,
-    pub(in crate::inspect) episodes: Episodes,
+    pub(crate) rows: u64,
+    pub(crate) moving: u64,
+    pub(crate) episodes: Episodes,
     /// Rows to be left out: from, to [s].
-    pub(in crate::inspect) cuts: Vec<[f64; 2]>,
+    pub(crate) cuts: Vec<[f64; 2]>,
 }
 
 #[cfg(test)]
@@ -314,16 +287,13 @@ mod tests {
 
     #[test]
     fn at_slow_speed_only_what_repeats_in_all_channels_is_a_repetition() {
-        let q: Vec<f64> = (0..5000)
-            .map(|k| (f64::from(k) * 0.3).floor() * 1e-4)
-            .collect();
-        let repeated: Vec<usize> = (1..5000)
-            .filter(|k| k % 500 == 2 && q[*k] == q[k - 1])
-            .collect();
+        let slow = |k: i32| (f64::from(k) * 0.3).floor() * 1e-4;
+        let q: Vec<f64> = (0..5000).map(slow).collect();
+        let again = |k: &usize| k % 500 == 2 && q[*k] == q[k - 1];
+        let repeated: Vec<usize> = (1..5000).filter(again).collect();
         let stale = judged(&q, Some(&repeated));
-        let pairs = repeated
-            .iter()
-            .filter(|k| q[**k + 1] != q[**k] && q[**k - 2] != q[**k - 1]);
+        let alone = |k: &&usize| q[**k + 1] != q[**k] && q[**k - 2] != q[**k - 1];
+        let pairs = repeated.iter().filter(alone);
         assert_eq!(stale.rows as usize, pairs.count());
     }
 }

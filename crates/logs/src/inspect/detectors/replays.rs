@@ -25,7 +25,7 @@ struct Replay {
 
 /// Watches the rows of all joints together.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct Replays {
+pub(crate) struct Replays {
     /// Number of the row that first had these numbers behind those of the row before.
     seen: HashMap<u64, u64>,
     /// A row is remembered where these bits of its sum are 0.
@@ -47,7 +47,7 @@ fn sum(numbers: &[f64], begin: u64) -> u64 {
 impl Replays {
     /// Takes the positions of the next row, and its torques and velocities.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
+    pub(crate) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
         self.rows += 1;
         if others.is_empty() {
             return;
@@ -96,14 +96,13 @@ impl Replays {
         }
     }
 
-    /// The stretch that is followed is at its end.
-    pub(in crate::inspect) fn part(&mut self) {
+    pub(crate) fn part(&mut self) {
         let long = |run: &Replay| run.hits >= MIN_HITS && run.last.0 - run.first.0 >= MIN_ROWS;
         self.found.extend(self.run.take().filter(long));
     }
 
     /// Stretches that stand in the log before them, those that have ended.
-    pub(in crate::inspect) fn found(&self) -> Episodes {
+    pub(crate) fn found(&self) -> Episodes {
         let mut episodes = Episodes::default();
         for run in &self.found {
             let rows = run.last.0 - run.first.0 + 1;
@@ -125,15 +124,12 @@ mod tests {
             let x = row as f64;
             // a coarse position, and a torque with noise
             let torque = (row.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
-            replays.take(
-                k as f64,
-                &[(0.3 * x).sin().mul_add(1e3, 0.5).floor()],
-                &[torque],
-            );
+            let position = (0.3 * x).sin().mul_add(1e3, 0.5).floor();
+            replays.take(k as f64, &[position], &[torque]);
         }
         replays.part();
-        let found = replays.found();
-        found.iter().map(|e| (e.from, e.to, e.rows)).collect()
+        let found = replays.found().list.into_iter();
+        found.map(|e| (e.from, e.to, e.rows)).collect()
     }
 
     #[test]
@@ -149,10 +145,8 @@ mod tests {
         let again = found(rows + 30_000, |k| if k < rows { k } else { k - rows + 700 });
         assert_eq!(again.len(), 1);
         let (from, to, _) = again[0];
-        assert!(
-            (from - rows as f64) < 1000.0 && to > (rows + 29_000) as f64,
-            "{again:?}"
-        );
+        let late = from - rows as f64;
+        assert!(late < 1000.0 && to > (rows + 29_000) as f64, "{again:?}");
     }
 
     #[test]

@@ -10,16 +10,14 @@
 //! an inertia explains it.
 
 use super::histogram::Histogram;
+use super::ring::Ring;
 
-/// Rows of the median.
 const MEDIAN_ROWS: usize = 7;
 const HALF_WIDTH: usize = MEDIAN_ROWS / 2;
 /// Rows to each side that are remembered of a spike.
 const REACH_ROWS: usize = 5;
 /// Rows to each side in which a spike must stand alone.
 const AROUND: usize = 25;
-/// Differences that are remembered.
-const RING: usize = 64;
 /// Rows to each side by which a change of the speed is seen.
 const CHANGE: usize = 9;
 /// Spikes that are kept, the highest.
@@ -30,11 +28,10 @@ const SUSPECT_QUANTILE: f64 = 0.9;
 /// Share of the rows by which a spike is measured.
 const SPIKE_QUANTILE: f64 = 0.995;
 /// A spike is so many times what nearly all other rows differ from their neighbours.
-pub(in crate::inspect) const SPIKE: f64 = 8.0;
+pub(crate) const SPIKE: f64 = 8.0;
 /// One of a torque, and one of many, has at least this share of the channel's deviation.
-pub(in crate::inspect) const SPIKE_SHARE: f64 = 0.1;
-/// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
-/// smooth motion it does in the next rows too.
+pub(crate) const SPIKE_SHARE: f64 = 0.1;
+/// A speed changes where it does by so many usual changes, and by so many times the largest of the rows beside.
 const MIN_RATIO_TO_USUAL: f64 = 6.0;
 const MIN_RATIO_TO_NEIGHBOURS: f64 = 3.0;
 
@@ -43,18 +40,17 @@ const MAX_TWO_ROW_SHARE: f64 = 0.5;
 
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::inspect) struct Spike {
-    pub(in crate::inspect) t: f64,
+pub(crate) struct Spike {
+    pub(crate) t: f64,
     /// Difference from the median of its neighbours.
-    pub(in crate::inspect) height: f64,
+    pub(crate) height: f64,
     /// Times and numbers of the rows about, itself in the middle.
     around: [[f64; 2]; 2 * REACH_ROWS + 1],
 }
 
 impl Spike {
-    /// The number of the cubic through the two nearest rows on each side that are not `bad`; `None`
-    /// where there are none.
-    pub(in crate::inspect) fn bridge(&self, bad: &dyn Fn(f64) -> bool) -> Option<f64> {
+    /// The number of the cubic through the two nearest rows on each side that are not `bad`, where there are any.
+    pub(crate) fn bridge(&self, bad: &dyn Fn(f64) -> bool) -> Option<f64> {
         let good = |row: &&[f64; 2]| !bad(row[0]);
         let before = self.around[..REACH_ROWS].iter().rev().filter(good).take(2);
         let after = self.around[REACH_ROWS + 1..].iter().filter(good).take(2);
@@ -78,62 +74,43 @@ fn cubic(nodes: &[[f64; 2]], at: f64) -> Option<f64> {
     Some((0..4).map(|i| weight(i) * nodes[i][1]).sum())
 }
 
-/// Looks for the spikes of one channel.
-#[derive(Debug, Clone)]
-pub(in crate::inspect) struct Spikes {
-    values: [f64; RING],
-    times: [f64; RING],
-    differences: [f64; RING],
-    /// Positions of the joint, and how far its speed changes over three rows, but for what it does as steadily
-    /// before and after [positions per two rows].
-    positions: [f64; RING],
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Spikes {
+    values: Ring,
+    times: Ring,
+    differences: Ring,
+    /// Positions of the joint.
+    positions: Ring,
+    /// How far its speed changes over three rows, but for what it does as steadily beside them [positions per two rows].
     changes_seen: Histogram,
     /// Rows since the stretch began.
     count: usize,
     /// Rows whose difference was looked at as a spike.
     judged: usize,
-    pub(in crate::inspect) differences_seen: Histogram,
+    pub(crate) differences_seen: Histogram,
     /// A difference above it may be a spike.
     suspect: f64,
-    found: Vec<Spike>,
+    /// Those that may be spikes, in the order of time.
+    pub(crate) found: Vec<Spike>,
     /// Height of the lowest spike that is kept, once there are too many.
     lowest: f64,
     /// Sums over the rows: of each step times the one before, of the squared steps, of the squared steps over two rows.
     steps: [f64; 3],
 }
 
-impl Default for Spikes {
-    fn default() -> Self {
-        Self {
-            values: [0.0; RING],
-            times: [0.0; RING],
-            differences: [0.0; RING],
-            positions: [f64::NAN; RING],
-            changes_seen: Histogram::default(),
-            count: 0,
-            judged: 0,
-            differences_seen: Histogram::default(),
-            suspect: 0.0,
-            found: Vec::new(),
-            lowest: 0.0,
-            steps: [0.0; 3],
-        }
-    }
-}
-
 impl Spikes {
     /// Takes the next row of a channel, and the position of its joint where the channel is none itself.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64, position: f64) {
+    pub(crate) fn take(&mut self, t: f64, value: f64, position: f64) {
         let k = self.count;
-        self.values[k % RING] = value;
-        self.times[k % RING] = t;
-        self.positions[k % RING] = position;
+        self.values[k] = value;
+        self.times[k] = t;
+        self.positions[k] = position;
         self.count += 1;
         if self.count < MEDIAN_ROWS {
             return;
         }
-        let [before, last] = [k - 2, k - 1].map(|k| self.values[k % RING]);
+        let [before, last] = [k - 2, k - 1].map(|k| self.values[k]);
         let step = value - last;
         let sums = [
             step * (last - before),
@@ -142,9 +119,9 @@ impl Spikes {
         ];
         (self.steps.iter_mut().zip(sums)).for_each(|(sum, x)| *sum += x);
         let centre = k - HALF_WIDTH;
-        let window = std::array::from_fn(|i| self.values[(k - i) % RING]);
-        let difference = self.values[centre % RING] - median(window);
-        self.differences[centre % RING] = difference;
+        let window = std::array::from_fn(|i| self.values[k - i]);
+        let difference = self.values[centre] - median(window);
+        self.differences[centre] = difference;
         self.differences_seen.add(difference);
         if position.is_finite() && k >= 2 * CHANGE {
             let change = self.change(k - CHANGE);
@@ -157,8 +134,7 @@ impl Spikes {
         }
     }
 
-    /// The next row belongs to another stretch.
-    pub(in crate::inspect) fn part(&mut self) {
+    pub(crate) fn part(&mut self) {
         if self.count >= MEDIAN_ROWS {
             let last = self.count - 1 - HALF_WIDTH;
             for row in self.judged.max(HALF_WIDTH)..=last {
@@ -170,20 +146,19 @@ impl Spikes {
     }
 
     /// Brings the suspicion up to date with what was seen so far.
-    pub(in crate::inspect) fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         self.suspect = SUSPECT_FACTOR * self.differences_seen.quantile(SUSPECT_QUANTILE);
     }
 
     /// What nearly all rows differ from their neighbours.
-    pub(in crate::inspect) fn nearly_all(&self) -> f64 {
+    pub(crate) fn nearly_all(&self) -> f64 {
         self.differences_seen.quantile(SPIKE_QUANTILE)
     }
 
-    /// The same, but where more rows are spikes than that leaves out, those are set
-    /// aside first: they hide each other where they are counted among the rest (Rosner 1983). `deviation` is that
-    /// of the channel.
-    pub(in crate::inspect) fn usual(&self, deviation: f64) -> f64 {
-        let rows = self.differences_seen.total().max(1) as f64;
+    /// The same, but where more rows are spikes than that leaves out, those are set aside first (Rosner 1983).
+    pub(crate) fn usual(&self, deviation: f64) -> f64 {
+        // they hide each other where they are counted among the rest
+        let rows = self.differences_seen.total.max(1) as f64;
         let apart = |aside: usize| {
             let rest = 1.0 - aside as f64 / rows;
             self.differences_seen.quantile(SPIKE_QUANTILE * rest)
@@ -191,8 +166,8 @@ impl Spikes {
         let mut aside = self.found.len();
         loop {
             let least = (SPIKE * apart(aside)).max(SPIKE_SHARE * deviation);
-            let higher = self.found.iter().filter(|s| s.height.abs() > least);
-            let higher = higher.count();
+            let spikes = self.found.iter();
+            let higher = spikes.filter(|s| s.height.abs() > least).count();
             if higher >= aside {
                 break;
             }
@@ -203,18 +178,18 @@ impl Spikes {
     }
 
     /// Whether steps mostly take back the step before, as noise does and no motion.
-    pub(in crate::inspect) fn goes_to_and_fro(&self) -> bool {
+    pub(crate) fn goes_to_and_fro(&self) -> bool {
         self.steps[0] < 0.0
     }
 
     /// Whether every other row belongs together more than neighbours do: of noise, both differ alike.
-    pub(in crate::inspect) fn alternates(&self) -> bool {
+    pub(crate) fn alternates(&self) -> bool {
         self.steps[2] < MAX_TWO_ROW_SHARE * self.steps[1]
     }
 
     /// Change of the joint's speed at a row, less half of those six rows before and after.
     fn change(&self, row: usize) -> f64 {
-        let q = |k: usize| self.positions[k % RING];
+        let q = |k: usize| self.positions[k];
         let at = |k: usize| (q(k + 3) - q(k + 1)) - (q(k - 1) - q(k - 3));
         at(row) - 0.5 * (at(row - 6) + at(row + 6))
     }
@@ -222,7 +197,7 @@ impl Spikes {
     /// Whether a row beside it stands out as well: no machine changes its speed within a single row.
     fn lasts(&self, row: usize, height: f64) -> bool {
         let beside = [row.wrapping_sub(1), row + 1];
-        let mut beside = beside.iter().map(|k| self.differences[k % RING]);
+        let mut beside = beside.iter().map(|k| self.differences[*k]);
         beside.any(|other| other * height > 0.25 * height * height)
     }
 
@@ -244,7 +219,7 @@ impl Spikes {
     #[inline]
     fn judge(&mut self, row: usize, last: usize) {
         self.judged = row + 1;
-        let height = self.differences[row % RING];
+        let height = self.differences[row];
         if height.abs() > self.suspect.max(self.lowest) {
             self.judge_closely(row, last, height);
         }
@@ -254,7 +229,7 @@ impl Spikes {
     fn judge_closely(&mut self, row: usize, last: usize, height: f64) {
         let from = row.saturating_sub(AROUND).max(HALF_WIDTH);
         let others = (from..=last.min(row + AROUND)).filter(|k| k.abs_diff(row) > HALF_WIDTH);
-        let high = others.filter(|k| self.differences[k % RING].abs() > 0.25 * height.abs());
+        let high = others.filter(|k| self.differences[*k].abs() > 0.25 * height.abs());
         // A second spike may be near, a rough stretch may not.
         if high.count() > 3 {
             return;
@@ -273,41 +248,31 @@ impl Spikes {
         }
         // as far as the cubic reaches, there are rows
         let around = std::array::from_fn(|i| {
-            let at = (row + i - REACH_ROWS) % RING;
+            let at = row + i - REACH_ROWS;
             [self.times[at], self.values[at]]
         });
         self.found.push(Spike {
-            t: self.times[row % RING],
+            t: self.times[row],
             height,
             around,
         });
     }
 
-    /// How far a row is off the cubic through rows beside it, or `height` where that is less; `None`
-    /// where it is as good as on it, or rows are missing.
+    /// How far a row is off the cubic through rows beside it, `height` at most; `None` on it, and where rows are missing.
     fn off_cubic(&self, row: usize, height: f64) -> Option<f64> {
-        let quiet = |k: &usize| self.differences[k % RING].abs() <= 0.25 * height.abs();
+        let quiet = |k: &usize| self.differences[*k].abs() <= 0.25 * height.abs();
         let before = (row.saturating_sub(AROUND)..(row + 1).saturating_sub(REACH_ROWS - 1)).rev();
         let after = row + REACH_ROWS - 1..self.count.min(row + AROUND);
-        let nodes = before
-            .filter(quiet)
-            .take(2)
-            .chain(after.filter(quiet).take(2));
-        let nodes: Vec<[f64; 2]> = nodes
-            .map(|k| [k as f64 - row as f64, self.values[k % RING]])
-            .collect();
-        let off = self.values[row % RING] - cubic(&nodes, 0.0)?;
+        let before = before.filter(quiet).take(2);
+        let nodes = before.chain(after.filter(quiet).take(2));
+        let node = |k: usize| [k as f64 - row as f64, self.values[k]];
+        let nodes: Vec<[f64; 2]> = nodes.map(node).collect();
+        let off = self.values[row] - cubic(&nodes, 0.0)?;
         let agrees = off * height > 0.0 && off.abs() > 0.5 * height.abs();
         agrees.then(|| off.abs().min(height.abs()).copysign(height))
     }
-
-    /// Those that may be spikes, in the order of time.
-    pub(in crate::inspect) fn found(&self) -> &[Spike] {
-        &self.found
-    }
 }
 
-/// Median of seven numbers.
 #[inline]
 fn median(mut x: [f64; MEDIAN_ROWS]) -> f64 {
     // Exchanges that leave the middle one in its place (Devillard 1998).
@@ -367,12 +332,9 @@ mod tests {
         for k in [500, 1200, 1201, 1202, 2990] {
             values[k] += 0.5;
         }
-        let found: Vec<f64> = fed(&values)
-            .found()
-            .iter()
-            .filter(|s| s.height > 0.3)
-            .map(|s| s.t)
-            .collect();
+        let spikes = fed(&values);
+        let high = spikes.found.iter().filter(|s| s.height > 0.3);
+        let found: Vec<f64> = high.map(|s| s.t).collect();
         assert_eq!(found, [500.0, 1200.0, 1201.0, 1202.0, 2990.0]);
     }
 
@@ -384,16 +346,12 @@ mod tests {
             values[k] += 0.5;
         }
         let spikes = fed(&values);
-        let high: Vec<&Spike> = spikes.found().iter().filter(|s| s.height > 0.3).collect();
+        let high: Vec<&Spike> = spikes.found.iter().filter(|s| s.height > 0.3).collect();
         let bad = |t: f64| high.iter().any(|spike| spike.t == t);
         assert_eq!(high.len(), 4);
         for spike in &high {
-            let value = spike.bridge(&bad).unwrap();
-            assert!(
-                (value - smooth(spike.t)).abs() < 1e-5,
-                "{} {value}",
-                spike.t
-            );
+            let off = spike.bridge(&bad).unwrap() - smooth(spike.t);
+            assert!(off.abs() < 1e-5, "{} {off}", spike.t);
         }
         assert_eq!(high[0].bridge(&|_| true), None);
     }
@@ -412,21 +370,16 @@ mod tests {
                 let step = 0.8 * (t - 1.0).max(0.0);
                 let position = (((5.0 * t).sin() + step) * 1e5).round() * 1e-5;
                 let noise = f64::from((k as u32 * 7919) % 1000) * 1e-5;
-                let torque = (5.0 * t).cos()
-                    + noise
-                    + if k == peak || k == peak + 1 {
-                        20.0
-                    } else {
-                        0.0
-                    };
-                spikes.take(t, torque, position);
+                let pulse = if [peak, peak + 1].contains(&k) {
+                    20.0
+                } else {
+                    0.0
+                };
+                spikes.take(t, (5.0 * t).cos() + noise + pulse, position);
             }
             spikes.part();
-            spikes
-                .found()
-                .iter()
-                .filter(|s| s.height.abs() > 10.0)
-                .count()
+            let found = spikes.found.iter();
+            found.filter(|s| s.height.abs() > 10.0).count()
         };
         assert_eq!(found(1000), 0);
         assert_eq!(found(314), 2);
@@ -434,25 +387,16 @@ mod tests {
 
     #[test]
     fn a_step_and_a_rough_stretch_are_no_spikes() {
-        let mut values: Vec<f64> = (0..3000)
-            .map(|k| if k < 1000 { 0.0 } else { 5.0 })
-            .collect();
+        let step = |k: i32| if k < 1000 { 0.0 } else { 5.0 };
+        let mut values: Vec<f64> = (0..3000).map(step).collect();
         for k in (2000..2500).step_by(9) {
             values[k] += 3.0;
         }
         let spikes = fed(&values);
-        assert!(
-            spikes
-                .found()
-                .iter()
-                .all(|s| s.height.abs() < 1e-9 || s.t < 2030.0 || s.t > 2470.0),
-            "{:?}",
-            spikes.found()
-        );
-        assert!(
-            !spikes.found().iter().any(|s| s.t < 1990.0),
-            "{:?}",
-            spikes.found()
-        );
+        for spike in spikes.found {
+            let inside = (2030.0..=2470.0).contains(&spike.t);
+            assert!(spike.height.abs() < 1e-9 || !inside, "{spike:?}");
+            assert!(spike.t >= 1990.0, "{spike:?}");
+        }
     }
 }

@@ -7,6 +7,7 @@
 //! all through the log, and the motion, where the acceleration changes from one row to the next.
 
 use super::histogram::Histogram;
+use super::ring::Ring;
 
 /// Rows to each side in which a leap must stand alone.
 const AROUND: usize = 25;
@@ -17,8 +18,6 @@ const LEVEL: usize = 5;
 /// Share of a leap's height that the rows next to it tell, and those beyond three rows, where the motion may have bent.
 const NEXT: [f64; 2] = [0.5, 1.5];
 const BEYOND: [f64; 2] = [0.25, 2.0];
-/// Rows that are remembered.
-const RING: usize = 64;
 /// Rows that repeat all positions from which the robot is at rest.
 const MIN_ROWS_AT_REST: usize = 6;
 /// Leaps that are kept, the highest.
@@ -26,62 +25,45 @@ const MAX_LEAPS: usize = 4096;
 /// Largest heights that may be leaps, over those of 99 % of the rows.
 const SUSPECT_FACTOR: f64 = 3.0;
 
-/// A leap of a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::inspect) struct Leap {
+pub(crate) struct Leap {
     /// Times of the last row before it and of the first one after it [s].
-    pub(in crate::inspect) before: f64,
-    pub(in crate::inspect) at: f64,
-    pub(in crate::inspect) height: f64,
+    pub(crate) before: f64,
+    pub(crate) at: f64,
+    pub(crate) height: f64,
 }
 
-/// Looks for the leaps of one position.
-#[derive(Debug, Clone)]
-pub(in crate::inspect) struct Leaps {
-    times: [f64; RING],
-    values: [f64; RING],
-    heights: [f64; RING],
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Leaps {
+    times: Ring,
+    values: Ring,
+    heights: Ring,
     /// Rows since the stretch began.
     count: usize,
     /// Rows whose height was looked at.
     judged: usize,
-    pub(in crate::inspect) heights_seen: Histogram,
+    heights_seen: Histogram,
     suspect: f64,
-    found: Vec<Leap>,
+    /// Those that may be leaps, in the order of time.
+    pub(crate) found: Vec<Leap>,
     lowest: f64,
-}
-
-impl Default for Leaps {
-    fn default() -> Self {
-        Self {
-            times: [0.0; RING],
-            values: [0.0; RING],
-            heights: [0.0; RING],
-            count: 0,
-            judged: 0,
-            heights_seen: Histogram::default(),
-            suspect: 0.0,
-            found: Vec::new(),
-            lowest: 0.0,
-        }
-    }
 }
 
 impl Leaps {
     /// Takes the next row that is not one of a few that repeat the positions of the row before.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
+    pub(crate) fn take(&mut self, t: f64, value: f64) {
         let k = self.count;
-        self.times[k % RING] = t;
-        self.values[k % RING] = value;
-        self.heights[k % RING] = 0.0;
+        self.times[k] = t;
+        self.values[k] = value;
+        self.heights[k] = 0.0;
         self.count += 1;
         if self.count < 4 {
             return;
         }
         // the leap would be between the two rows in the middle
         let height = self.height(k - 1);
-        self.heights[(k - 1) % RING] = height;
+        self.heights[k - 1] = height;
         self.heights_seen.add(height);
         if k > AROUND + 1 {
             self.judge(k - 1 - AROUND, k - 1);
@@ -91,7 +73,7 @@ impl Leaps {
     /// Height of a leap between a row and the one before it.
     #[inline]
     fn height(&self, row: usize) -> f64 {
-        let at = |i: usize| (row + i - 2) % RING;
+        let at = |i: usize| row + i - 2;
         let t: [f64; 4] = std::array::from_fn(|i| self.times[at(i)]);
         let (mut all, mut after) = (0.0, 0.0);
         for i in 0..4 {
@@ -109,8 +91,7 @@ impl Leaps {
         all / after
     }
 
-    /// The next row belongs to another stretch.
-    pub(in crate::inspect) fn part(&mut self) {
+    pub(crate) fn part(&mut self) {
         if self.count >= 4 {
             let last = self.count - 2;
             for row in self.judged.max(2)..=last {
@@ -122,14 +103,14 @@ impl Leaps {
     }
 
     /// Brings the suspicion up to date with what was seen so far.
-    pub(in crate::inspect) fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         self.suspect = SUSPECT_FACTOR * self.heights_seen.quantile(0.99);
     }
 
     #[inline]
     fn judge(&mut self, row: usize, last: usize) {
         self.judged = row + 1;
-        let height = self.heights[row % RING];
+        let height = self.heights[row];
         if height.abs() > self.suspect.max(self.lowest) {
             self.judge_closely(row, last, height);
         }
@@ -140,7 +121,7 @@ impl Leaps {
         let from = row.saturating_sub(AROUND).max(2);
         let others = from..=last.min(row + AROUND);
         let far = others.filter(|k| k.abs_diff(row) > OWN);
-        let far = far.filter(|k| self.heights[k % RING].abs() > 0.25 * height.abs());
+        let far = far.filter(|k| self.heights[*k].abs() > 0.25 * height.abs());
         // A second leap may be near, a rough stretch may not.
         if far.count() > 3 || !self.stays(row) {
             return;
@@ -148,7 +129,7 @@ impl Leaps {
         // Windows beside a leap show it, too, and on an uneven clock higher, but it is not there that
         // the rows part.
         let near = row.saturating_sub(OWN).max(2)..=last.min(row + OWN);
-        let higher = |k: &usize| self.heights[k % RING].abs() > height.abs();
+        let higher = |k: &usize| self.heights[*k].abs() > height.abs();
         if near.filter(higher).any(|k| self.stays(k)) {
             return;
         }
@@ -159,16 +140,15 @@ impl Leaps {
             self.found.retain(|leap| leap.height.abs() > self.lowest);
         }
         self.found.push(Leap {
-            before: self.times[(row - 1) % RING],
-            at: self.times[row % RING],
+            before: self.times[row - 1],
+            at: self.times[row],
             height,
         });
     }
 
-    /// Whether a leap of the height that the window at a row shows is one that stays. A spike of up to three
-    /// rows is none: the rows beyond it are where those before it were.
+    /// Whether the leap that the window at a row shows is one that stays: that of a spike of up to three rows does not.
     fn stays(&self, row: usize) -> bool {
-        let height = self.heights[row % RING];
+        let height = self.heights[row];
         [(1, NEXT), (3, BEYOND)].iter().all(|(skip, [low, high])| {
             self.level(row, *skip).is_none_or(|level| {
                 let share = level / height;
@@ -177,80 +157,63 @@ impl Leaps {
         })
     }
 
-    /// Height of a leap by five rows on each side, without `skip` rows next to it on each: what brings
-    /// them onto one parabola. `None` too near an end to say.
+    /// Height that brings five rows on each side onto one parabola, without `skip` rows next to the leap on each.
     fn level(&self, row: usize, skip: usize) -> Option<f64> {
         let from = row.saturating_sub(LEVEL + skip);
-        let rows = (from..(row + LEVEL + skip).min(self.count))
+        let rows: Vec<usize> = (from..(row + LEVEL + skip).min(self.count))
             .filter(|k| k + skip < row || *k >= row + skip)
-            .collect::<Vec<_>>();
+            .collect();
         let (before, after) = rows.split_at(rows.partition_point(|k| *k < row));
         if before.len() < 2 || after.len() < 2 {
             return None;
         }
-        let begin = self.times[row % RING];
-        let length = (self.times[rows[rows.len() - 1] % RING] - self.times[rows[0] % RING]).abs();
+        let begin = self.times[row];
+        let length = (self.times[rows[rows.len() - 1]] - self.times[rows[0]]).abs();
         let column = |f: &dyn Fn(f64, usize) -> f64| -> Vec<f64> {
             let each = rows.iter();
-            each.map(|k| f((self.times[k % RING] - begin) / length, *k))
+            each.map(|k| f((self.times[*k] - begin) / length, *k))
                 .collect()
         };
-        let mut basis = [
-            column(&|_, _| 1.0),
-            column(&|t, _| t),
-            column(&|t, _| t * t),
-        ];
+        let powers: [&dyn Fn(f64, usize) -> f64; 3] = [&|_, _| 1.0, &|t, _| t, &|t, _| t * t];
+        let mut basis = powers.map(column);
         let mut leap = column(&|_, k| if k >= row { 1.0 } else { 0.0 });
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let take_off = |x: &mut [f64], of: &[f64]| {
+            let share = dot(x, of);
+            x.iter_mut().zip(of).for_each(|(x, y)| *x -= share * y);
+        };
         // Gram-Schmidt: what of the leap is no parabola
         for i in 0..basis.len() {
             let (done, rest) = basis.split_at_mut(i);
-            for other in done.iter() {
-                let share = dot(&rest[0], other);
-                rest[0]
-                    .iter_mut()
-                    .zip(other)
-                    .for_each(|(x, y)| *x -= share * y);
-            }
-            let norm = dot(&rest[0], &rest[0]).sqrt();
+            let own = &mut rest[0];
+            done.iter().for_each(|other| take_off(own, other));
+            let norm = dot(own, own).sqrt();
             if norm < 1e-9 {
                 return None;
             }
-            rest[0].iter_mut().for_each(|x| *x /= norm);
-            let share = dot(&leap, &rest[0]);
-            leap.iter_mut()
-                .zip(&rest[0])
-                .for_each(|(x, y)| *x -= share * y);
+            own.iter_mut().for_each(|x| *x /= norm);
+            take_off(&mut leap, own);
         }
-        let about = self.values[(row - 1) % RING];
-        let values = column(&|_, k| self.values[k % RING] - about);
+        let about = self.values[row - 1];
+        let values = column(&|_, k| self.values[k] - about);
         let found = dot(&leap, &values) / dot(&leap, &leap);
         found.is_finite().then_some(found)
     }
 
-    /// Those that may be leaps, in the order of time.
-    pub(in crate::inspect) fn found(&self) -> &[Leap] {
-        &self.found
-    }
-
-    /// Height that noise and the usual motion do not reach in a million logs like this one, if the
-    /// share of the rows that pass a height falls exponentially with it, as it does from the 90th to
-    /// the 99th of a hundred (a normal distribution falls faster).
-    pub(in crate::inspect) fn unusual(&self, rows: u64) -> f64 {
+    /// Height that noise and the usual motion do not reach in a million logs like this one.
+    pub(crate) fn unusual(&self, rows: u64) -> f64 {
         const LOGS: f64 = 1e6;
-        let (most, nearly_all) = (
-            self.heights_seen.quantile(0.9),
-            self.heights_seen.quantile(0.99),
-        );
+        // the share of the rows that pass a height falls exponentially with it, as it does from the 90th to the 99th
+        // of a hundred (a normal distribution falls faster)
+        let [most, nearly_all] = [0.9, 0.99].map(|share| self.heights_seen.quantile(share));
         let decades = (0.01 * LOGS * rows.max(100) as f64).log10();
         nearly_all + (nearly_all - most) * decades
     }
 }
 
-/// Leaves out rows that repeat the positions of the row before, unless the robot is at rest: then the
-/// last of them stands for all.
+/// Leaves out rows that repeat the positions of the row before; of a rest the last one stands for all.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct FreshRows {
+pub(crate) struct FreshRows {
     previous: Vec<f64>,
     /// Time of the last row that repeats, and how many there are in a row.
     repeated: usize,
@@ -259,7 +222,7 @@ pub(in crate::inspect) struct FreshRows {
 
 /// What to do with a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::inspect) enum Freshness {
+pub(crate) enum Freshness {
     /// Its positions are those of the row before.
     Repeats,
     /// Its positions are new.
@@ -269,16 +232,15 @@ pub(in crate::inspect) enum Freshness {
 }
 
 impl FreshRows {
-    pub(in crate::inspect) fn new(positions: usize) -> Self {
+    pub(crate) fn new(positions: usize) -> Self {
         Self {
             previous: vec![f64::NAN; positions],
             ..Self::default()
         }
     }
 
-    /// Looks at the positions of the next row.
     #[inline]
-    pub(in crate::inspect) fn look(&mut self, t: f64, positions: &[f64]) -> Freshness {
+    pub(crate) fn look(&mut self, t: f64, positions: &[f64]) -> Freshness {
         if positions == self.previous {
             self.repeated += 1;
             self.last = t;
@@ -311,11 +273,9 @@ mod tests {
     }
 
     fn high(leaps: &Leaps, least: f64) -> Vec<(f64, f64)> {
-        let found = leaps
-            .found()
-            .iter()
-            .filter(|leap| leap.height.abs() > least);
-        found.map(|leap| (leap.at, leap.height)).collect()
+        let found = leaps.found.iter();
+        let high = found.filter(|leap| leap.height.abs() > least);
+        high.map(|leap| (leap.at, leap.height)).collect()
     }
 
     /// Rows with an uneven clock and the last digits of an encoder.
@@ -343,11 +303,8 @@ mod tests {
     fn spikes_and_smooth_turns_are_no_leaps() {
         let spike = |k: usize| (100..100 + 1 + k / 1500).contains(&(k % 500));
         let spiky = fed(rows(|k, q| q + if spike(k) { 0.05 } else { 0.0 }).into_iter());
-        assert!(
-            high(&spiky, spiky.unusual(4000)).is_empty(),
-            "{:?}",
-            spiky.found()
-        );
+        let found = high(&spiky, spiky.unusual(4000));
+        assert!(found.is_empty(), "{found:?}");
         let smooth = fed(rows(|_, q| q).into_iter());
         assert!(high(&smooth, smooth.unusual(4000)).is_empty());
     }
@@ -361,9 +318,7 @@ mod tests {
             .collect();
         assert_eq!(shown[3], Freshness::Fresh);
         assert_eq!(shown[10], Freshness::AfterRest(9.0));
-        assert_eq!(
-            shown.iter().filter(|f| **f == Freshness::Repeats).count(),
-            7
-        );
+        let repeats = shown.iter().filter(|f| **f == Freshness::Repeats);
+        assert_eq!(repeats.count(), 7);
     }
 }

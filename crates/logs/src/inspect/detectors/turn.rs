@@ -20,9 +20,8 @@ struct LongStep {
     range: f64,
 }
 
-/// Watches one position for its range's ends.
 #[derive(Debug, Clone)]
-pub(in crate::inspect) struct Turns {
+pub(crate) struct Turns {
     low: f64,
     high: f64,
     /// Position of the row before, and the step to it; NaN where there is none.
@@ -46,20 +45,18 @@ impl Default for Turns {
     }
 }
 
-/// A position that begins anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::inspect) struct Wrapped {
-    pub(in crate::inspect) range: f64,
-    pub(in crate::inspect) times: u64,
+pub(crate) struct Wrapped {
+    pub(crate) range: f64,
+    pub(crate) times: u64,
     /// Times of the first and the last [s].
-    pub(in crate::inspect) from: f64,
-    pub(in crate::inspect) to: f64,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
 }
 
 impl Turns {
-    /// Takes the next row.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
+    pub(crate) fn take(&mut self, t: f64, value: f64) {
         self.low = self.low.min(value);
         self.high = self.high.max(value);
         let Some([last, before]) = self.last else {
@@ -94,32 +91,25 @@ impl Turns {
         }
     }
 
-    /// The next row belongs to another stretch.
-    pub(in crate::inspect) fn part(&mut self) {
+    pub(crate) fn part(&mut self) {
         self.last = None;
         self.waiting = None;
     }
 
-    /// The range, where the position goes through its end; `usual` are ranges that encoders have,
-    /// `step` is a usual step from row to row.
-    ///
-    /// All long steps must show the same range, and everything must lie within it. One or two alone
-    /// are believed of a usual range only: a reference that was set anew leaps once, too.
-    pub(in crate::inspect) fn wrapped(&self, usual: &[f64], step: f64) -> Option<Wrapped> {
+    /// The range, where the position goes through its end, by ranges that encoders have and a `usual` step from row to row.
+    pub(crate) fn wrapped(&self, usual: &[f64], step: f64) -> Option<Wrapped> {
+        // All long steps must show the same range, and everything must lie within it. One or two alone are believed
+        // of a usual range only: a reference that was set anew leaps once, too.
         let travel = self.high - self.low;
-        let long = || {
-            self.long
-                .iter()
-                .filter(|long| long.step.abs() > LONG_STEP_SHARE * travel)
-        };
-        let (first, last) = (long().next()?, long().next_back()?);
-        let mut ranges: Vec<f64> = long().map(|long| long.range.abs()).collect();
+        let mut long: Vec<&LongStep> = self.long.iter().collect();
+        long.retain(|long| long.step.abs() > LONG_STEP_SHARE * travel);
+        let (first, last) = (long.first()?, long.last()?);
+        let mut ranges: Vec<f64> = long.iter().map(|long| long.range.abs()).collect();
         ranges.sort_by(f64::total_cmp);
         let median = ranges[ranges.len() / 2];
         let spread = ranges[ranges.len() - 1] - ranges[0];
-        let known = usual
-            .iter()
-            .find(|range| (median / **range - 1.0).abs() < USUAL_RANGE_TOLERANCE);
+        let near = |range: &&f64| (median / **range - 1.0).abs() < USUAL_RANGE_TOLERANCE;
+        let known = usual.iter().find(near);
         let range = known.copied().unwrap_or(median);
         let fits = spread <= RANGE_AGREEMENT * median && travel <= (1.0 + RANGE_AGREEMENT) * range;
         let sure = known.is_some() || ranges.len() >= 3;
@@ -166,16 +156,15 @@ mod tests {
 
     #[test]
     fn leaps_of_other_sizes_and_plain_motions_do_not_begin_anew() {
-        assert_eq!(watched(|t| 3.0 * t.sin()).wrapped(&TURN, 1e-3), None);
-        assert_eq!(
-            watched(|t| 0.1 * t.sin() + if t < 9.0 { 0.0 } else { 2.0 }).wrapped(&TURN, 1e-3),
-            None
-        );
-        assert_eq!(
-            watched(|t| if t < 9.0 { 0.5 } else { 0.6 }).wrapped(&TURN, 1e-3),
-            None
-        );
-        let counts = watched(|t| 1e-4 * f64::from((3.0 * t).sin() > 0.0));
-        assert_eq!(counts.wrapped(&TURN, 1e-4), None);
+        type Motion = fn(f64) -> f64;
+        let motions: [(Motion, f64); 4] = [
+            (|t| 3.0 * t.sin(), 1e-3),
+            (|t| 0.1 * t.sin() + if t < 9.0 { 0.0 } else { 2.0 }, 1e-3),
+            (|t| if t < 9.0 { 0.5 } else { 0.6 }, 1e-3),
+            (|t| 1e-4 * f64::from((3.0 * t).sin() > 0.0), 1e-4),
+        ];
+        for (motion, step) in motions {
+            assert_eq!(watched(motion).wrapped(&TURN, step), None);
+        }
     }
 }

@@ -5,19 +5,18 @@ use super::windows::Window;
 /// Rows by which the velocity may lag or lead.
 const FARTHEST: usize = 50;
 
-/// How a velocity channel follows its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::inspect) struct Follows {
+pub(crate) struct Follows {
     /// Rows by which it is late; negative where it is early.
-    pub(in crate::inspect) rows: f64,
+    pub(crate) rows: f64,
     /// Correlation with the derivative at that lag, and without a lag.
-    pub(in crate::inspect) best: f64,
-    pub(in crate::inspect) now: f64,
+    pub(crate) best: f64,
+    pub(crate) now: f64,
     /// How many times the derivative it is at that lag.
-    pub(in crate::inspect) times: f64,
+    pub(crate) times: f64,
 }
 
-/// LagSums of one lag.
+/// Sums over the rows at one lag.
 #[derive(Debug, Clone, Copy, Default)]
 struct LagSums {
     n: f64,
@@ -40,24 +39,16 @@ impl LagSums {
     }
 }
 
-/// Finds the lag at which a velocity resembles the derivative of a position most; `None` where
-/// they do not move enough to say.
-pub(in crate::inspect) fn follows<'w>(
-    windows: impl Iterator<Item = &'w Window>,
-    position: usize,
-    velocity: usize,
-) -> Option<Follows> {
+/// Finds the lag at which a velocity resembles the derivative of a position most; `None` where they move too little.
+pub(crate) fn follows(windows: &[Window], position: usize, velocity: usize) -> Option<Follows> {
     let mut sums = [LagSums::default(); 2 * FARTHEST + 1];
     let mut derivative = Vec::new();
     for window in windows {
         let (q, v) = (&window.columns[position], &window.columns[velocity]);
         derivative.clear();
         // Row k of it belongs to row k + 1 of the window.
-        derivative.extend(
-            q.windows(3)
-                .zip(window.t.windows(3))
-                .map(|(q, t)| (q[2] - q[0]) / (t[2] - t[0])),
-        );
+        let triples = q.windows(3).zip(window.t.windows(3));
+        derivative.extend(triples.map(|(q, t)| (q[2] - q[0]) / (t[2] - t[0])));
         let usable = FARTHEST + 1..derivative.len().saturating_sub(FARTHEST);
         for (lag, sums) in sums.iter_mut().enumerate() {
             for k in usable.clone() {
@@ -77,18 +68,14 @@ pub(in crate::inspect) fn follows<'w>(
     if !(now.is_finite() && sums[FARTHEST].n > 200.0) {
         return None;
     }
-    let (peak, _) = correlations
-        .iter()
-        .enumerate()
-        .filter(|(_, c)| c.is_finite())
-        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    let finite = correlations.iter().enumerate();
+    let finite = finite.filter(|(_, c)| c.is_finite());
+    let (peak, _) = finite.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     let mut rows = peak as f64 - FARTHEST as f64;
-    if let (Some(before), Some(after)) = (
-        peak.checked_sub(1).and_then(|k| correlations.get(k)),
-        correlations.get(peak + 1),
-    ) {
+    let about = peak.checked_sub(1).and_then(|k| correlations.get(k..k + 3));
+    if let Some([before, top, after]) = about {
         // The parabola through the three highest has its top between them.
-        let bend = before - 2.0 * correlations[peak] + after;
+        let bend = before - 2.0 * top + after;
         if bend.abs() > 1e-15 {
             rows += (0.5 * (before - after) / bend).clamp(-0.5, 0.5);
         }
@@ -107,15 +94,11 @@ mod tests {
 
     fn window(velocity: impl Fn(f64) -> f64) -> Vec<Window> {
         let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * 0.001).collect();
-        let q = t
-            .iter()
-            .map(|t| (5.0 * t).sin() + 0.2 * (17.0 * t).cos())
-            .collect();
+        let position = |t: &f64| (5.0 * t).sin() + 0.2 * (17.0 * t).cos();
+        let q = t.iter().map(position).collect();
         let v = t.iter().map(|t| velocity(*t)).collect();
-        vec![Window {
-            t,
-            columns: vec![q, v],
-        }]
+        let columns = vec![q, v];
+        vec![Window { t, columns }]
     }
 
     fn speed(t: f64) -> f64 {
@@ -126,7 +109,7 @@ mod tests {
     fn a_late_velocity_is_found_with_its_delay_and_a_true_one_has_none() {
         for (delay, sign) in [(0.0, 1.0), (0.0123, 1.0), (-0.004, 1.0), (0.008, -1.0)] {
             let log = window(|t| sign * speed(t - delay));
-            let found = follows(log.iter(), 0, 1).unwrap();
+            let found = follows(&log, 0, 1).unwrap();
             assert!((found.rows * 0.001 - delay).abs() < 2e-4, "{found:?}");
             assert!(sign * found.best > 0.9999, "{found:?}");
             assert!((sign * found.times - 1.0).abs() < 0.01, "{found:?}");
@@ -135,6 +118,6 @@ mod tests {
 
     #[test]
     fn at_rest_nothing_is_said() {
-        assert_eq!(follows(window(|_| 0.0).iter(), 0, 1), None);
+        assert_eq!(follows(&window(|_| 0.0), 0, 1), None);
     }
 }

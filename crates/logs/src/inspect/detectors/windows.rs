@@ -7,16 +7,15 @@ const NUMBERS: usize = 1 << 23;
 
 /// Consecutive rows without a gap.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::inspect) struct Window {
-    pub(in crate::inspect) t: Vec<f64>,
+pub(crate) struct Window {
+    pub(crate) t: Vec<f64>,
     /// One list per channel.
-    pub(in crate::inspect) columns: Vec<Vec<f64>>,
+    pub(crate) columns: Vec<Vec<f64>>,
 }
 
-/// Stretches of a log of any length.
 #[derive(Debug, Clone)]
-pub(in crate::inspect) struct Windows {
-    kept: Vec<Window>,
+pub(crate) struct Windows {
+    pub(crate) kept: Vec<Window>,
     /// Every how many stretches one is kept.
     stride: u64,
     seen: u64,
@@ -33,19 +32,15 @@ impl Default for Windows {
 }
 
 impl Windows {
-    /// Offers the next stretch.
-    pub(in crate::inspect) fn offer(&mut self, t: &[f64], columns: &[&[f64]]) {
+    pub(crate) fn offer(&mut self, t: &[f64], columns: &[&[f64]]) {
         let number = self.seen;
         self.seen += 1;
         if !number.is_multiple_of(self.stride) {
             return;
         }
         let most = (NUMBERS / (t.len() * (columns.len() + 1)).max(1)).min(MAX_STRETCHES);
-        if most < 2 {
-            // Too wide to keep more than the first rows.
-            if self.kept.is_empty() && most == 1 {
-                self.keep(t, columns);
-            }
+        // Too wide to keep more than the first rows.
+        if most < 2 && (most == 0 || !self.kept.is_empty()) {
             return;
         }
         if self.kept.len() >= most {
@@ -60,10 +55,6 @@ impl Windows {
                 return;
             }
         }
-        self.keep(t, columns);
-    }
-
-    fn keep(&mut self, t: &[f64], columns: &[&[f64]]) {
         self.kept.push(Window {
             t: t.to_vec(),
             columns: columns.iter().map(|column| column.to_vec()).collect(),
@@ -71,14 +62,9 @@ impl Windows {
     }
 
     /// At most so many of them, evenly spread.
-    pub(in crate::inspect) fn spread(&self, most: usize) -> impl Iterator<Item = &Window> {
-        self.kept
-            .iter()
-            .step_by(self.kept.len().div_ceil(most).max(1))
-    }
-
-    pub(in crate::inspect) fn iter(&self) -> impl Iterator<Item = &Window> + Clone {
-        self.kept.iter()
+    pub(crate) fn spread(&self, most: usize) -> impl Iterator<Item = &Window> {
+        let step = self.kept.len().div_ceil(most).max(1);
+        self.kept.iter().step_by(step)
     }
 }
 
@@ -92,13 +78,11 @@ mod tests {
         for k in 0..1000 {
             windows.offer(&[f64::from(k)], &[&[f64::from(-k)]]);
         }
-        let times: Vec<f64> = windows.iter().map(|w| w.t[0]).collect();
+        let times: Vec<f64> = windows.kept.iter().map(|w| w.t[0]).collect();
         assert!(times.len() > MAX_STRETCHES / 2 && times.len() <= MAX_STRETCHES);
         let step = times[1] - times[0];
-        assert!(
-            times.windows(2).all(|pair| pair[1] - pair[0] == step),
-            "{times:?}"
-        );
+        let even = times.windows(2).all(|pair| pair[1] - pair[0] == step);
+        assert!(even, "{times:?}");
         assert!(*times.last().unwrap() >= 1000.0 - 2.0 * step);
     }
 }

@@ -2,20 +2,21 @@ use super::*;
 
 #[test]
 fn names_fall_into_words_at_digits_signs_and_capitals() {
-    let of = |name: &str| -> Vec<String> { words(name).into_iter().map(|w| w.text).collect() };
-    assert_eq!(
-        of("act_torque_abs_nm_1"),
-        ["act", "torque", "abs", "nm", "1"]
-    );
-    assert_eq!(of("JointPos2"), ["joint", "pos", "2"]);
-    assert_eq!(of("dQ1"), ["dq", "1"]);
-    assert_eq!(of("tau_J_d[3]"), ["tau", "j", "d", "3"]);
-    assert_eq!(of(" /joint_states.q10 "), ["joint", "states", "q", "10"]);
-    assert_eq!(of("AIPos.A1"), ["ai", "pos", "a", "1"]);
-    assert_eq!(of("tauIn_0"), ["tau", "in", "0"]);
-    assert_eq!(of("MsrJntTrq_A1"), ["msr", "jnt", "trq", "a", "1"]);
-    assert_eq!(of("tau_mNm"), ["tau", "mnm"]);
-    assert!(of("--").is_empty());
+    for (name, spoken) in [
+        ("act_torque_abs_nm_1", "act torque abs nm 1"),
+        ("JointPos2", "joint pos 2"),
+        ("dQ1", "dq 1"),
+        ("tau_J_d[3]", "tau j d 3"),
+        (" /joint_states.q10 ", "joint states q 10"),
+        ("AIPos.A1", "ai pos a 1"),
+        ("tauIn_0", "tau in 0"),
+        ("MsrJntTrq_A1", "msr jnt trq a 1"),
+        ("tau_mNm", "tau mnm"),
+        ("--", ""),
+    ] {
+        let found: Vec<String> = words(name).into_iter().map(|word| word.text).collect();
+        assert_eq!(found.join(" "), spoken, "{name}");
+    }
 }
 
 #[test]
@@ -37,7 +38,7 @@ fn a_word_for_torque_is_no_current_and_letters_of_axes_are_no_units() {
 }
 
 #[test]
-fn words_tell_roles_and_commands_and_joints() {
+fn words_say_roles_and_commands_and_joints() {
     use ChannelRole::*;
     for (name, role_, command, joint_) in [
         ("positions_0", Some(Position), false, "0"),
