@@ -32,12 +32,13 @@ impl Aim {
     /// `weak`, or `EFFECT:JOINT`.
     pub fn of(text: &str, file: &RobotFile) -> Result<Self, CliError> {
         let Some((name, joint)) = text.split_once(':') else {
+            let wrong = format!(
+                "--for takes `weak` or EFFECT:JOINT, and not `{}`",
+                escape(text)
+            );
             return match text {
                 "weak" => Ok(Self::Weak),
-                _ => Err(CliError::usage(format!(
-                    "--for takes `weak` or EFFECT:JOINT, and not `{}`",
-                    escape(text)
-                ))),
+                _ => Err(CliError::usage(wrong)),
             };
         };
         let effect = entry(name).ok_or_else(|| {
@@ -66,8 +67,7 @@ impl Aim {
     }
 }
 
-/// Fundamental of a motion that uses positions and speeds alike \[Hz\]: of the middle coordinate, the frequency of a
-/// swing over all of its positions at its speed; that of other designs at most.
+/// Frequency of the middle coordinate's swing over its positions at its speed; that of other designs at most.
 pub(super) fn fundamental(machine: &ForeseenRobot) -> f64 {
     let of = |quantity, i| {
         let mut channels = machine.channels.iter();
