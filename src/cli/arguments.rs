@@ -18,7 +18,6 @@ pub enum Destination {
 }
 
 impl Destination {
-    /// The file, if it is one.
     pub fn file(&self) -> Option<&Path> {
         match self {
             Destination::Stdout => None,
@@ -47,7 +46,6 @@ pub struct LeaveOut {
 }
 
 impl LeaveOut {
-    /// The logs without the stretches.
     pub fn of(&self, logs: &[LogSpec]) -> Vec<LogSpec> {
         let mut logs = logs.to_vec();
         for log in &mut logs {

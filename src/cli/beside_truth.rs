@@ -52,7 +52,6 @@ impl BesideTruth {
     }
 }
 
-/// Reads the truth of simulated logs.
 pub fn load_truth(path: &Path) -> Result<TruthFile, CliError> {
     let unusable = |e: &dyn std::fmt::Display| {
         CliError::input(format!("{}: {e}", path.display())).hint(

@@ -19,7 +19,6 @@ use cft_ident_logs::output::Together;
 use cft_ident_report::report::{Detail, figure};
 use cft_ident_stages::identify::{self, Control};
 
-/// The circumstances of a run.
 #[derive(Debug)]
 pub struct Context {
     quiet: bool,
@@ -42,7 +41,6 @@ pub struct Context {
 /// What a command leaves beside its result.
 #[derive(Debug, Default)]
 struct Said {
-    /// The last page that was written.
     page: Option<PathBuf>,
     /// The error that ends the command once its results are written.
     ending: Option<CliError>,
@@ -140,7 +138,6 @@ impl Context {
         Ok(self.files.write(path, text.as_bytes())?)
     }
 
-    /// The page that was written, if one was.
     pub(super) fn page(&self) -> Option<PathBuf> {
         self.said().page.clone()
     }
@@ -166,7 +163,6 @@ impl Context {
         }
     }
 
-    /// The warnings so far.
     pub(super) fn warnings(&self) -> Vec<String> {
         self.said().warnings.clone()
     }
@@ -254,12 +250,10 @@ impl RunningBar {
         RunningBar { bar }
     }
 
-    /// `steps` more are done.
     pub fn advance(&self, steps: u64) {
         self.bar.inc(steps);
     }
 
-    /// What is being done now.
     pub fn label(&self, label: &str) {
         self.bar.set_message(label.to_owned());
     }

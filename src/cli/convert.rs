@@ -67,7 +67,6 @@ pub struct Converted {
     file: Option<String>,
 }
 
-/// The log that is being written.
 struct Target<'a> {
     path: &'a Path,
     writer: Option<LogWriter>,
@@ -135,7 +134,6 @@ impl Target<'_> {
     }
 }
 
-/// Converts one log as it stands.
 fn as_it_stands(
     spec: &LogSpec,
     args: &Args,
@@ -190,7 +188,6 @@ fn as_it_stands(
     Ok(log.provenance()?)
 }
 
-/// Converts the channels of a robot.
 fn of_robot(
     spec: &LogSpec,
     machine: &LoggedRobot,

@@ -192,7 +192,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     Ok(Outcome::new(report.text_for(context.detail), document))
 }
 
-/// A fault of the data as an error.
 fn at_fault(fault: &DataFault) -> CliError {
     CliError::input(stages::diagnose::at_fault(fault))
         .hint(fault.remedy.clone())

@@ -55,7 +55,6 @@ enum Content {
     Config(&'static str),
 }
 
-/// What is known of a machine.
 struct Machine {
     name: &'static str,
     what: &'static str,

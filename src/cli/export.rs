@@ -134,7 +134,6 @@ struct Written {
     what: String,
 }
 
-/// A file's name without folder and ending.
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
@@ -153,7 +152,6 @@ struct Format<'a> {
 /// The text of a format, of an arm and the lines at its head.
 type Text = fn(&Arm, &[String]) -> String;
 
-/// Those of the command line.
 fn formats(args: &Args) -> Vec<Format<'_>> {
     use export::{mjcf, sdf, usd};
     let all: [(&Option<PathBuf>, &'static str, Says, Text); 3] = [

@@ -14,7 +14,6 @@ use cft_ident_stages::identify::GivenModel;
 pub struct ReadFile<T> {
     /// The file as the user named it, for messages.
     pub name: String,
-    /// What it says.
     pub value: T,
     /// Its entry among the inputs of the result.
     pub provenance: Provenance,

@@ -73,9 +73,7 @@ pub struct Args {
 const FOLDER: &str = "cft-ident-run";
 /// Seed where none is named.
 const SEED: u64 = 1;
-/// What is run.
 struct Work {
-    /// Name of it.
     name: String,
     campaign: Campaign,
     /// Folder from which the campaign names its logs.
@@ -87,7 +85,6 @@ struct Work {
     draft: Option<String>,
     /// Its text, where it comes with the tool.
     shipped: Option<&'static str>,
-    /// What was guessed in it.
     guesses: Vec<String>,
     warnings: Vec<String>,
 }
@@ -143,7 +140,6 @@ fn is_urdf(file: &Path) -> bool {
 }
 
 impl Work {
-    /// A campaign file.
     fn of_campaign(file: &Path, warnings: Vec<String>) -> Result<Self, CliError> {
         let campaign = Campaign::load(file)?;
         let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
@@ -161,7 +157,6 @@ impl Work {
         })
     }
 
-    /// A robot and its logs.
     fn of_robot(
         file: &Path,
         args: &Args,
@@ -458,11 +453,9 @@ fn keep(
     }
 }
 
-/// Where the results go.
 struct Folder<'a> {
     path: &'a Path,
     context: &'a Context,
-    /// Names of what was written.
     files: Vec<String>,
 }
 

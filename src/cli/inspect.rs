@@ -209,7 +209,6 @@ thread_local! {
 /// Fields of a topic that a terminal shows.
 const SHOWN: usize = 12;
 
-/// The topics of recordings, in lines.
 fn topics_text(topics: &[TopicFacts]) -> String {
     let mut out = String::new();
     for topic in topics {

@@ -64,18 +64,16 @@ pub use error::CliError;
 pub use exit::Exit;
 pub use outcome::Outcome;
 
-/// Names of logs, as they are reported.
 fn names_of(specs: &[LogSpec]) -> Vec<String> {
     specs.iter().map(LogSpec::name).collect()
 }
 
-/// The name of a file without its folder.
 fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
-/// Their files.
+/// Files of logs.
 fn paths_of(specs: &[LogSpec]) -> impl Iterator<Item = &Path> {
     specs.iter().map(|log| log.path.as_path())
 }
@@ -409,7 +407,6 @@ mod tests {
         assert_eq!((args.seed, args.seconds), (3, Some(20.0)));
     }
 
-    /// Lines of a screen.
     const SCREEN: usize = 45;
 
     #[test]

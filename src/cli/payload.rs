@@ -59,7 +59,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     ))
 }
 
-/// A number with its interval.
 fn shown(x: &Number95) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
@@ -70,7 +69,6 @@ fn shown(x: &Number95) -> String {
     }
 }
 
-/// What a person has to know first.
 fn sentences(found: &Payload) -> Vec<String> {
     let mass = |gains_free: bool| {
         let reading = found.readings.iter().find(|of| of.gains_free == gains_free);
@@ -119,7 +117,6 @@ fn made_worse(reading: &PayloadReading) -> Option<String> {
     })
 }
 
-/// Both readings, for a person.
 fn text_of(found: &Payload, logs: &str) -> String {
     let caption = format!(
         "body on {} by {}, in the frame of that link, with 95 % intervals",

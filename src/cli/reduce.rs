@@ -117,7 +117,6 @@ fn in_file(log: &identify::ReducedLog) -> LogInFile {
     }
 }
 
-/// The file for a terminal.
 fn report(found: &ReducedLogs, result: &Reduced, args: &Args) -> Report {
     let columns = [
         ("log", Align::Left),

@@ -19,11 +19,9 @@ pub struct SetupArgs {
     pub as_declared: bool,
 }
 
-/// A set-up that was checked.
 pub struct Checked {
     /// The robot to go on with, and the logs.
     pub data: Dataset,
-    /// What was found, for the document.
     pub report: SetupReport,
     pub warnings: Vec<String>,
     /// The new robot file, where one is to be written.

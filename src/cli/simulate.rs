@@ -95,7 +95,6 @@ pub struct Args {
     pub output: PathBuf,
 }
 
-/// Simulates, and writes the log and its truth.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let truth_path = truth_beside(&args.output);
     let log = args.volts.as_ref().map(|log| &*log.path);
@@ -205,7 +204,6 @@ pub(super) fn simulate_to(
     Ok((simulated, rows.figures))
 }
 
-/// Writes rows as they come.
 struct ToFile<'a> {
     path: &'a Path,
     context: &'a Context,
@@ -262,7 +260,6 @@ pub(super) struct LogFigures {
     last_s: f64,
 }
 
-/// One column of it.
 #[derive(Debug)]
 struct ColumnFigures {
     name: String,

@@ -44,7 +44,6 @@ pub(super) fn line(arguments: &[OsString]) -> String {
     words.join(" ")
 }
 
-/// Logs one after the other.
 pub(super) fn logs(all: impl Iterator<Item = String>) -> String {
     all.map(|log| quoted(&log)).collect::<Vec<_>>().join(" ")
 }

@@ -81,7 +81,6 @@ fn residual_row(r: &Reconstructed, band: bool) -> impl Iterator<Item = f64> {
     std::iter::once(r.t).chain(columns)
 }
 
-/// Errors of simulated positions, for a person.
 fn drifts(found: &OpenLoop) -> String {
     let mut table = Table::new(&[
         ("joint", Align::Left),

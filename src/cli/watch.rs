@@ -44,7 +44,6 @@ pub struct Args {
     pub output: Option<PathBuf>,
 }
 
-/// Where rows go.
 enum Sink {
     Lines(Lines),
     /// A line an alarm, and where the watch stands.
@@ -53,7 +52,6 @@ enum Sink {
     None,
 }
 
-/// What a person at a terminal sees.
 struct People {
     /// Whether an alarm is on.
     on: bool,
@@ -132,7 +130,6 @@ fn torque(joint: &str, external: f64, std: f64) -> String {
     format!("{{\"joint\":{joint},\"external\":{external:.5e},\"std\":{std:.5e}}}")
 }
 
-/// A name as a JSON string.
 fn in_json(name: &str) -> String {
     serde_json::Value::from(name).to_string()
 }
@@ -237,7 +234,6 @@ fn put(sink: &mut Sink, line: &WatchLine) -> Result<bool, CliError> {
     Ok(true)
 }
 
-/// How much was seen, in a line.
 fn verdict(found: &Watched) -> String {
     let alarms = found.alarms.len();
     format!(
@@ -249,7 +245,6 @@ fn verdict(found: &Watched) -> String {
     )
 }
 
-/// What was seen, for a person.
 fn text_of(found: &Watched, log: &str) -> String {
     let mut table = Table::new(&[
         ("joint", Align::Left),

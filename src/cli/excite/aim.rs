@@ -14,7 +14,6 @@ use cft_ident_stages::identify::LoggedRobot;
 /// Samples of a period of the motion that stands for a usual one.
 const SAMPLES_PER_PERIOD: usize = 100;
 
-/// What the next motion is for.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Aim {
     /// The parameters that are not identified.

@@ -8,7 +8,6 @@ use cft_ident_plant::excite::{
     GivenInformation, Judgement, LawForeseen, Motion, MotionTerms, judge,
 };
 
-/// Judges a motion by the limits given.
 pub(super) fn judged(
     bench: &Bench,
     motion: &Motion,

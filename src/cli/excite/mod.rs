@@ -193,7 +193,6 @@ impl From<ExciteError> for CliError {
     }
 }
 
-/// What a run works on.
 struct Bench<'a> {
     args: &'a Args,
     context: &'a Context,
@@ -208,7 +207,6 @@ struct Bench<'a> {
     inputs: Vec<Provenance>,
 }
 
-/// Designs or checks.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all = Names::of(args);
     let read = [&args.robot, &args.model, &args.check, &args.offsets];

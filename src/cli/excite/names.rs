@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use super::Args;
 
-/// Files of one motion.
 pub(super) struct Names {
     pub trajectory: Option<PathBuf>,
     pub samples: Option<PathBuf>,

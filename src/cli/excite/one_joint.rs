@@ -25,7 +25,6 @@ pub(super) fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
     }
 }
 
-/// Designs the one-joint experiment of a joint.
 pub(super) fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError> {
     let bar = bench.context.progress("designing", None);
     let task = ladder_task(bench, joint);

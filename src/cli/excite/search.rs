@@ -27,7 +27,6 @@ pub(super) fn task(bench: &mut Bench) -> Result<Task, CliError> {
     })
 }
 
-/// The search, with its bar.
 pub(super) fn searched(bench: &Bench, task: &Task) -> Result<FoundMotion, CliError> {
     let context = bench.context;
     let bar = context.progress("designing", Some(task.most_evaluations()));
@@ -54,7 +53,6 @@ pub(super) fn blended(bench: &Bench, series: Series) -> Result<(Motion, FourierS
     Ok((Motion::Periodic { series, blend }, fourier))
 }
 
-/// Offsets that a file fixes.
 fn offsets(bench: &mut Bench) -> Result<Vec<Option<f64>>, CliError> {
     let n = bench.machine.coordinates();
     let Some(path) = &bench.args.offsets else {

@@ -62,7 +62,6 @@ pub(super) fn rate(text: &str) -> Result<f64, String> {
     rate.ok_or_else(|| "give a number above 0".to_owned())
 }
 
-/// What the robot is, as far as it can be seen.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shape {
     /// A URDF beside the robot file, by the path that the file will hold.
@@ -309,7 +308,6 @@ pub(super) fn describe(
 /// Lines of a terminal that say what is to be looked at.
 const CHECKS: usize = 5;
 
-/// What is to be looked at, in a few lines.
 fn checks_in_lines(checks: &[&String]) -> String {
     let shown = match checks.len() > CHECKS {
         true => CHECKS - 1,

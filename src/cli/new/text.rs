@@ -9,7 +9,6 @@ use cft_ident_files::config::{Capsules, UrdfChain};
 use cft_ident_logs::log::{escape, list};
 use cft_ident_logs::mapping::{ClockSource, JointColumns, Mapping, SeenColumns};
 
-/// What the text is made from.
 pub(super) struct Draft<'a> {
     pub name: String,
     pub shape: Shape,
@@ -51,7 +50,6 @@ impl Draft<'_> {
         Some((rate / 12.5).min(20.0))
     }
 
-    /// The whole file.
     pub(super) fn text(&self) -> String {
         let mut out = format!(
             "# {}: a robot file of cft-ident. SI units and radians.\n",

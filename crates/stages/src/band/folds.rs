@@ -339,7 +339,6 @@ fn is_linear(effect: &Added) -> bool {
     effect.law.entry.role != Role::Shift
 }
 
-/// The model a step further.
 fn moved(model: &AugmentedModel, layout: &Layout, step: &DVector<f64>) -> AugmentedModel {
     let mut out = model.clone();
     let theta = out.model.theta.iter_mut();

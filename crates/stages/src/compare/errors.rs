@@ -46,7 +46,6 @@ const PIECES: usize = 30;
 const FEWEST: usize = 12;
 /// Rows of a piece, at least.
 const MIN_PIECE_ROWS: usize = 10;
-/// Seed of the bootstrap.
 const SEED: u64 = 19_890_901;
 
 /// Of one joint over one piece: squared errors of both, squared torque.

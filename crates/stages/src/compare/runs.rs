@@ -87,7 +87,6 @@ pub struct VerdictChange {
     pub b: Option<String>,
 }
 
-/// What one document says.
 #[derive(Default)]
 struct Said {
     parameters: Vec<ParameterEntry>,
@@ -138,7 +137,6 @@ pub fn runs(a: (&str, &Value), b: (&str, &Value)) -> Result<RunDifference, DiffE
     })
 }
 
-/// The command that wrote a document.
 fn command((file, document): (&str, &Value)) -> Result<String, DiffError> {
     let schema = document["schema"].as_str().unwrap_or_default();
     let mut parts = schema.split('/');

@@ -47,7 +47,6 @@ pub struct Quiet {
     pub step_s: f64,
 }
 
-/// A sample that was kept.
 #[derive(Clone, Copy)]
 struct Kept<'a> {
     gap: f64,

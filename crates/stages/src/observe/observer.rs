@@ -43,7 +43,6 @@ pub struct Observer {
     temperatures: Temperatures,
 }
 
-/// What is there once the sampling step is known.
 struct Core {
     plant: Sampled,
     smooth: Causal,

@@ -6,7 +6,6 @@ use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::dynamics::Dynamics;
 
-/// One axis in many windows.
 pub(super) struct Abreast<'a> {
     model: &'a AugmentedModel,
     dynamics: Dynamics,

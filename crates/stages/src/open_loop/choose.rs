@@ -195,7 +195,6 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// All samples.
     fn whole(&self) -> Vec<RunSpan> {
         let each = self.stretches.iter().enumerate();
         each.map(|(s, stretch)| (s, 0, stretch.len())).collect()

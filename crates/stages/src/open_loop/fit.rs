@@ -24,7 +24,6 @@ pub(super) const HOPS: usize = 4;
 const MOST_SAMPLES: usize = 500_000;
 /// Positions of a window that count.
 pub(super) const POSITIONS: usize = 50;
-/// Most steps that are tried.
 const MAX_STEPS: usize = 40;
 /// Share of the cost below which a step brings nothing.
 const MIN_COST_DECREASE: f64 = 1e-4;
@@ -111,12 +110,10 @@ fn side_by_side(
     Some(out)
 }
 
-/// Root mean square.
 pub(super) fn rms(e: &[f64]) -> f64 {
     (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt()
 }
 
-/// What a fit found.
 #[derive(Debug, Clone)]
 pub(super) struct Fitted {
     pub model: AugmentedModel,

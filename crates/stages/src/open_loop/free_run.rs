@@ -180,7 +180,6 @@ fn one(model: &AugmentedModel, stretch: &Stretch, (_, begin, end): RunSpan) -> O
     (follows && finite).then_some(sums)
 }
 
-/// The error over windows.
 fn error(windows: &[Sums]) -> PositionError {
     let sum = |of: fn(&Sums) -> f64| windows.iter().map(of).sum::<f64>();
     let square = sum(|s| s.square);

@@ -72,8 +72,9 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
             continue;
         }
         let mut follower = Follower::new(model, stretch, STEP_S);
-        let mut begin = 0;
-        while begin + size <= stretch.len() {
+        // the last sample of a window is the first of the next
+        let begins = (0..).step_by(size - 1);
+        for begin in begins.take_while(|begin| begin + size <= stretch.len()) {
             windows += 1;
             let end = begin + size;
             let follows = follower.run((begin, end), &mut |k, found| {
@@ -91,8 +92,6 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
                 }
             });
             astray += u64::from(!follows);
-            // the last sample of a window is the first of the next
-            begin += size - 1;
         }
     }
     let names = robot.joint_names().iter().zip(&sums).enumerate();

@@ -22,7 +22,6 @@ pub struct EffectRows {
     pub rows: Vec<[f64; 3]>,
 }
 
-/// The rows of an effect along some logs.
 pub(super) fn effect(
     replay: &Replay,
     model: &AugmentedModel,
@@ -149,7 +148,6 @@ impl OfSignal {
         }
     }
 
-    /// Name and unit.
     fn named(self, replay: &Replay, effect: &Added, joint: usize) -> (String, String) {
         let robot = &replay.machine.robot;
         let unit = |j: usize| robot.joint_kind(j).position_unit();

@@ -50,7 +50,6 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Names of some of the logs.
     fn named(&self, logs: &[usize]) -> Vec<String> {
         let names = logs.iter().filter_map(|log| self.names.get(*log));
         let mut names: Vec<String> = names.cloned().collect();
@@ -63,7 +62,6 @@ impl<'a> Replay<'a> {
         (0..self.names.len()).collect()
     }
 
-    /// Stretches of one log.
     fn of_log(&self, log: usize) -> impl Iterator<Item = &Stretch> {
         self.stretches.iter().filter(move |s| s.log == log)
     }

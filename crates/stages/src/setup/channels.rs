@@ -10,7 +10,6 @@ use cft_ident_core::robot::friction::sign;
 /// What the channels of a log are of.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drive {
-    /// Joints.
     Joints,
     /// Motors behind coupled gears, p = R q and tau = R' c: R and its inverse.
     Gears(DMatrix<f64>, DMatrix<f64>),

@@ -18,7 +18,6 @@ const STEP: f64 = 0.2;
 /// Newton steps to the best value.
 const STEPS: usize = 4;
 
-/// What is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Free {
     Factor(ChannelKind, usize),

@@ -71,7 +71,6 @@ pub(crate) struct SetupLimits {
     pub short_list: usize,
 }
 
-/// The numbers of the check.
 pub(crate) const LIMITS: SetupLimits = SetupLimits {
     unexplained: 0.5,
     sound: 0.25,

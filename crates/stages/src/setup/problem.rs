@@ -50,7 +50,6 @@ pub(super) struct Rows {
     /// Over all rows.
     pub total: Vec<DMatrix<f64>>,
     joints: Vec<JointRows>,
-    /// Rows of each block.
     of_blocks: Vec<Range<usize>>,
     /// Sums of each block, once they are asked for: most hypotheses are seen to be no better before.
     blocks: OnceLock<Vec<Vec<DMatrix<f64>>>>,

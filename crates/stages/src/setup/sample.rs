@@ -106,7 +106,6 @@ impl Sample {
         }
     }
 
-    /// Keeps these rows, in order.
     fn keep(&mut self, kept: &[usize]) {
         let width = OF_JOINT * self.joints;
         for (to, from) in kept.iter().enumerate() {
