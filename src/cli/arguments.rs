@@ -1,6 +1,5 @@
 //! Values on the command line that several commands share, and their parsers.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -19,7 +18,6 @@ pub enum Destination {
 }
 
 impl Destination {
-    /// The file, if it is one.
     pub fn file(&self) -> Option<&Path> {
         match self {
             Destination::Stdout => None,
@@ -39,15 +37,6 @@ impl FromStr for Destination {
     }
 }
 
-impl fmt::Display for Destination {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Destination::Stdout => f.write_str("-"),
-            Destination::File(path) => write!(f, "{}", path.display()),
-        }
-    }
-}
-
 /// Stretches of the logs that a command fits or judges which are to be left out.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct LeaveOut {
@@ -57,7 +46,6 @@ pub struct LeaveOut {
 }
 
 impl LeaveOut {
-    /// The logs without the stretches.
     pub fn of(&self, logs: &[LogSpec]) -> Vec<LogSpec> {
         let mut logs = logs.to_vec();
         for log in &mut logs {
@@ -70,10 +58,8 @@ impl LeaveOut {
 /// `8..10s`, or `8..10`.
 fn stretch(text: &str) -> Result<[f64; 2], String> {
     let wrong = || "is no stretch in seconds, such as 8..10s".to_owned();
-    let (from, to) = text
-        .trim_end_matches('s')
-        .split_once("..")
-        .ok_or_else(wrong)?;
+    let ends = text.trim_end_matches('s').split_once("..");
+    let (from, to) = ends.ok_or_else(wrong)?;
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
     match (number(from), number(to)) {
         (Some(from), Some(to)) if 0.0 <= from && from < to => Ok([from, to]),
@@ -81,33 +67,31 @@ fn stretch(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
+/// A number that `fits`, or what is wrong with it.
+pub(super) fn number(text: &str, wrong: &str, fits: impl Fn(f64) -> bool) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if fits(value) => Ok(value),
+        Ok(_) => Err(wrong.to_owned()),
+        Err(_) => Err("is not a number".to_owned()),
+    }
+}
+
 /// A finite number above zero (a duration, a limit).
 pub(super) fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if is_usable(value) && value >= SMALLEST => Ok(value),
-        Ok(_) => Err(format!(
-            "must be a number above 0, from {SMALLEST:e} to {LARGEST:e}"
-        )),
-        Err(_) => Err("is not a number".into()),
-    }
+    let wrong = format!("must be a number above 0, from {SMALLEST:e} to {LARGEST:e}");
+    number(text, &wrong, |x| is_usable(x) && x >= SMALLEST)
 }
 
 /// A part of a whole: above 0, at most 1.
 pub(super) fn part(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value <= 1.0 => Ok(value),
-        Ok(_) => Err("must be above 0 and at most 1, the whole".into()),
-        Err(_) => Err("is not a number".into()),
-    }
+    let wrong = "must be above 0 and at most 1, the whole";
+    number(text, wrong, |x| x > 0.0 && x <= 1.0)
 }
 
 /// A finite number (a position, a speed).
 pub(super) fn finite(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if is_usable(value) => Ok(value),
-        Ok(_) => Err(format!("must be a number of at most {LARGEST:e}")),
-        Err(_) => Err("is not a number".into()),
-    }
+    let wrong = format!("must be a number of at most {LARGEST:e}");
+    number(text.trim(), &wrong, is_usable)
 }
 
 /// A log to be written: the ending chooses the format.
@@ -142,25 +126,25 @@ pub(super) fn estimator() -> impl TypedValueParser<Value = EstimatorKind> {
     })
 }
 
-const ESTIMATORS: [(EstimatorKind, &str); 5] = [
-    (
-        EstimatorKind::Wls,
-        "Rows weighted by each joint's noise, in two steps",
-    ),
-    (EstimatorKind::Ols, "All rows alike"),
-    (
-        EstimatorKind::Irls,
-        "Rows with large residuals count less: Huber's loss, then Tukey's bisquare",
-    ),
-    (
-        EstimatorKind::Iv,
-        "Instrumental variables: the regressor along simulated positions, blind to their noise",
-    ),
-    (
-        EstimatorKind::Oe,
-        "All parameters at once, the slopes of the friction law among them",
-    ),
-];
+const ESTIMATORS: [(EstimatorKind, &str); 5] = {
+    use EstimatorKind::{Irls, Iv, Oe, Ols, Wls};
+    [
+        (Wls, "Rows weighted by each joint's noise, in two steps"),
+        (Ols, "All rows alike"),
+        (
+            Irls,
+            "Rows with large residuals count less: Huber's loss, then Tukey's bisquare",
+        ),
+        (
+            Iv,
+            "Instrumental variables: the regressor along simulated positions, blind to their noise",
+        ),
+        (
+            Oe,
+            "All parameters at once, the slopes of the friction law among them",
+        ),
+    ]
+};
 
 #[cfg(test)]
 mod tests {

@@ -52,7 +52,6 @@ impl BesideTruth {
     }
 }
 
-/// Reads the truth of simulated logs.
 pub fn load_truth(path: &Path) -> Result<TruthFile, CliError> {
     let unusable = |e: &dyn std::fmt::Display| {
         CliError::input(format!("{}: {e}", path.display())).hint(
@@ -65,9 +64,7 @@ pub fn load_truth(path: &Path) -> Result<TruthFile, CliError> {
 
 /// The truth of a parameter, where it is known.
 pub fn true_value(truth: Option<&TruthFile>, parameter: &Parameter) -> Option<f64> {
-    truth?
-        .parameters
-        .iter()
-        .find(|p| p.name == parameter.name && p.joint == parameter.joint)
-        .map(|p| p.value)
+    let mut known = truth?.parameters.iter();
+    let found = known.find(|p| p.name == parameter.name && p.joint == parameter.joint);
+    found.map(|p| p.value)
 }

@@ -13,17 +13,11 @@ pub(super) fn open(page: &Path) -> Result<(), CliError> {
         None if cfg!(target_os = "windows") => Command::new("explorer"),
         None => Command::new("xdg-open"),
     };
-    let begun = command
-        .arg(page)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn();
+    command.arg(page).stdin(Stdio::null());
+    let begun = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
     begun.map(drop).map_err(|error| {
-        CliError::output(format!(
-            "cannot open {} in a browser: {error}",
-            page.display()
-        ))
-        .hint("open it by hand, or name a browser in the environment variable BROWSER")
+        let page = page.display();
+        CliError::output(format!("cannot open {page} in a browser: {error}"))
+            .hint("open it by hand, or name a browser in the environment variable BROWSER")
     })
 }

@@ -16,15 +16,13 @@ pub(super) const ROBOT: &str = "configs/cft.toml";
 /// Designed by `excite` for all parameters; it ends by itself, after about 40 s.
 const EXCITATION: &str = "configs/cft-excitation.toml";
 const UNSEEN: &str = "configs/cft-validation.toml";
-/// What the plant of the campaign has and its declared model lacks: the ripple of a screw, some times
-/// as strong as the noise.
+/// The plant has it and the declared model lacks it: the ripple of a screw, some times as strong as the noise.
 const EFFECT: &str = "ripple:q1:order=14,sin=1.2,cos=0.6";
 /// Length of a one-joint experiment and of the unseen motion [s].
 const ONE_JOINT_S: f64 = 20.0;
 const UNSEEN_S: f64 = 20.0;
 
-/// Simulates the campaign into `folder` and writes its campaign file; returns the names of the files
-/// and the warnings of the simulations.
+/// Simulates the campaign into `folder` and writes its campaign file; names of the files, and warnings.
 pub(super) fn simulate(
     folder: &Path,
     seed: u64,
@@ -35,46 +33,38 @@ pub(super) fn simulate(
     let unseen = Trajectory::load(Path::new(UNSEEN))?;
     let joints = robot.joint_names();
     let moves: Vec<String> = joints.iter().map(|j| format!("{j}.csv")).collect();
-    let mut orders: Vec<(String, Experiment, Option<f64>)> = joints
-        .iter()
-        .zip(&moves)
-        .map(|(joint, log)| (log.clone(), Experiment::of_joint(joint), Some(ONE_JOINT_S)))
-        .collect();
-    orders.push((
-        "identification.csv".into(),
-        Experiment::Trajectory(&excitation),
-        None,
-    ));
-    orders.push((
-        "unseen.csv".into(),
-        Experiment::Trajectory(&unseen),
-        Some(UNSEEN_S),
-    ));
+    let each = joints.iter().zip(&moves);
+    let each = each.map(|(joint, log)| (&**log, Experiment::of_joint(joint), Some(ONE_JOINT_S)));
+    let excitation = Experiment::Trajectory(&excitation);
+    let unseen = Experiment::Trajectory(&unseen);
+    let whole = [
+        ("identification.csv", excitation, None),
+        ("unseen.csv", unseen, Some(UNSEEN_S)),
+    ];
+    let orders: Vec<(&str, Experiment, Option<f64>)> = each.chain(whole).collect();
     let effects = vec![EFFECT.parse::<EffectSpec>().map_err(CliError::input)?];
     let bar = context.progress("simulating the campaign", Some(orders.len() as u64));
-    let said: Vec<Result<Vec<String>, CliError>> = orders
-        .par_iter()
-        .enumerate()
-        .map(|(i, (log, experiment, seconds))| {
-            let order = Order {
-                robot: &robot,
-                model: None,
-                experiment: *experiment,
-                seconds: *seconds,
-                effects: effects.clone(),
-                // every experiment has noise of its own
-                seed: seed.wrapping_mul(1000).wrapping_add(i as u64),
-            };
-            let (simulated, _) = simulate_to(&order, None, &folder.join(log), context)?;
-            bar.advance(1);
-            let named = warnings(&simulated);
-            Ok(named.into_iter().map(|w| format!("{log}: {w}")).collect())
-        })
-        .collect();
+    let simulated = |(i, (log, experiment, seconds)): (usize, &(&str, Experiment, Option<f64>))| {
+        let order = Order {
+            robot: &robot,
+            model: None,
+            experiment: *experiment,
+            seconds: *seconds,
+            effects: effects.clone(),
+            // every experiment has noise of its own
+            seed: seed.wrapping_mul(1000).wrapping_add(i as u64),
+        };
+        let (simulated, _) = simulate_to(&order, None, &folder.join(log), context)?;
+        bar.advance(1);
+        let named = warnings(&simulated);
+        Ok(named.into_iter().map(|w| format!("{log}: {w}")).collect())
+    };
+    let each = orders.par_iter().enumerate();
+    let said: Vec<Result<Vec<String>, CliError>> = each.map(simulated).collect();
     let mut files = vec!["campaign.toml".to_owned(), "robot.toml".to_owned()];
     for (log, ..) in &orders {
         let truth = truth_beside(Path::new(log));
-        files.extend([log.clone(), truth.display().to_string()]);
+        files.extend([(*log).to_owned(), truth.display().to_string()]);
     }
     let said = said.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
     let campaign = Campaign {
@@ -98,6 +88,6 @@ pub(super) fn simulate(
     context.write_text(&folder.join("robot.toml"), &robot_text)?;
     context.write_text(&folder.join("campaign.toml"), &format!("{head}{text}"))?;
     // what is identified next reads them
-    context.files().commit()?;
+    context.files.commit()?;
     Ok((files, said))
 }

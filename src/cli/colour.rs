@@ -18,8 +18,7 @@ const WORDS: [(&str, &str); 7] = [
     ("worse", RED),
 ];
 
-/// Whether standard output takes colour: a terminal that is not dumb, unless NO_COLOR is set;
-/// CLICOLOR_FORCE asks for it anywhere.
+/// Whether standard output takes colour: a terminal that is not dumb, without NO_COLOR; or CLICOLOR_FORCE.
 pub(super) fn wanted() -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let forced = std::env::var_os("CLICOLOR_FORCE").is_some_and(|value| value != "0");
@@ -42,10 +41,10 @@ pub(super) fn coloured(text: &str, met: bool) -> String {
         out += &format!("\u{1b}[{style}m{line}\u{1b}[0m\n");
     }
     // the line end is there already
-    let rest = rest
-        .strip_prefix('\n')
-        .filter(|_| !first.is_empty())
-        .unwrap_or(rest);
+    let rest = match first {
+        "" => rest,
+        _ => &rest[1..],
+    };
     let mut in_table = false;
     for line in rest.split_inclusive('\n') {
         in_table = line.starts_with("--") || in_table && !line.trim().is_empty();

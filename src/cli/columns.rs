@@ -63,13 +63,11 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, V
     }
     let missing = temperatures(log, machine, &mut known);
     let columns = known.into_iter().enumerate();
-    let channels = columns
-        .filter(|(column, _)| Some(*column) != time)
-        .map(|(column, planned)| planned.unwrap_or_else(|| other(log, column)))
-        .collect();
+    let channels = columns.filter(|(column, _)| Some(*column) != time);
+    let channels = channels.map(|(column, known)| known.unwrap_or_else(|| other(log, column)));
     let plan = ColumnPlan {
         time: time.map(|time| (time, seconds)),
-        channels,
+        channels: channels.collect(),
         keep: machine.file.log.keep.clone(),
         held: None,
         band_hz: Some(machine.settings().cutoff_hz),
@@ -97,24 +95,12 @@ fn temperatures(
             );
             let remedy =
                 "name the right column in [log.joint] of the robot file, or take the key out";
-            let kind = FaultKind::MissingChannel;
-            missing.push(LogFault::whole(
-                Severity::Warning,
-                kind,
-                0.0,
-                effect,
-                remedy,
-            ));
+            missing.push(missing_channel(Severity::Warning, effect, remedy));
             continue;
         };
         let (name, role) = (&log.names()[column], ChannelRole::Temperature);
-        known[column] = Some(ChannelColumn {
-            column,
-            factor: 1.0,
-            offset: 0.0,
-            wrap: None,
-            channel: InspectedChannel::new(name, role, Some(joint), Some("degC")),
-        });
+        let channel = InspectedChannel::new(name, role, Some(joint), Some("degC"));
+        known[column] = Some(as_it_is(column, channel));
     }
     missing
 }
@@ -176,6 +162,11 @@ fn place(
 fn other(log: &RawReader, column: usize) -> ChannelColumn {
     let mut channel = InspectedChannel::guessed(&log.names()[column]);
     channel.unit = log.unit(column).map(str::to_owned);
+    as_it_is(column, channel)
+}
+
+/// A column whose numbers are those of its channel.
+fn as_it_is(column: usize, channel: InspectedChannel) -> ChannelColumn {
     ChannelColumn {
         column,
         factor: 1.0,
@@ -237,12 +228,9 @@ fn limits(
 
 /// What keeps the strict reader from a log, as a fault.
 fn refusal(problem: ErrorText) -> LogFault {
-    let remedy = problem.remedies.join("; ");
-    LogFault::whole(
-        Severity::Error,
-        FaultKind::MissingChannel,
-        0.0,
-        problem.what,
-        &remedy,
-    )
+    missing_channel(Severity::Error, problem.what, &problem.remedies.join("; "))
+}
+
+fn missing_channel(severity: Severity, effect: String, remedy: &str) -> LogFault {
+    LogFault::whole(severity, FaultKind::MissingChannel, 0.0, effect, remedy)
 }

@@ -6,7 +6,7 @@ use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use indicatif::{
@@ -19,33 +19,43 @@ use cft_ident_logs::output::Together;
 use cft_ident_report::report::{Detail, figure};
 use cft_ident_stages::identify::{self, Control};
 
-/// The circumstances of a run.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Context {
     quiet: bool,
     json: Option<PathBuf>,
     bars: bool,
     interrupted: Arc<AtomicBool>,
-    command: String,
-    detail: Detail,
-    control: Control,
-    files: Arc<Together>,
-    /// The last page that was written.
-    page: Arc<Mutex<Option<PathBuf>>>,
-    /// The document goes to standard output.
-    prints: bool,
+    said: Mutex<Said>,
+    /// The command as it was typed, without folders from the root on and without what does not change a result.
+    pub(super) command: String,
+    /// How much of a result is shown.
+    pub(super) detail: Detail,
+    /// The document goes to standard output, and nothing else.
+    pub(super) prints_document: bool,
+    /// [`Context::interrupted`] and the progress bars, for a stage of [`identify`].
+    pub(super) control: Control,
+    /// The outputs, which get their names together when the command has ended well.
+    pub(super) files: Together,
+}
+
+/// What a command leaves beside its result.
+#[derive(Debug, Default)]
+struct Said {
+    page: Option<PathBuf>,
     /// The error that ends the command once its results are written.
-    ending: Arc<Mutex<Option<CliError>>>,
+    ending: Option<CliError>,
     /// Warnings that stand before those of the command's own result.
-    warnings: Arc<Mutex<Vec<String>>>,
+    warnings: Vec<String>,
 }
 
 impl Context {
-    /// A context that draws bars when standard error is a terminal that can move its cursor and
-    /// `quiet` is false.
-    /// `json` is the file of the JSON document; `interrupted` is set from outside when the run is to
-    /// stop.
-    pub fn new(quiet: bool, json: Option<&Path>, interrupted: Arc<AtomicBool>) -> Self {
+    /// Bars are drawn on a terminal; `json` is the file of the document, `interrupted` is set from outside.
+    pub fn new(
+        quiet: bool,
+        json: Option<&Path>,
+        interrupted: Arc<AtomicBool>,
+        arguments: &[OsString],
+    ) -> Self {
         let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
         let bars = !quiet && std::io::stderr().is_terminal() && !dumb;
         let flag = Arc::clone(&interrupted);
@@ -61,32 +71,17 @@ impl Context {
             json: json.map(Path::to_path_buf),
             bars,
             interrupted,
-            command: String::new(),
+            said: Mutex::default(),
+            command: typed::line(arguments),
             detail: Detail::Usual,
+            prints_document: false,
             control,
-            files: Arc::default(),
-            page: Arc::default(),
-            prints: false,
-            ending: Arc::default(),
-            warnings: Arc::default(),
+            files: Together::default(),
         }
     }
 
-    /// The same with the arguments that the command was called with, the program's name first.
-    pub fn called(mut self, arguments: &[OsString]) -> Self {
-        self.command = typed::line(arguments);
-        self
-    }
-
-    /// The same, with so much of a result shown.
-    pub fn showing(mut self, detail: Detail) -> Self {
-        self.detail = detail;
-        self
-    }
-
-    /// How much of a result is shown.
-    pub fn detail(&self) -> Detail {
-        self.detail
+    fn said(&self) -> MutexGuard<'_, Said> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What is shown of a result that is no report: all of it, or `brief` where little is asked for.
@@ -97,31 +92,14 @@ impl Context {
         }
     }
 
-    /// The same for a command whose document goes to standard output.
-    pub(super) fn printing(self, prints: bool) -> Self {
-        Context { prints, ..self }
-    }
-
-    /// Whether the document goes to standard output, and nothing else.
-    pub(crate) fn prints_document(&self) -> bool {
-        self.prints
-    }
-
     /// Ends the command with an error after its results are written.
-    pub(crate) fn end_with(&self, error: CliError) {
-        let mut ending = self.ending.lock().unwrap_or_else(PoisonError::into_inner);
-        *ending = Some(error);
+    pub(super) fn end_with(&self, error: CliError) {
+        self.said().ending = Some(error);
     }
 
     /// That error.
     pub(super) fn ending(&self) -> Option<CliError> {
-        let mut ending = self.ending.lock().unwrap_or_else(PoisonError::into_inner);
-        ending.take()
-    }
-
-    /// The command as it was typed, without folders from the root on and without what does not change a result.
-    pub fn command(&self) -> &str {
-        &self.command
+        self.said().ending.take()
     }
 
     /// Whether the user has asked to stop; long loops look at it between blocks.
@@ -129,59 +107,43 @@ impl Context {
         self.interrupted.load(Ordering::Relaxed)
     }
 
-    /// The same, and the progress bars, for a stage of [`identify`].
-    pub fn control(&self) -> &Control {
-        &self.control
-    }
-
     /// The flag behind [`Context::interrupted`], for a room that takes one.
-    pub(crate) fn stop_flag(&self) -> &AtomicBool {
+    pub(super) fn stop_flag(&self) -> &AtomicBool {
         &self.interrupted
     }
 
     /// [`Context::interrupted`] as an error, to be left with `?` before anything is written.
     pub fn check(&self) -> Result<(), CliError> {
-        if self.interrupted() {
-            Err(CliError::interrupted())
-        } else {
-            Ok(())
+        match self.interrupted() {
+            true => Err(CliError::interrupted()),
+            false => Ok(()),
         }
     }
 
-    /// Looks at the outputs of a command, the JSON document's file among them, before the long run.
-    /// A file that is renewed in place is not given in `inputs`.
-    pub(crate) fn check_outputs(
-        &self,
-        inputs: &[&Path],
-        outputs: &[&Path],
+    /// Looks at the outputs before the long run; a file that is renewed in place is not given in `inputs`.
+    pub(super) fn check_outputs<'a>(
+        &'a self,
+        inputs: impl IntoIterator<Item = &'a Path>,
+        outputs: impl IntoIterator<Item = &'a Path>,
     ) -> Result<(), CliError> {
-        let mut all = outputs.to_vec();
-        all.extend(self.json.as_deref());
-        outputs::check(inputs, &all)
-    }
-
-    /// The outputs, which get their names together when the command has ended well.
-    pub(crate) fn files(&self) -> &Together {
-        &self.files
+        let outputs = outputs.into_iter().chain(self.json.as_deref());
+        outputs::check(inputs, outputs)
     }
 
     /// Writes a text that gets its name with the other outputs.
-    pub(crate) fn write_text(&self, path: &Path, text: &str) -> Result<(), CliError> {
+    pub(super) fn write_text(&self, path: &Path, text: &str) -> Result<(), CliError> {
         if path.extension().is_some_and(|end| end == "html") {
-            let mut page = self.page.lock().unwrap_or_else(PoisonError::into_inner);
-            *page = Some(path.to_owned());
+            self.said().page = Some(path.to_owned());
         }
         Ok(self.files.write(path, text.as_bytes())?)
     }
 
-    /// The page that was written, if one was.
     pub(super) fn page(&self) -> Option<PathBuf> {
-        let page = self.page.lock().unwrap_or_else(PoisonError::into_inner);
-        page.clone()
+        self.said().page.clone()
     }
 
     /// Writes a figure, as SVG or as PNG by the path's ending.
-    pub(crate) fn write_picture(&self, path: &Path, svg: &str) -> Result<(), CliError> {
+    pub(super) fn write_picture(&self, path: &Path, svg: &str) -> Result<(), CliError> {
         let png = path
             .extension()
             .is_some_and(|end| end.eq_ignore_ascii_case("png"));
@@ -194,19 +156,15 @@ impl Context {
     }
 
     /// A warning about what was given, for the document and for standard error; once, however often it is found.
-    pub(crate) fn warn(&self, text: &str) {
-        let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
-        if !warnings.iter().any(|known| known == text) {
-            warnings.push(text.to_owned());
+    pub(super) fn warn(&self, text: &str) {
+        let mut said = self.said();
+        if !said.warnings.iter().any(|known| known == text) {
+            said.warnings.push(text.to_owned());
         }
     }
 
-    /// The warnings so far.
     pub(super) fn warnings(&self) -> Vec<String> {
-        self.warnings
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        self.said().warnings.clone()
     }
 
     /// A line on standard error for the person who waits; `-q` silences it.
@@ -292,17 +250,10 @@ impl RunningBar {
         RunningBar { bar }
     }
 
-    /// `steps` more are done.
     pub fn advance(&self, steps: u64) {
         self.bar.inc(steps);
     }
 
-    /// `steps` are done in all.
-    pub fn set(&self, steps: u64) {
-        self.bar.set_position(steps);
-    }
-
-    /// What is being done now.
     pub fn label(&self, label: &str) {
         self.bar.set_message(label.to_owned());
     }
@@ -329,7 +280,7 @@ mod tests {
     #[test]
     fn a_set_flag_ends_the_command_with_130() {
         let flag = Arc::new(AtomicBool::new(false));
-        let context = Context::new(true, None, Arc::clone(&flag));
+        let context = Context::new(true, None, Arc::clone(&flag), &[]);
         assert!(context.check().is_ok());
         flag.store(true, Ordering::Relaxed);
         let error = context.check().unwrap_err();

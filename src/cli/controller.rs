@@ -4,7 +4,7 @@ use super::CliError;
 use cft_ident_core::explain::Explain;
 use cft_ident_core::robot::model::Model;
 use cft_ident_export::export::ros2_control::{ControlledJoint, parameters};
-use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::escape;
 
 /// Parameters of ros2_control's joint_trajectory_controller for gains of this bandwidth; `name` is that of the model.
@@ -18,23 +18,17 @@ pub(super) fn ros2_control(
     let joint = |joint: &String| {
         let own = limits.get(joint);
         let Some([low, high]) = own.and_then(|own| own.position) else {
+            let joint = escape(joint);
             return Err(CliError::input(format!(
-                "{name}: the travel of {} is not known, in whose middle gains are computed",
-                escape(joint)
+                "{name}: the travel of {joint} is not known, in whose middle gains are computed"
             ))
             .hint(format!(
-                "write `[limits.{}] position = [low, high]` into the model file",
-                escape(joint)
+                "write `[limits.{joint}] position = [low, high]` into the model file"
             )));
         };
-        let called = file
-            .robot
-            .log
-            .joint
-            .get(joint)
-            .and_then(|of| of.name.clone());
+        let called = name_in_controller(&file.robot, joint);
         Ok(ControlledJoint {
-            name: called.unwrap_or_else(|| joint.clone()),
+            name: called.unwrap_or(joint).clone(),
             position: 0.5 * (low + high),
             effort: own.and_then(|own| own.torque),
         })
@@ -51,4 +45,9 @@ pub(super) fn ros2_control(
     );
     parameters(model, &joints, bandwidth_hz, &head)
         .map_err(|error| CliError::input(error.explanation().of(name)))
+}
+
+/// What the controller calls a joint, where it calls it otherwise.
+pub(super) fn name_in_controller<'a>(robot: &'a RobotFile, joint: &str) -> Option<&'a String> {
+    robot.log.joint.get(joint)?.name.as_ref()
 }

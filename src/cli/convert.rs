@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, arguments, columns, logs_of, names_of};
+use super::{
+    CliError, Context, Outcome, arguments, columns, columns_of, logs_of, names_of, paths_of,
+};
 use cft_ident_core::number;
 use cft_ident_logs::log::{
     Block, Instant, LogSection, LogSpec, Provenance, RawBlock, RawReader, Reader, escape,
@@ -65,7 +67,6 @@ pub struct Converted {
     file: Option<String>,
 }
 
-/// The log that is being written.
 struct Target<'a> {
     path: &'a Path,
     writer: Option<LogWriter>,
@@ -79,25 +80,20 @@ struct Target<'a> {
 impl Target<'_> {
     /// Begins the log, or goes on with it where it has the same columns.
     fn begin(&mut self, spec: &LogSpec, columns: Vec<String>) -> Result<(), CliError> {
+        let log = escape(&spec.name());
         for (index, name) in columns.iter().enumerate() {
             if columns[..index].contains(name) {
-                return Err(CliError::input(format!(
-                    "{}: two columns are called `{}`",
-                    escape(&spec.name()),
-                    escape(name)
-                ))
-                .hint("rename one of them: what is converted is found again by its name"));
+                let text = format!("{log}: two columns are called `{}`", escape(name));
+                return Err(CliError::input(text)
+                    .hint("rename one of them: what is converted is found again by its name"));
             }
         }
         if self.writer.is_none() {
             self.writer = Some(LogWriter::create(self.path, &columns)?);
             self.columns = columns;
         } else if self.columns != columns {
-            return Err(CliError::input(format!(
-                "{}: its columns are not those of the logs before it",
-                escape(&spec.name())
-            ))
-            .hint("convert it by itself"));
+            let text = format!("{log}: its columns are not those of the logs before it");
+            return Err(CliError::input(text).hint("convert it by itself"));
         }
         Ok(())
     }
@@ -105,10 +101,8 @@ impl Target<'_> {
     /// Appends a row whose time is counted from `origin`.
     fn row(
         &mut self,
-        spec: &LogSpec,
-        origin: Instant,
-        first: bool,
-        t: f64,
+        (spec, first): (&LogSpec, bool),
+        (origin, t): (Instant, f64),
         values: impl Iterator<Item = f64>,
     ) -> Result<(), CliError> {
         let Some(writer) = &mut self.writer else {
@@ -127,12 +121,11 @@ impl Target<'_> {
             false => origin.later(t).since(self.origin),
         };
         if first && self.rows > 0 && t <= self.last {
-            return Err(CliError::input(format!(
-                "{}: it begins at {t} s, before the log ahead of it ends at {} s",
-                escape(&spec.name()),
-                self.last
-            ))
-            .hint("give the logs in the order of time, or convert them one by one"));
+            let (log, end) = (escape(&spec.name()), self.last);
+            let text =
+                format!("{log}: it begins at {t} s, before the log ahead of it ends at {end} s");
+            return Err(CliError::input(text)
+                .hint("give the logs in the order of time, or convert them one by one"));
         }
         self.last = t;
         self.rows += 1;
@@ -141,7 +134,6 @@ impl Target<'_> {
     }
 }
 
-/// Converts one log as it stands.
 fn as_it_stands(
     spec: &LogSpec,
     args: &Args,
@@ -167,39 +159,35 @@ fn as_it_stands(
     let mut first = true;
     while log.read(&mut block)? {
         context.check()?;
-        let origin = log.origin();
         for (k, t) in block.t.iter().enumerate() {
             let values = others.iter().map(|column| block.columns[*column][k]);
-            target.row(spec, origin, first, *t, values)?;
+            target.row((spec, first), (log.origin(), *t), values)?;
             first = false;
         }
     }
     let lost = log.malformed();
+    let fields = "more or fewer fields than the header names";
     if lost > 0 && args.drop_rows {
-        warnings.push(format!(
-            "{name}: {lost} rows with more or fewer fields than the header names are left out"
-        ));
+        warnings.push(format!("{name}: {lost} rows with {fields} are left out"));
     } else if lost > 0 {
-        return Err(CliError::input(format!(
-            "{name}: {lost} rows have more or fewer fields than the header names"
-        ))
-        .hint("complete or delete these rows; write decimal points, not commas")
-        .hint("or leave them out: --drop-rows"));
+        return Err(
+            CliError::input(format!("{name}: {lost} rows have {fields}"))
+                .hint("complete or delete these rows; write decimal points, not commas")
+                .hint("or leave them out: --drop-rows"),
+        );
     }
     warnings.extend(log.warnings().iter().map(|text| format!("{name}: {text}")));
     for column in others {
-        let words = log.words(column);
+        let (words, column) = (log.words(column), escape(&log.names()[column]));
         if words > 0 {
             warnings.push(format!(
-                "{name}: {words} fields of `{}` are words and are left out: only numbers are kept",
-                escape(&log.names()[column])
+                "{name}: {words} fields of `{column}` are words and are left out: only numbers are kept"
             ));
         }
     }
     Ok(log.provenance()?)
 }
 
-/// Converts the channels of a robot.
 fn of_robot(
     spec: &LogSpec,
     machine: &LoggedRobot,
@@ -210,18 +198,12 @@ fn of_robot(
     let mut reader = Reader::open(spec, &machine.file.layout())?;
     let joints = machine.robot.joint_names();
     let n = joints.len();
-    let kinds: &[&str] = match reader.has_velocities() {
-        true => &["q", "tau", "dq"],
-        false => &["q", "tau"],
-    };
-    let named = kinds
-        .iter()
-        .flat_map(|kind| joints.iter().map(move |joint| format!("{kind}_{joint}")));
+    let kinds = &["q", "tau", "dq"][..if reader.has_velocities() { 3 } else { 2 }];
+    let mut columns = columns_of(kinds, joints);
     let warm = machine.file.temperature_layout();
     let warm = warm.map_or(Vec::new(), |(joints, _)| joints);
-    let temperatures = warm.iter().map(|j| format!("temperature_{}", joints[*j]));
-    let columns = std::iter::once("t".to_owned()).chain(named);
-    target.begin(spec, columns.chain(temperatures).collect())?;
+    columns.extend(warm.iter().map(|j| format!("temperature_{}", joints[*j])));
+    target.begin(spec, columns)?;
     let mut block = Block::default();
     let mut first = true;
     let mut courses = None;
@@ -235,7 +217,7 @@ fn of_robot(
             let parts = [&block.q, &block.tau, &block.dq].map(|x| x.get(k * n..(k + 1) * n));
             let values = parts.into_iter().flatten().flatten().copied();
             let values = values.chain(warm.iter().filter_map(|j| courses.as_ref()?.at(*j, *t)));
-            target.row(spec, origin, first, *t, values)?;
+            target.row((spec, first), (origin, *t), values)?;
             first = false;
         }
     }
@@ -243,10 +225,8 @@ fn of_robot(
     Ok(reader.provenance()?)
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
-    context.check_outputs(&inputs, &[args.output.as_path()])?;
+    context.check_outputs(paths_of(&args.logs), [&*args.output])?;
     let machine = args.robot.as_deref().map(LoggedRobot::load).transpose()?;
     let mut target = Target {
         path: &args.output,
@@ -258,9 +238,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         without_time: 0,
     };
     let bar = context.progress("converting", Some(args.logs.len() as u64));
-    let notes = machine.as_ref().map(|machine| machine.file.notes.0.clone());
-    let (mut warnings, mut provenance) = (notes.unwrap_or_default(), Vec::new());
-    let layout = machine.as_ref().map(|machine| machine.file.layout());
+    let file = machine.as_ref().map(|machine| &machine.file);
+    let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
+    let (layout, mut provenance) = (file.map(|file| file.layout()), Vec::new());
     warnings.extend(repeated_rows(&logs_of(&args.logs), layout.as_ref()));
     for spec in &args.logs {
         provenance.push(match &machine {
@@ -270,32 +250,26 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         bar.advance(1);
     }
     drop(bar);
+    let logs = names_of(&args.logs).join(", ");
     if target.rows == 0 {
-        let logs = names_of(&args.logs).join(", ");
         return Err(CliError::input(format!("{logs}: no row has a time"))
             .hint("check the time column, and the span"));
     }
-    if target.without_time > 0 && !args.drop_rows {
-        return Err(CliError::input(format!(
-            "{}: {} of {} rows have no time and would be lost",
-            names_of(&args.logs).join(", "),
-            target.without_time,
-            target.without_time + target.rows
-        ))
-        .hint("give them a time, or delete them")
-        .hint("or leave them out: --drop-rows"));
+    let lost = target.without_time;
+    if lost > 0 && !args.drop_rows {
+        let all = lost + target.rows;
+        let text = format!("{logs}: {lost} of {all} rows have no time and would be lost");
+        return Err(CliError::input(text)
+            .hint("give them a time, or delete them")
+            .hint("or leave them out: --drop-rows"));
     }
-    if target.without_time > 0 {
-        warnings.push(format!(
-            "{} rows without a time are left out",
-            target.without_time
-        ));
+    if lost > 0 {
+        warnings.push(format!("{lost} rows without a time are left out"));
     }
     let recording = LogForm::of(&args.output).is_some_and(LogForm::is_recording);
     if recording && machine.is_none() {
         for name in &target.columns {
-            let unit = columns::unit_of_joint(name);
-            if let Some(unit) = unit {
+            if let Some(unit) = columns::unit_of_joint(name) {
                 warnings.push(format!(
                     "`{}` is in {unit}, but others who open the recording take positions for rad or m and torques for Nm or N: give a robot file with -r to write SI units",
                     escape(name)
@@ -314,7 +288,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let document = Document::new("convert", &provenance, &warnings, &result)?;
     if let Some(writer) = target.writer {
-        context.files().add_log(writer)?;
+        context.files.add_log(writer)?;
     }
     let written = format!("written: {}", args.output.display());
     let all = format!(
@@ -323,9 +297,5 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         result.columns.len(),
         number::significant(duration, 5),
     );
-    Ok(Outcome {
-        text: context.text(all, &written),
-        document,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(context.text(all, &written), document))
 }

@@ -1,6 +1,6 @@
 //! `cft-ident diagnose`: what the torque residual still holds, and the effect behind it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup, typed,
@@ -73,35 +73,29 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let logs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
-    let inputs: Vec<&Path> = logs
-        .map(|l| l.path.as_path())
-        .chain([args.model.as_path()])
-        .chain(args.candidates.as_deref())
-        .collect();
+    let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
+    let files = [args.model.as_path()]
+        .into_iter()
+        .chain(args.candidates.as_deref());
+    let inputs = specs.clone().map(|l| l.path.as_path()).chain(files);
     let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
-    context.check_outputs(&inputs, &outputs)?;
+    context.check_outputs(inputs, outputs)?;
     let given = files::model(&args.model, context)?;
     let file = &given.value.file;
-    let machine = given.value.machine();
-    let machine = match args.as_declared {
-        true => machine.as_declared(),
-        false => machine,
-    };
+    let mut machine = given.value.machine();
+    if args.as_declared {
+        machine = machine.as_declared();
+    }
     let data = Dataset::new(&machine, &logs_of(&args.leave_out.of(&args.logs)))
         .with_veto(&logs_of(&args.veto))
         .with_held_out(&logs_of(&args.holdout));
-    let own = args
-        .candidates
-        .as_deref()
-        .map(files::candidates)
-        .transpose()?;
+    let own = args.candidates.as_deref();
+    let own = own.map(files::candidates).transpose()?;
     let settings = DiagnoseSettings {
         model: &given.value,
         keep: args.keep,
-        candidates: own.map(|given| given.value).unwrap_or_default(),
+        candidates: own.map_or(Vec::new(), |given| given.value),
         hold_friction: args.hold_friction,
         wishes: Wishes {
             cautious: args.cautious,
@@ -109,16 +103,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             accepted: args.accept.iter().map(|text| accepted(text)).collect(),
         },
     };
-    let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
     // before the logs are looked at
     settings.check_candidates()?;
     let report = setup::report(&data, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
-    let refused = fault.as_ref().filter(|_| !args.as_declared);
-    if let Some(fault) = refused {
+    if let Some(fault) = fault.as_ref().filter(|_| !args.as_declared) {
         return Err(at_fault(fault));
     }
-    let end = identify::diagnose(&data, &settings, context.control())?;
+    let end = identify::diagnose(&data, &settings, &context.control)?;
     let setup = report.findings;
     let found = match end {
         DiagnoseEnd::Diagnosed(found) => *found,
@@ -130,32 +122,26 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 let found = pictures::inspected(specs, &machine, context)?;
                 quality::section(&mut page, &found, &[]);
                 let (inputs, made_from) = ([given.provenance], &file.provenance.inputs);
-                let (robot, command) = (&machine.file, context.command());
+                let (robot, command) = (&machine.file, &context.command);
                 provenance::section(&mut page, robot, &inputs, made_from, None, command);
                 context.write_text(path, &report.html())?;
             }
-            return Ok(Outcome {
-                text: report.text_for(context.detail()),
-                document: Document::new(
-                    "diagnose",
-                    &[],
-                    &[],
-                    &DiagnosisResult {
-                        setup,
-                        ..fault.result()
-                    },
-                )?,
-                missed: Vec::new(),
-            });
+            let result = DiagnosisResult {
+                setup,
+                ..fault.result()
+            };
+            let document = Document::new("diagnose", &[], &[], &result)?;
+            return Ok(Outcome::new(report.text_for(context.detail), document));
         }
     };
     let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
     let plain = found.result(&machine);
     let result = DiagnosisResult {
         setup,
-        verdict: fault
-            .as_ref()
-            .map_or(plain.verdict, |_| DiagnosisVerdict::DataFault),
+        verdict: match fault {
+            Some(_) => DiagnosisVerdict::DataFault,
+            None => plain.verdict,
+        },
         faults: fault.into_iter().collect(),
         ..plain
     };
@@ -185,7 +171,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if let Some(path) = &args.report {
             let quality = pictures::inspected(specs, &machine, context)?;
             let mut page = report.page();
-            stages::diagnose::pictures(&mut page, &of, &replayed, &quality, context.command());
+            stages::diagnose::pictures(&mut page, &of, &replayed, &quality, &context.command);
             context.write_text(path, &report.html())?;
         }
     }
@@ -203,14 +189,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let written = format!("written: {}{unchanged}", path.display());
         report.terminal().line(&written);
     }
-    Ok(Outcome {
-        text: report.text_for(context.detail()),
-        document,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(report.text_for(context.detail), document))
 }
 
-/// A fault of the data as an error.
 fn at_fault(fault: &DataFault) -> CliError {
     CliError::input(stages::diagnose::at_fault(fault))
         .hint(fault.remedy.clone())

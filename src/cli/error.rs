@@ -41,11 +41,6 @@ impl CliError {
         Self::new(Exit::BadInput, problem)
     }
 
-    /// The data determine nothing that was asked (exit 4).
-    pub fn undetermined(problem: impl Into<ErrorText>) -> Self {
-        Self::new(Exit::Undetermined, problem)
-    }
-
     /// A result cannot be written (exit 5).
     pub fn output(problem: impl Into<ErrorText>) -> Self {
         Self::new(Exit::OutputFailed, problem)
@@ -162,8 +157,7 @@ impl From<JsonError> for CliError {
     }
 }
 
-/// Says something on standard error. A terminal gets lines that fit it; a file or a pipe gets one
-/// line for each message, as a script looks for it.
+/// A line on standard error, folded for a terminal; a file or a pipe gets one line for each message.
 pub(super) fn to_stderr(stderr: &mut dyn Write, text: &str) {
     // A closed standard error is no reason to lose a result.
     let _ = match std::io::stderr().is_terminal() {
@@ -172,8 +166,7 @@ pub(super) fn to_stderr(stderr: &mut dyn Write, text: &str) {
     };
 }
 
-/// Later lines of a message are indented, and control characters that a file's text may carry into
-/// it (escape sequences, say) are shown instead of being sent to the terminal.
+/// Later lines are indented, and control characters that a file's text may carry are shown.
 pub(super) fn indented(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.trim_end().chars() {
@@ -192,50 +185,41 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_that_holds_a_semicolon_stays_whole() {
-        let error = CliError::from(LogError::Empty {
+    fn an_error_shows_message_places_and_hints_each_on_a_line_of_its_own() {
+        let name = LogError::Empty {
             file: "my; log.csv".to_owned(),
-        });
-        assert_eq!(
-            error.to_string(),
-            "error: my; log.csv: is empty\nhint: record again, or check that the recorder closed the file"
-        );
-    }
-
-    #[test]
-    fn an_error_shows_message_place_and_hint_in_that_order() {
-        let error = CliError::input("time runs backwards: 0.013 s after 0.014 s")
-            .at("q4.csv:15")
-            .hint("sort the log by t");
-        assert_eq!(
-            error.to_string(),
-            "error: time runs backwards: 0.013 s after 0.014 s\n  --> q4.csv:15\nhint: sort the log by t"
-        );
-        assert_eq!(error.exit(), Exit::BadInput);
-    }
-
-    #[test]
-    fn control_characters_from_a_file_do_not_reach_the_terminal() {
-        let error = CliError::input("column \"\u{1b}[31mq1\" is unknown\nin the header");
-        assert_eq!(
-            error.to_string(),
-            "error: column \"\\u{1b}[31mq1\" is unknown\n  in the header"
-        );
-    }
-
-    #[test]
-    fn the_remedy_of_a_room_stands_on_a_line_of_its_own() {
-        let error = ConfigError::UnknownKey {
+        };
+        let room = ConfigError::UnknownKey {
             file: "cft.toml".into(),
             line: 12,
             key: "setpu".into(),
             remedy: "did you mean `setup`?".into(),
         };
-        let error = CliError::from(error);
-        assert_eq!(error.exit(), Exit::BadInput);
-        assert_eq!(
-            error.to_string(),
-            "error: cft.toml:12: unknown key `setpu`\nhint: did you mean `setup`?"
-        );
+        let time = CliError::input("time runs backwards: 0.013 s after 0.014 s");
+        for (case, error, expected) in [
+            (
+                "a semicolon in a name",
+                CliError::from(name),
+                "error: my; log.csv: is empty\nhint: record again, or check that the recorder closed the file",
+            ),
+            (
+                "message, place and hint",
+                time.at("q4.csv:15").hint("sort the log by t"),
+                "error: time runs backwards: 0.013 s after 0.014 s\n  --> q4.csv:15\nhint: sort the log by t",
+            ),
+            (
+                "control characters of a file",
+                CliError::input("column \"\u{1b}[31mq1\" is unknown\nin the header"),
+                "error: column \"\\u{1b}[31mq1\" is unknown\n  in the header",
+            ),
+            (
+                "the remedy of a room",
+                CliError::from(room),
+                "error: cft.toml:12: unknown key `setpu`\nhint: did you mean `setup`?",
+            ),
+        ] {
+            assert_eq!(error.to_string(), expected, "{case}");
+            assert_eq!(error.exit(), Exit::BadInput, "{case}");
+        }
     }
 }

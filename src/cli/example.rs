@@ -55,10 +55,11 @@ enum Content {
     Config(&'static str),
 }
 
-/// What is known of a measured machine.
-struct Measured {
+struct Machine {
+    name: &'static str,
     what: &'static str,
-    licence: &'static str,
+    /// Licence of its data; null of a simulation.
+    licence: Option<&'static str>,
     origin: &'static str,
     files: &'static [(&'static str, Content)],
     /// Commands to go on with; `{}` is the folder.
@@ -71,9 +72,10 @@ macro_rules! carried {
     };
 }
 
-static UR10: Measured = Measured {
+static UR10: Machine = Machine {
+    name: "ur10",
     what: "UR10, 6 joints, 27.5 s at 125 Hz; CSV, MCAP, URDF",
-    licence: "BSD-3-Clause",
+    licence: Some("BSD-3-Clause"),
     origin: "A measured motion of a UR10: /joint_states at 125 Hz, efforts of the controller [Nm].\n\
         Source: repository unisa-acg/inverse-dynamics-solver, commit 41e196de, BSD-3-Clause (LICENSE).\n\
         ur10.mcap holds its messages; ur10.csv the same numbers; ur10.urdf its ur10_robot.urdf.\n\
@@ -89,9 +91,10 @@ static UR10: Measured = Measured {
         cft-ident validate {}/ur10.csv@70..100% -m model.toml --report report.html\n",
 };
 
-static TX40: Measured = Measured {
+static TX40: Machine = Machine {
+    name: "tx40",
     what: "Staubli TX40, 6 joints, 6.3 s at 5 kHz; CSV, URDF",
-    licence: "Apache-2.0",
+    licence: Some("Apache-2.0"),
     origin: "A measured motion of a Staubli TX40, joint side [rad, Nm], at 5 kHz.\n\
         Source: repository thanhndv212/figaroh-examples, commit c0b5c7f0, examples/staubli_TX40,\n\
         Apache-2.0 (LICENSE, NOTICE).\n\
@@ -112,9 +115,10 @@ static TX40: Measured = Measured {
         cft-ident diagnose {}/tx40.csv -m model.toml -o refined.toml --report report.html\n",
 };
 
-static BLDC: Measured = Measured {
+static BLDC: Machine = Machine {
+    name: "bldc",
     what: "one motor with cogging, 30 s at 1 kHz; CSV",
-    licence: "BSD-3-Clause",
+    licence: Some("BSD-3-Clause"),
     origin: "A measured BLDC motor at constant speeds: position [rad] and current [A] at about 1 kHz. The\n\
         compensation of its cogging is switched on after half of the log.\n\
         Source: repository heitor-andrade/laas_anti_cogging, commit eb0391d7, BSD-3-Clause (LICENSE).\n\
@@ -129,38 +133,37 @@ static BLDC: Measured = Measured {
         --holdout {}/bldc.csv@23..29.5s --report report.html\n",
 };
 
-/// What is said of the simulated one.
-const CFT: &str = "CFT robot, 4 joints, simulated; a campaign of 6 logs";
-const CFT_NEXT: &str = "cft-ident identify {}/campaign.toml -o run\n";
+/// The simulated one: its files are made.
+static CFT: Machine = Machine {
+    name: "cft",
+    what: "CFT robot, 4 joints, simulated; a campaign of 6 logs",
+    licence: None,
+    origin: "",
+    files: &[],
+    next: "cft-ident identify {}/campaign.toml -o run\n",
+};
 /// Seed of its simulation: that of `identify`.
 const SEED: u64 = 1;
 
 impl ExampleMachine {
-    fn measured(self) -> Option<&'static Measured> {
+    fn machine(self) -> &'static Machine {
         match self {
-            ExampleMachine::Ur10 => Some(&UR10),
-            ExampleMachine::Tx40 => Some(&TX40),
-            ExampleMachine::Bldc => Some(&BLDC),
-            ExampleMachine::Cft => None,
+            ExampleMachine::Ur10 => &UR10,
+            ExampleMachine::Tx40 => &TX40,
+            ExampleMachine::Bldc => &BLDC,
+            ExampleMachine::Cft => &CFT,
         }
     }
+}
 
-    fn name(self) -> &'static str {
-        match self {
-            ExampleMachine::Ur10 => "ur10",
-            ExampleMachine::Tx40 => "tx40",
-            ExampleMachine::Bldc => "bldc",
-            ExampleMachine::Cft => "cft",
-        }
-    }
-
-    fn known(self) -> Known {
-        Known {
-            name: self.name(),
-            what: self.measured().map_or(CFT, |machine| machine.what),
-            licence: self.measured().map(|machine| machine.licence),
-        }
-    }
+/// All examples, in the order of the list.
+fn known() -> impl Iterator<Item = Known> {
+    let all = ExampleMachine::value_variants().iter();
+    all.map(|of| of.machine()).map(|machine| Known {
+        name: machine.name,
+        what: machine.what,
+        licence: machine.licence,
+    })
 }
 
 /// An example that can be written.
@@ -192,54 +195,40 @@ struct Written {
     next: Vec<String>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let text;
     let mut written = None;
-    match args.name {
+    match args.name.map(ExampleMachine::machine) {
         None => text = list(),
         Some(machine) => {
-            let folder = match &args.output {
-                Some(folder) => folder.clone(),
-                None => PathBuf::from(machine.name()),
-            };
+            let folder = args.output.clone();
+            let folder = folder.unwrap_or_else(|| PathBuf::from(machine.name));
             let files = write(machine, &folder, context)?;
             let shown = folder.display().to_string();
-            let next = machine.measured().map_or(CFT_NEXT, |machine| machine.next);
-            let next = next.replace("{}", shown.trim_end_matches('/'));
+            let next = machine.next.replace("{}", shown.trim_end_matches('/'));
             let listed = format!("written to {shown}: {}", files.join(", "));
             let then = next.trim_end().replace('\n', "\n  ");
             text = context.text(format!("{listed}\n\ngo on with:\n  {then}\n"), &listed);
             written = Some(Written {
-                name: machine.name(),
+                name: machine.name,
                 folder: shown,
                 files,
                 next: commands(&next),
             });
         }
     }
-    let examples = ExampleMachine::value_variants().iter().map(|m| m.known());
     let result = Examples {
-        examples: examples.collect(),
+        examples: known().collect(),
         written,
     };
-    Ok(Outcome {
-        document: Document::new("example", &[], &[], &result)?,
-        text,
-        missed: Vec::new(),
-    })
+    let document = Document::new("example", &[], &[], &result)?;
+    Ok(Outcome::new(text, document))
 }
 
 fn list() -> String {
-    let mut table = Table::new(&[
-        ("name", Align::Left),
-        ("machine", Align::Left),
-        ("licence", Align::Left),
-    ]);
-    for machine in ExampleMachine::value_variants() {
-        let known = machine.known();
-        table.row([known.name, known.what, known.licence.unwrap_or("")]);
-    }
+    let columns = ["name", "machine", "licence"].map(|name| (name, Align::Left));
+    let mut table = Table::new(&columns);
+    known().for_each(|known| table.row([known.name, known.what, known.licence.unwrap_or("")]));
     format!("{table}\ncft-ident example NAME writes it into the folder NAME\n")
 }
 
@@ -249,53 +238,39 @@ fn commands(next: &str) -> Vec<String> {
     whole.lines().map(str::to_owned).collect()
 }
 
-fn write(
-    machine: ExampleMachine,
-    folder: &Path,
-    context: &Context,
-) -> Result<Vec<String>, CliError> {
+fn write(machine: &Machine, folder: &Path, context: &Context) -> Result<Vec<String>, CliError> {
     let unusable = |e: &dyn std::fmt::Display| {
         CliError::output(format!("cannot write into {}: {e}", folder.display()))
             .hint("name another folder with -o")
     };
-    let Some(known) = machine.measured() else {
+    let make_folder = || context.files.make_folder(folder).map_err(|e| unusable(&e));
+    if machine.files.is_empty() {
         let robot = config::embedded(Path::new(campaign::ROBOT)).unwrap_or_default();
         stays(&folder.join("robot.toml"), robot.as_bytes())?;
-        context
-            .files()
-            .make_folder(folder)
-            .map_err(|e| unusable(&e))?;
+        make_folder()?;
         let (files, warnings) = campaign::simulate(folder, SEED, context)?;
         warnings.iter().for_each(|warning| context.warn(warning));
         return Ok(files);
-    };
-    let mut contents: Vec<(&str, Vec<u8>)> = Vec::with_capacity(known.files.len() + 1);
-    for (name, content) in known.files {
+    }
+    let mut contents: Vec<(&str, Vec<u8>)> = Vec::with_capacity(machine.files.len() + 1);
+    for (name, content) in machine.files {
         let bytes = match content {
             Content::Plain(bytes) => bytes.to_vec(),
             Content::Packed(bytes) => unpacked(bytes).map_err(|e| unusable(&e))?,
-            Content::Config(path) => config::embedded(Path::new(path))
-                .unwrap_or_default()
-                .as_bytes()
-                .to_vec(),
+            Content::Config(path) => config::embedded(Path::new(path)).unwrap_or_default().into(),
         };
         contents.push((name, bytes));
     }
-    contents.push(("README.txt", known.origin.as_bytes().to_vec()));
+    contents.push(("README.txt", machine.origin.into()));
     for (name, bytes) in &contents {
         stays(&folder.join(name), bytes)?;
     }
-    context
-        .files()
-        .make_folder(folder)
-        .map_err(|e| unusable(&e))?;
+    make_folder()?;
     for (name, bytes) in &contents {
-        context.files().write(&folder.join(name), bytes)?;
+        context.files.write(&folder.join(name), bytes)?;
     }
-    Ok(contents
-        .into_iter()
-        .map(|(name, _)| name.to_owned())
-        .collect())
+    let names = contents.iter().map(|(name, _)| (*name).to_owned());
+    Ok(names.collect())
 }
 
 /// A file that is there and says something else is the user's.

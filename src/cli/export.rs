@@ -11,10 +11,11 @@ use serde::Serialize;
 
 use self::words::{about_effects, beside_urdf, beyond_table, effects, never_driving};
 use super::files::ReadFile;
-use super::{CliError, Context, Outcome, arguments, controller, files};
+use super::{
+    CliError, Context, Outcome, arguments, controller, file_name, files, logs_of, paths_of,
+};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::no_torque;
-use cft_ident_core::motion::Stretch;
 use cft_ident_export::export::arm::{Arm, Says};
 use cft_ident_export::export::dissipative::below_zero;
 use cft_ident_export::export::left_out::{self, Elsewhere};
@@ -23,7 +24,7 @@ use cft_ident_files::config::{self, ModelFile, RobotFile, UrdfReplacement, repla
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, Log};
+use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, InMemory};
 
 const EXAMPLE: &str = "\
 Example:
@@ -133,15 +134,9 @@ struct Written {
     what: String,
 }
 
-/// A file's name without folder and ending.
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
-}
-
-fn name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
 }
 
 /// A format of a simulator that is asked for.
@@ -157,7 +152,6 @@ struct Format<'a> {
 /// The text of a format, of an arm and the lines at its head.
 type Text = fn(&Arm, &[String]) -> String;
 
-/// Those of the command line.
 fn formats(args: &Args) -> Vec<Format<'_>> {
     use export::{mjcf, sdf, usd};
     let all: [(&Option<PathBuf>, &'static str, Says, Text); 3] = [
@@ -180,57 +174,27 @@ fn formats(args: &Args) -> Vec<Format<'_>> {
     asked.collect()
 }
 
-/// The motion along which sizes are taken.
-#[derive(Default)]
-struct Along {
-    stretches: Vec<Stretch>,
-    names: Vec<String>,
-    inputs: Vec<Provenance>,
-    warnings: Vec<String>,
-}
-
-impl Along {
-    fn read(
-        args: &Args,
-        given: &ReadFile<GivenModel>,
-        context: &Context,
-    ) -> Result<Self, CliError> {
-        if args.logs.is_empty() {
-            return Ok(Self::default());
-        }
-        let machine = given.value.machine();
-        let logs: Vec<Log> = args.logs.iter().map(Log::from).collect();
-        let whole = identify::read_whole(&machine, &logs, context.control())?;
-        let refined = given.value.numbers()?;
-        machine.check_temperatures(&refined, &logs, &whole.stretches)?;
-        Ok(Self {
-            stretches: whole.stretches,
-            names: logs.iter().map(|log| escape(&log.name())).collect(),
-            inputs: whole.inputs,
-            warnings: whole.warnings,
-        })
+/// The motion along which sizes are taken, where logs are given.
+fn along(args: &Args, given: &GivenModel, context: &Context) -> Result<Option<InMemory>, CliError> {
+    if args.logs.is_empty() {
+        return Ok(None);
     }
+    let (machine, logs) = (given.machine(), logs_of(&args.logs));
+    let whole = identify::read_whole(&machine, &logs, &context.control)?;
+    machine.check_temperatures(&given.numbers()?, &logs, &whole.stretches)?;
+    Ok(Some(whole))
 }
 
 /// A URDF that stands for the robot, and the robot that it is read as.
-struct Source {
-    text: String,
-    robot: RobotFile,
-}
-
-fn source(path: &Path) -> Result<ReadFile<Source>, CliError> {
+fn source(path: &Path) -> Result<ReadFile<(String, RobotFile)>, CliError> {
     let shown = escape(&path.to_string_lossy());
-    let file = path.file_name().unwrap_or(path.as_os_str());
-    let file = file.to_string_lossy();
-    let text = config::text(path)?;
-    let section = toml::Value::from(&*file);
+    let (file, text) = (file_name(path), config::text(path)?);
+    let section = toml::Value::from(file.as_str());
     let robot = format!("[robot]\nmodel = \"serial\"\nurdf = {section}\n");
+    let robot = RobotFile::parse_in(&shown, &robot, path.parent())?;
     Ok(ReadFile {
         provenance: Provenance::of_text(&file, &text),
-        value: Source {
-            robot: RobotFile::parse_in(&shown, &robot, path.parent())?,
-            text,
-        },
+        value: (text, robot),
         name: shown,
     })
 }
@@ -242,16 +206,6 @@ fn controller_names(file: &ModelFile) -> BTreeMap<String, String> {
     named.collect()
 }
 
-/// The file, with or without its effects.
-fn without(file: &ModelFile, effects: bool) -> ModelFile {
-    let mut file = file.clone();
-    if effects {
-        file.effects.clear();
-    }
-    file
-}
-
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let side = args.urdf.as_ref().map(|path| path.with_extension("toml"));
     let formats = formats(args);
@@ -262,21 +216,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let outputs = [&args.urdf, &side, &args.c, &args.rust, &args.ros2_control];
     let outputs = outputs.into_iter().filter_map(|path| path.as_deref());
-    let beside = formats.iter().flat_map(|f| [f.path, f.side.as_path()]);
-    let outputs: Vec<&Path> = outputs.chain(beside).collect();
-    let logs = args.logs.iter().map(|log| log.path.as_path());
-    let inputs = logs.chain([args.model.as_path()]);
-    let inputs: Vec<&Path> = inputs.chain(args.urdf_source.as_deref()).collect();
-    context.check_outputs(&inputs, &outputs)?;
+    let outputs = outputs.chain(formats.iter().flat_map(|f| [f.path, &f.side]));
+    let inputs = paths_of(&args.logs).chain([&*args.model]);
+    context.check_outputs(inputs.chain(args.urdf_source.as_deref()), outputs)?;
     let given = files::model(&args.model, context)?;
     for effect in &given.value.file.effects {
         if let (Some(reason), false) = (no_torque(&effect.name), args.without_effects) {
-            return Err(CliError::input(format!(
-                "{}: the effect {} cannot be a torque: {reason}",
-                given.name,
-                escape(&effect.name)
-            ))
-            .hint("export the rest with --without-effects"));
+            let (file, effect) = (&given.name, escape(&effect.name));
+            let text = format!("{file}: the effect {effect} cannot be a torque: {reason}");
+            return Err(CliError::input(text).hint("export the rest with --without-effects"));
         }
     }
     let (refined, left_out) = match args.without_effects {
@@ -295,10 +243,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             return Err(CliError::usage("--observer belongs to --c and --rust"));
         }
         if args.without_effects && !left_out.is_empty() {
-            return Err(CliError::usage(
-                "the limits of --observer are those of the model with its effects",
-            )
-            .hint("leave --without-effects out, or fit a model without effects"));
+            let text = "the limits of --observer are those of the model with its effects";
+            let hint = "leave --without-effects out, or fit a model without effects";
+            return Err(CliError::usage(text).hint(hint));
         }
         let recipe = identify::watch_recipe(&given.value, 1.0 / rate_hz, args.false_alarms)?;
         program.observer = Some(recipe);
@@ -307,7 +254,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         format!(
             "Dynamic model written by cft-ident {} from {} (SHA-256 {}).",
             env!("CARGO_PKG_VERSION"),
-            escape(&name(&args.model)),
+            escape(&file_name(&args.model)),
             given.provenance.sha256
         ),
         "tau = Y(q, v, a) theta + F(v) + offset, SI units and radians.".to_owned(),
@@ -317,23 +264,28 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     lines.extend(about_effects(&program, &left_out));
     let never_driving = never_driving(&program);
     lines.extend(never_driving.iter().cloned());
-    let torque_units: Vec<String> = (0..program.joints.len())
-        .map(|j| given.value.file.robot.torque_unit(j).to_owned())
-        .collect();
-    let along = Along::read(args, &given, context)?;
+    let unit = |j: usize| given.value.file.robot.torque_unit(j).to_owned();
+    let torque_units = (0..program.joints.len()).map(unit).collect();
+    let along = along(args, &given.value, context)?;
+    let stretches = along.as_ref().map_or(&[][..], |along| &along.stretches);
+    let logs = args.logs.iter().map(|log| escape(&log.name()));
+    let logs: Vec<String> = logs.collect();
     let source = args.urdf_source.as_deref().map(source).transpose()?;
     let mut described = Vec::new();
     // every text is made before the first is written
     let mut texts: Vec<(&Path, &str, String)> = Vec::new();
     let mut beyond = Vec::new();
     if let (Some(path), Some(side)) = (&args.urdf, &side) {
-        let kept = without(&given.value.file, args.without_effects);
+        let mut kept = given.value.file.clone();
+        if args.without_effects {
+            kept.effects.clear();
+        }
         // of the model alone: effects are in the file beside it
         let arm = Arm::of(&kept, &AugmentedModel::plain(model.clone()));
-        let mut beside = true;
-        if let (Ok(arm), Some(source)) = (&arm, &source) {
-            beside = urdf_source::same_names(arm, &source.value.robot);
-        }
+        let beside = match (&arm, &source) {
+            (Ok(arm), Some(source)) => urdf_source::same_names(arm, &source.value.1),
+            _ => true,
+        };
         let elsewhere = match beside {
             true => Elsewhere::Beside,
             false => Elsewhere::Nowhere,
@@ -343,24 +295,21 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
         if let Ok(arm) = &arm {
             let says = export::sdf::SAYS;
-            let found = left_out::left_out(arm, &refined, says, &along.stretches);
-            urdf_lines.extend(left_out::lines(&found, &along.names, elsewhere));
+            let found = left_out::left_out(arm, &refined, says, stretches);
+            urdf_lines.extend(left_out::lines(&found, &logs, elsewhere));
         }
         let mut made =
-            export::urdf::urdf(&kept, model, &name(path), &urdf_lines).map_err(failed)?;
+            export::urdf::urdf(&kept, model, &file_name(path), &urdf_lines).map_err(failed)?;
         if let Some(source) = &source {
             let arm = arm.map_err(failed)?;
-            let replacement = urdf_source::replacement(
-                &arm,
-                &source.value.robot,
-                &source.name,
-                &controller_names(&given.value.file),
-            );
+            let (text, robot) = &source.value;
+            let names = controller_names(&given.value.file);
+            let replacement = urdf_source::replacement(&arm, robot, &source.name, &names);
             let replacement = UrdfReplacement {
                 notes: urdf_lines.clone(),
                 ..replacement.map_err(failed)?
             };
-            made.urdf = replaced_in_urdf(&source.name, &source.value.text, &replacement)?;
+            made.urdf = replaced_in_urdf(&source.name, text, &replacement)?;
         }
         texts.push((path, "URDF", made.urdf));
         if beside {
@@ -369,7 +318,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             described.push(format!(
                 "{}: joints have other names there than in the model, so no model file stands beside {}",
                 source.as_ref().map_or("", |source| source.name.as_str()),
-                name(path)
+                file_name(path)
             ));
         }
     }
@@ -377,20 +326,20 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let arm = Arm::of(&given.value.file, &refined).map_err(failed)?;
         for format in &formats {
             let says = format.says;
-            let found = export::left_out::left_out(&arm, &refined, says, &along.stretches);
+            let found = export::left_out::left_out(&arm, &refined, says, stretches);
             let mut head = base_lines.clone();
             if !left_out.is_empty() {
                 let all = left_out.join(", ");
                 head.push(format!("NOT in here, though the model has it: {all}."));
             }
             head.extend(below_zero(&given.value.file, model));
-            let side = export::left_out::side_file(&found, &head, &along.names).map_err(failed)?;
-            head.extend(left_out::lines(&found, &along.names, Elsewhere::Nowhere));
+            let side = export::left_out::side_file(&found, &head, &logs).map_err(failed)?;
+            head.extend(left_out::lines(&found, &logs, Elsewhere::Nowhere));
             head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
             texts.push((format.path, format.what, (format.text)(&arm, &head)));
             texts.push((&format.side, "what it cannot say", side));
             beyond.extend(found.into_iter().map(|part| Beyond {
-                file: name(format.path),
+                file: file_name(format.path),
                 what: part.what,
                 joint: part.joint,
                 percent_of_torque: part.percent_of_torque,
@@ -403,11 +352,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     if let Some(path) = &args.c {
         let prefix = export::header::identifier(&stem(path));
-        texts.push((
-            path,
-            "C99 header",
-            export::header::header(&program, &prefix, &note),
-        ));
+        let text = export::header::header(&program, &prefix, &note);
+        texts.push((path, "C99 header", text));
     }
     if let Some(path) = &args.rust {
         texts.push((path, "Rust module", export::module::module(&program, &note)));
@@ -425,10 +371,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     for (path, what, _) in &texts {
         table.row([path.display().to_string().as_str(), what]);
     }
-    let mut warnings: Vec<String> = match left_out.is_empty() {
-        true => Vec::new(),
-        false => vec![format!("left out: {}", left_out.join(", "))],
-    };
+    let mut warnings = Vec::new();
+    if !left_out.is_empty() {
+        warnings.push(format!("left out: {}", left_out.join(", ")));
+    }
     if args.urdf.is_some() || !formats.is_empty() {
         warnings.extend(below_zero(&given.value.file, model));
     }
@@ -436,7 +382,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         warnings.extend(never_driving);
     }
     let written = texts.iter().map(|(path, what, _)| Written {
-        file: name(path),
+        file: file_name(path),
         what: (*what).to_owned(),
     });
     let result = Exported {
@@ -447,16 +393,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut inputs = vec![given.provenance];
     inputs.extend(source.map(|source| source.provenance));
-    inputs.extend(along.inputs);
     warnings.extend(described);
-    warnings.extend(along.warnings);
-    let mut text = table.to_string();
-    text += &beyond_table(&result.beyond);
+    if let Some(along) = along {
+        inputs.extend(along.inputs);
+        warnings.extend(along.warnings);
+    }
+    let text = table.to_string() + &beyond_table(&result.beyond);
     let files: Vec<&str> = result.files.iter().map(|of| of.file.as_str()).collect();
     let brief = format!("written: {}", files.join(", "));
-    Ok(Outcome {
-        text: context.text(text, &brief),
-        document: Document::new("export", &inputs, &warnings, &result)?,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(
+        context.text(text, &brief),
+        Document::new("export", &inputs, &warnings, &result)?,
+    ))
 }

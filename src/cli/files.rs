@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::Context;
 use super::error::CliError;
+use super::{Context, file_name};
 use cft_ident_files::config::candidates::{self, CandidateSection};
 use cft_ident_files::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
 use cft_ident_logs::log::{Provenance, escape};
@@ -14,7 +14,6 @@ use cft_ident_stages::identify::GivenModel;
 pub struct ReadFile<T> {
     /// The file as the user named it, for messages.
     pub name: String,
-    /// What it says.
     pub value: T,
     /// Its entry among the inputs of the result.
     pub provenance: Provenance,
@@ -27,10 +26,9 @@ fn read<T>(
 ) -> Result<ReadFile<T>, CliError> {
     let name = escape(&path.to_string_lossy());
     let text = config::text_of_kind(path, wanted)?;
-    let file = path.file_name().unwrap_or(path.as_os_str());
     Ok(ReadFile {
         value: parse(&name, &text)?,
-        provenance: Provenance::of_text(&file.to_string_lossy(), &text),
+        provenance: Provenance::of_text(&file_name(path), &text),
         name,
     })
 }
@@ -48,11 +46,8 @@ pub fn model(path: &Path, context: &Context) -> Result<ReadFile<GivenModel>, Cli
         let file = ModelFile::parse_in(name, text, path.parent())?;
         Ok(GivenModel::new(name, file))
     })?;
-    (model.value.file.robot)
-        .notes
-        .0
-        .iter()
-        .for_each(|shown| context.warn(shown));
+    let notes = model.value.file.robot.notes.0.iter();
+    notes.for_each(|shown| context.warn(shown));
     Ok(model)
 }
 

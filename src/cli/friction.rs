@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
-    typed,
+    CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, paths_of, pictures,
+    setup, typed, written,
 };
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
@@ -51,23 +51,19 @@ pub struct Args {
     pub seed: u64,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
-    let mut outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());
-    outputs.extend(args.setup.fix_setup.as_deref());
-    context.check_outputs(&inputs, &outputs)?;
+    let outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());
+    let outputs = outputs.chain(args.setup.fix_setup.as_deref());
+    context.check_outputs(paths_of(&args.logs), outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
     let mut given = vec![robot.provenance];
-    let old = match &args.model {
-        None => None,
-        Some(path) => {
-            let model = files::model_of(path, &machine.file, context)?;
-            given.push(model.provenance);
-            Some(model.value.file)
-        }
-    };
+    let old = args.model.as_deref();
+    let old = old.map(|path| files::model_of(path, &machine.file, context));
+    let old = old.transpose()?.map(|model| {
+        given.push(model.provenance);
+        model.value.file
+    });
     let settings = FrictionSettings {
         joint: args.joint.clone(),
     };
@@ -75,11 +71,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
     let machine = &checked.data.machine;
-    let mut found = identify::friction(&checked.data, &settings, context.control())?;
+    let mut found = identify::friction(&checked.data, &settings, &context.control)?;
     found.setup.clone_from(&checked.report.findings);
-    found
-        .warnings
-        .splice(0..0, checked.warnings.iter().cloned());
+    let before = checked.warnings.iter().cloned();
+    found.warnings.splice(0..0, before);
     let model = found.model(machine, old.as_ref());
     let document = Document::new("friction", &found.inputs, &found.warnings, &found)?;
     let of = stages::friction::Friction {
@@ -93,7 +88,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(path) = &args.report {
         let quality = pictures::inspected(&args.logs, machine, context)?;
         let mut page = report.page();
-        stages::friction::pictures(&mut page, &of, &given, &quality, context.command());
+        stages::friction::pictures(&mut page, &of, &given, &quality, &context.command);
         context.check()?;
         context.write_text(path, &report.html())?;
     }
@@ -104,12 +99,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     checked.write(context)?;
     context.write_text(&args.output, &model.to_toml()?)?;
-    report
-        .terminal()
-        .line(&format!("written: {}", args.output.display()));
-    Ok(Outcome {
-        text: report.text_for(context.detail()),
-        document,
-        missed: Vec::new(),
-    })
+    written(&mut report, &args.output);
+    Ok(Outcome::new(report.text_for(context.detail), document))
 }

@@ -17,36 +17,20 @@ pub(super) fn parted(logs: &[LogSpec]) -> CampaignLogs {
         return out;
     }
     for log in logs {
+        let parts = |span: fn(f64, f64) -> Span, from: f64, to: f64| {
+            let middle = from + 0.01 * FITTED * (to - from);
+            Some([span(from, middle), span(middle, to)])
+        };
+        let percent = |from, to| Span::Percent { from, to };
         let parted = match log.span {
-            Span::Whole => Some((
-                Span::Percent {
-                    from: 0.0,
-                    to: FITTED,
-                },
-                Span::Percent {
-                    from: FITTED,
-                    to: 100.0,
-                },
-            )),
-            Span::Percent { from, to } => {
-                let middle = from + 0.01 * FITTED * (to - from);
-                Some((
-                    Span::Percent { from, to: middle },
-                    Span::Percent { from: middle, to },
-                ))
-            }
-            Span::Seconds { from, to } if to.is_finite() => {
-                let middle = from + 0.01 * FITTED * (to - from);
-                Some((
-                    Span::Seconds { from, to: middle },
-                    Span::Seconds { from: middle, to },
-                ))
-            }
-            Span::Seconds { .. } => None,
+            Span::Whole => parts(percent, 0.0, 100.0),
+            Span::Percent { from, to } => parts(percent, from, to),
+            Span::Seconds { to, .. } if to.is_infinite() => None,
+            Span::Seconds { from, to } => parts(|from, to| Span::Seconds { from, to }, from, to),
         };
         let part = |span: Span| log.of_span(span).to_string();
         match parted {
-            Some((fitted, rest)) => {
+            Some([fitted, rest]) => {
                 out.identification.push(part(fitted));
                 out.validation.push(part(rest));
             }

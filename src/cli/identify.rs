@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::beside_truth::{BesideTruth, load_truth, true_value};
 use super::{
-    CliError, Context, Outcome, campaign, held_out, logs_of, names_of, new, pictures, setup, typed,
-    validate,
+    CliError, Context, Outcome, campaign, file_name, held_out, logs_of, names_of, new, pictures,
+    setup, typed, validate,
 };
 use cft_ident_files::config::campaign::CampaignSettings;
 use cft_ident_files::config::{self, Campaign};
@@ -73,9 +73,7 @@ pub struct Args {
 const FOLDER: &str = "cft-ident-run";
 /// Seed where none is named.
 const SEED: u64 = 1;
-/// What is run.
 struct Work {
-    /// Name of it.
     name: String,
     campaign: Campaign,
     /// Folder from which the campaign names its logs.
@@ -87,12 +85,10 @@ struct Work {
     draft: Option<String>,
     /// Its text, where it comes with the tool.
     shipped: Option<&'static str>,
-    /// What was guessed in it.
     guesses: Vec<String>,
     warnings: Vec<String>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let of_robot = !args.logs.is_empty();
     let folder = args.output.clone().unwrap_or_else(|| match &args.robot {
@@ -116,7 +112,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         // read again below: no folder is made for a campaign that cannot be run
         Campaign::load(file)?;
     }
-    context.files().make_folder(&folder).map_err(|e| {
+    context.files.make_folder(&folder).map_err(|e| {
         CliError::output(format!("cannot make the folder {}: {e}", folder.display()))
             .hint("name another one with -o")
     })?;
@@ -144,17 +140,12 @@ fn is_urdf(file: &Path) -> bool {
 }
 
 impl Work {
-    /// A campaign file.
     fn of_campaign(file: &Path, warnings: Vec<String>) -> Result<Self, CliError> {
         let campaign = Campaign::load(file)?;
         let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
         let robot = resolve(&base, &campaign.robot);
         Ok(Self {
-            name: file
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            name: file_name(file),
             machine: LoggedRobot::load(&robot.to_string_lossy())?,
             campaign,
             base,
@@ -166,7 +157,6 @@ impl Work {
         })
     }
 
-    /// A robot and its logs.
     fn of_robot(
         file: &Path,
         args: &Args,
@@ -203,17 +193,16 @@ impl Work {
         };
         let logs = held_out::parted(&args.logs);
         if logs.validation.is_empty() {
-            warnings.push(
-                "no part of a log is held out: the error on data that were not fitted is not known"
-                    .to_owned(),
-            );
+            let text =
+                "no part of a log is held out: the error on data that were not fitted is not known";
+            warnings.push(text.to_owned());
         }
         let names = names_of(&args.logs).join(", ");
-        let of = file.file_name().unwrap_or_default().to_string_lossy();
+        let of = file_name(file);
         Ok(Self {
             name: format!("{of} with {names}"),
             campaign: Campaign {
-                robot: of.into_owned(),
+                robot: of,
                 truth: None,
                 logs,
                 settings: CampaignSettings {
@@ -235,10 +224,9 @@ impl Work {
 /// A path of a campaign file: relative to the file's folder, or a file that comes with the tool.
 fn resolve(base: &Path, path: &str) -> PathBuf {
     let beside = base.join(path);
-    if !beside.exists() && config::embedded(Path::new(path)).is_some() {
-        PathBuf::from(path)
-    } else {
-        beside
+    match !beside.exists() && config::embedded(Path::new(path)).is_some() {
+        true => PathBuf::from(path),
+        false => beside,
     }
 }
 
@@ -247,33 +235,25 @@ fn logs(
     specs: &[String],
     started: &BTreeMap<String, f64>,
 ) -> Result<Vec<LogSpec>, CliError> {
-    specs
-        .iter()
-        .map(|text| {
-            let mut spec = LogSpec::from_str(text)?;
-            let name = spec.path.to_string_lossy();
-            spec.started_s = started.get(name.as_ref()).copied().unwrap_or(0.0);
-            spec.path = base.join(&spec.path);
-            Ok(spec)
-        })
-        .collect()
+    let log = |text: &String| {
+        let mut spec = LogSpec::from_str(text)?;
+        let name = spec.path.to_string_lossy();
+        spec.started_s = started.get(name.as_ref()).copied().unwrap_or(0.0);
+        spec.path = base.join(&spec.path);
+        Ok(spec)
+    };
+    specs.iter().map(log).collect()
 }
 
 fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let Work {
-        name,
-        campaign,
-        base,
-        machine,
-        robot,
-        draft,
-        shipped,
-        mut guesses,
-        mut warnings,
-    } = work;
-    let (name, campaign, base) = (&*name, &campaign, &*base);
+    let (campaign, base) = (&work.campaign, &*work.base);
+    let (mut guesses, mut warnings) = (work.guesses, work.warnings);
     let roles = &campaign.logs;
-    let mut files: Vec<String> = Vec::new();
+    let mut out = Folder {
+        path: folder,
+        context,
+        files: Vec::new(),
+    };
     let one_joint = logs(base, &roles.friction, &roles.started)?;
     let mut training = logs(base, &roles.identification, &roles.started)?;
     let unseen = logs(base, &roles.validation, &roles.started)?;
@@ -282,32 +262,25 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     let fitted = typed::logs(training.iter().map(LogSpec::to_string));
     training.extend(one_joint.iter().cloned());
     let mut with_draft = args.setup.clone();
-    if draft.is_some() && !with_draft.as_declared {
+    if work.draft.is_some() && !with_draft.as_declared {
         // what was guessed of the columns gives way to what the torques say
-        with_draft.fix_setup = Some(robot.clone());
+        with_draft.fix_setup = Some(work.robot.clone());
     }
-    let checked = setup::checked(
-        Dataset::new(&machine, &logs_of(&training)),
-        (&robot, &[]),
-        &with_draft,
-        context,
-    )?;
+    let data = Dataset::new(&work.machine, &logs_of(&training));
+    let checked = setup::checked(data, (&work.robot, &[]), &with_draft, context)?;
     warnings.extend(checked.warnings.iter().cloned());
-    match (draft, &checked.new_file) {
-        (Some(text), None) => write((folder, context), "robot.toml", &text, &mut files)?,
+    match (work.draft, &checked.new_file) {
+        (Some(text), None) => out.write("robot.toml", &text)?,
         (Some(_), Some((_, text))) => {
-            guesses.extend(checked.report.refusals().map(|found| {
-                format!(
-                    "the torques contradict the names of the columns, and were followed: {}",
-                    found.in_words()
-                )
-            }));
-            write((folder, context), "robot.toml", text, &mut files)?;
+            let head = "the torques contradict the names of the columns, and were followed";
+            let refusals = checked.report.refusals();
+            guesses.extend(refusals.map(|found| format!("{head}: {}", found.in_words())));
+            out.write("robot.toml", text)?;
         }
         (None, _) => checked.write(context)?,
     }
-    if let Some(text) = shipped {
-        write((folder, context), "robot.toml", text, &mut files)?;
+    if let Some(text) = work.shipped {
+        out.write("robot.toml", text)?;
     }
     let machine = checked.data.machine;
     let data = Dataset {
@@ -319,9 +292,9 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         consistent: !campaign.settings.unconstrained,
         hold_friction: args.hold_friction,
     };
-    let control = context.control();
+    let control = &context.control;
     let found = identify::identify(&data, &settings, control, &mut |end| {
-        keep(end, &machine, &title, (folder, context), &mut files)
+        keep(end, &machine, &title, &mut out)
     })?;
     warnings.extend(found.warnings.iter().cloned());
     let (mut diagnosis, mut replayed_diagnosis) = (None, None);
@@ -337,10 +310,8 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     }
 
     // only now, with everything decided, may the truth be looked at
-    let truth = match &campaign.truth {
-        None => None,
-        Some(path) => Some(load_truth(&base.join(path))?),
-    };
+    let truth = campaign.truth.as_ref();
+    let truth = truth.map(|path| load_truth(&base.join(path))).transpose()?;
     let unseen_names = names_of(&unseen);
     let written = match found.refined {
         Some(_) => "refined.toml",
@@ -353,7 +324,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     };
     let of = stages::identify::Identify {
         machine: &machine,
-        campaign: name,
+        campaign: &work.name,
         found: &found,
         unseen: &unseen_names,
         truth: &|p| true_value(truth.as_ref(), p),
@@ -385,18 +356,18 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         inputs: &found.inputs,
         warnings: &warnings,
         quality: &pictures::inspected(all, &machine, context)?,
-        command: context.command(),
+        command: &context.command,
     };
     let mut page = report.page();
     stages::identify::pictures(&mut page, &of, shown, &origin);
     context.check()?;
     if let Some(replayed) = &replayed_diagnosis {
         let picture = residual::figure(&machine, &replayed.residual).svg();
-        write((folder, context), "residual.svg", &picture, &mut files)?;
+        out.write("residual.svg", &picture)?;
     }
-    write((folder, context), "report.html", &report.html(), &mut files)?;
-    write((folder, context), "summary.txt", &report.text(), &mut files)?;
-    files.push("result.json".into());
+    out.write("report.html", &report.html())?;
+    out.write("summary.txt", &report.text())?;
+    out.files.push("result.json".into());
     let latest = found.refined.as_ref().unwrap_or(&found.model);
     let result = Identified {
         setup: &checked.report.findings,
@@ -406,18 +377,17 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         validate: found.validated.as_ref(),
         diagnose: diagnosis,
         truth: truth.as_ref().map(|truth| BesideTruth::of(latest, truth)),
-        files,
+        files: out.files,
     };
     let document = Document::new("identify", &found.inputs, &warnings, &result)?;
     context.write_text(&folder.join("result.json"), &document.text())?;
-    let missed = found
-        .validated
+    let (limit, validated) = (campaign.settings.max_relative_error, &found.validated);
+    let missed = validated
         .as_ref()
-        .map(|found| validate::missed(found.judged(), campaign.settings.max_relative_error));
+        .map(|found| validate::missed(found.judged(), limit));
     Ok(Outcome {
-        text: report.text_for(context.detail()),
-        document,
         missed: missed.unwrap_or_default(),
+        ..Outcome::new(report.text_for(context.detail), document)
     })
 }
 
@@ -425,16 +395,15 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
 fn by_names(campaign: &Campaign) -> String {
     let mut named = campaign.clone();
     let logs = &mut named.logs;
-    for logs in [
+    let roles = [
         &mut logs.friction,
         &mut logs.identification,
         &mut logs.validation,
-    ] {
-        for log in logs {
-            if let Ok(spec) = LogSpec::from_str(log) {
-                let span = spec.span.label().map(|span| format!("@{span}"));
-                *log = spec.name() + &span.unwrap_or_default();
-            }
+    ];
+    for log in roles.into_iter().flatten() {
+        if let Ok(spec) = LogSpec::from_str(log) {
+            let span = spec.span.label().map(|span| format!("@{span}"));
+            *log = spec.name() + &span.unwrap_or_default();
         }
     }
     toml::to_string(&named).unwrap_or_default()
@@ -465,31 +434,35 @@ fn keep(
     end: StageEnd,
     machine: &LoggedRobot,
     unseen: &str,
-    folder: (&Path, &Context),
-    files: &mut Vec<String>,
+    out: &mut Folder,
 ) -> Result<(), CliError> {
     match end {
         StageEnd::Friction(found, model) => {
-            write(folder, "friction.toml", &model.to_toml()?, files)?;
-            let figure = stages::friction::figure(machine, found).svg();
-            write(folder, "friction.svg", &figure, files)
+            out.write("friction.toml", &model.to_toml()?)?;
+            out.write(
+                "friction.svg",
+                &stages::friction::figure(machine, found).svg(),
+            )
         }
-        StageEnd::Dynamics(_, model) => write(folder, "model.toml", &model.to_toml()?, files),
+        StageEnd::Dynamics(_, model) => out.write("model.toml", &model.to_toml()?),
         StageEnd::Validated(found) => {
             let figure = stages::validate::figure(&found.validation, unseen).svg();
-            write(folder, "validation.svg", &figure, files)
+            out.write("validation.svg", &figure)
         }
-        StageEnd::Refined(model) => write(folder, "refined.toml", &model.to_toml()?, files),
+        StageEnd::Refined(model) => out.write("refined.toml", &model.to_toml()?),
     }
 }
 
-fn write(
-    (folder, context): (&Path, &Context),
-    name: &str,
-    text: &str,
-    files: &mut Vec<String>,
-) -> Result<(), CliError> {
-    context.write_text(&folder.join(name), text)?;
-    files.push(name.to_owned());
-    Ok(())
+struct Folder<'a> {
+    path: &'a Path,
+    context: &'a Context,
+    files: Vec<String>,
+}
+
+impl Folder<'_> {
+    fn write(&mut self, name: &str, text: &str) -> Result<(), CliError> {
+        self.context.write_text(&self.path.join(name), text)?;
+        self.files.push(name.to_owned());
+        Ok(())
+    }
 }

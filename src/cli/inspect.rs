@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
+use super::{CliError, Context, Exit, Outcome, columns, logs_of, paths_of, setup};
 use cft_ident_core::robot::model::Model;
 use cft_ident_core::{motion, number};
 use cft_ident_files::config::ModelFile;
@@ -68,37 +68,31 @@ impl Known {
             let name = path.display().to_string();
             let file = ModelFile::load(path)?;
             let model = Some(file.model(&name)?);
-            let machine = LoggedRobot::new(&name, file.robot.clone());
+            let machine = LoggedRobot::new(&name, file.robot);
             return Ok(Some(Self { machine, model }));
         }
-        let load = |robot: &str| {
-            Ok(Self {
-                machine: LoggedRobot::load(robot)?,
-                model: None,
-            })
-        };
-        args.robot.as_deref().map(load).transpose()
+        let machine = args.robot.as_deref().map(LoggedRobot::load).transpose()?;
+        let model = None;
+        Ok(machine.map(|machine| Self { machine, model }))
     }
 }
 
-/// Looks at one log.
-fn inspect(
+/// What one log holds and what is wrong with it, by the robot file where there is one, and the log as it was read.
+fn looked_at(
     spec: &LogSpec,
     topic: Option<String>,
-    known: Option<&Known>,
+    machine: Option<&LoggedRobot>,
     context: &Context,
-    warnings: &mut Vec<String>,
-) -> Result<(Findings, Provenance), CliError> {
-    let machine = known.map(|known| &known.machine);
-    let layout = machine.map(|machine| machine.file.layout());
+) -> Result<(Findings, RawReader), CliError> {
     let section = LogSection {
         topic,
         ..LogSection::default()
     };
-    let mut log = match &layout {
-        Some(layout) => RawReader::open(spec, Some(layout))?,
-        None => RawReader::open_plain(spec, &section)?,
+    let open = || match machine {
+        Some(machine) => RawReader::open(spec, Some(&machine.file.layout())),
+        None => RawReader::open_plain(spec, &section),
     };
+    let mut log = open()?;
     let (plan, refused) = match machine {
         Some(machine) => columns::of_robot(&log, machine),
         None => columns::guessed(&mut log)?,
@@ -107,20 +101,35 @@ fn inspect(
     let found = look(&mut log, &plan, &stop)?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;
     if findings.hides() {
-        let mut again = match &layout {
-            Some(layout) => RawReader::open(spec, Some(layout))?,
-            None => RawReader::open_plain(spec, &section)?,
-        };
-        let found = look_again(&mut again, &plan, &findings, &stop)?;
+        let found = look_again(&mut open()?, &plan, &findings, &stop)?;
         findings = found.ok_or_else(CliError::interrupted)?;
     }
     findings.faults.splice(0..0, refused);
     findings.place();
-    warnings.extend(
-        log.warnings()
-            .iter()
-            .map(|text| format!("{}: {text}", escape(&spec.name()))),
-    );
+    Ok((findings, log))
+}
+
+/// The same by the robot file.
+pub(super) fn findings(
+    spec: &LogSpec,
+    machine: &LoggedRobot,
+    context: &Context,
+) -> Result<Findings, CliError> {
+    Ok(looked_at(spec, None, Some(machine), context)?.0)
+}
+
+/// Looks at one log, and compares it with the model where there is one.
+fn inspect(
+    spec: &LogSpec,
+    topic: Option<String>,
+    known: Option<&Known>,
+    context: &Context,
+    warnings: &mut Vec<String>,
+) -> Result<(Findings, Provenance), CliError> {
+    let machine = known.map(|known| &known.machine);
+    let (mut findings, log) = looked_at(spec, topic, machine, context)?;
+    let name = escape(&spec.name());
+    warnings.extend(log.warnings().iter().map(|text| format!("{name}: {text}")));
     if let Some(Known {
         machine,
         model: Some(model),
@@ -130,43 +139,19 @@ fn inspect(
             Ok(None) => {}
             // A delay by the model is surer than one without it.
             Ok(Some(found)) => {
-                findings
-                    .faults
-                    .retain(|fault| fault.kind != FaultKind::Delay);
+                findings.faults.retain(|f| f.kind != FaultKind::Delay);
                 findings.faults.push(found);
                 findings.place();
                 findings.sort();
             }
             Err(error) if error.exit() == Exit::Interrupted => return Err(error),
-            Err(error) => warnings.push(format!(
-                "{}: not compared with the model: {}",
-                escape(&spec.name()),
-                error.message()
-            )),
+            Err(error) => {
+                let text = error.message();
+                warnings.push(format!("{name}: not compared with the model: {text}"));
+            }
         }
     }
     Ok((findings, log.provenance()?))
-}
-
-/// What one log holds and what is wrong with it, by the robot file.
-pub(super) fn findings(
-    spec: &LogSpec,
-    machine: &LoggedRobot,
-    context: &Context,
-) -> Result<Findings, CliError> {
-    let mut log = RawReader::open(spec, Some(&machine.file.layout()))?;
-    let (plan, refused) = columns::of_robot(&log, machine);
-    let stop = || context.interrupted();
-    let found = look(&mut log, &plan, &stop)?;
-    let mut findings = found.ok_or_else(CliError::interrupted)?;
-    if findings.hides() {
-        let mut again = RawReader::open(spec, Some(&machine.file.layout()))?;
-        let found = look_again(&mut again, &plan, &findings, &stop)?;
-        findings = found.ok_or_else(CliError::interrupted)?;
-    }
-    findings.faults.splice(0..0, refused);
-    findings.place();
-    Ok(findings)
 }
 
 /// Compares the torques of a log with those that a model gives, joints turned and exchanged.
@@ -180,7 +165,7 @@ fn compare(
     let n = joints.len();
     let mut comparison = OrderComparison::new(n);
     let changes = comparison.changes().to_vec();
-    let mut log = machine.open(&spec.into(), context.control())?;
+    let mut log = machine.open(&spec.into(), &context.control)?;
     let summary = motion::run(
         &mut |block| log.read(block),
         n,
@@ -224,23 +209,19 @@ thread_local! {
 /// Fields of a topic that a terminal shows.
 const SHOWN: usize = 12;
 
-/// The topics of recordings, in lines.
 fn topics_text(topics: &[TopicFacts]) -> String {
     let mut out = String::new();
     for topic in topics {
-        let rate = topic.rate_hz.map_or_else(String::new, |rate| {
-            format!(", {} Hz", number::significant(rate, 4))
-        });
+        let rate = topic
+            .rate_hz
+            .map(|hz| format!(", {} Hz", number::significant(hz, 4)));
         let publishers = match topic.publishers {
             1 => String::new(),
             more => format!(", {more} publishers"),
         };
-        out += &format!(
-            "topic {} ({}): {} messages{rate}{publishers}\n",
-            escape(&topic.name),
-            escape(&topic.kind),
-            topic.messages
-        );
+        let [name, kind] = [&topic.name, &topic.kind].map(|text| escape(text));
+        let (messages, rate) = (topic.messages, rate.unwrap_or_default());
+        out += &format!("topic {name} ({kind}): {messages} messages{rate}{publishers}\n");
         if let Some(reason) = &topic.unreadable {
             out += &format!("  not read: {reason}\n");
         }
@@ -254,19 +235,15 @@ fn topics_text(topics: &[TopicFacts]) -> String {
     out
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
-    context.check_outputs(&inputs, &[])?;
+    context.check_outputs(paths_of(&args.logs), [])?;
     let known = Known::load(args)?;
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
     let (mut logs, mut provenance) = (Vec::new(), Vec::new());
     let mut all_topics = Vec::new();
-    let notes = known
-        .as_ref()
-        .map(|known| known.machine.file.notes.0.clone());
-    let mut warnings = notes.unwrap_or_default();
-    let layout = known.as_ref().map(|known| known.machine.file.layout());
+    let file = known.as_ref().map(|known| &known.machine.file);
+    let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
+    let layout = file.map(|file| file.layout());
     warnings.extend(repeated_rows(&logs_of(&args.logs), layout.as_ref()));
     for spec in &args.logs {
         // What several machines recorded is no one log: each is looked at on its own.
@@ -321,13 +298,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         setup: report.findings,
         topics: (!all_topics.is_empty()).then_some(all_topics),
     };
-    let shown = match known.is_some() || context.detail() == Detail::Brief {
+    let shown = match known.is_some() || context.detail == Detail::Brief {
         true => String::new(),
         false => topics_text(result.topics.as_deref().unwrap_or_default()),
     };
-    Ok(Outcome {
-        text: text.text_for(context.detail()) + &shown,
-        document: Document::new("inspect", &provenance, &warnings, &result)?,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(
+        text.text_for(context.detail) + &shown,
+        Document::new("inspect", &provenance, &warnings, &result)?,
+    ))
 }

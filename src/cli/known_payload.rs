@@ -1,9 +1,9 @@
 //! `LOG:mass=KG[+-STD]`: a log in which the arm carries a payload of known mass.
 
-use cft_ident_core::explain::Explain;
+use cft_ident_core::explain::ErrorText;
 use std::str::FromStr;
 
-use cft_ident_logs::log::{LogSpec, escape};
+use cft_ident_logs::log::{LogError, LogSpec, escape};
 use cft_ident_stages::identify::{Log, PayloadLog};
 
 /// A log with a payload whose mass is known.
@@ -16,49 +16,36 @@ pub struct KnownPayload {
     pub std: f64,
 }
 
-/// Why a text is no such log.
-#[derive(Debug, Clone, PartialEq, Explain, thiserror::Error)]
-pub enum PayloadError {
-    #[explain(
-        "`{_0}` is not LOG:mass=KG or LOG:mass=KG+-STD, e.g. loaded.csv:mass=2.8+-0.05",
-        "logs without a payload stand before --fit-gains"
-    )]
-    Form(String),
-    #[explain(
-        "`{_0}` is no mass",
-        "give kilograms above 0, and a standard deviation from 0 on"
-    )]
-    Mass(String),
-    #[explain("{_0}")]
-    Log(String),
-}
-
 impl FromStr for KnownPayload {
-    type Err = PayloadError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, PayloadError> {
-        let form = || PayloadError::Form(escape(text));
+    fn from_str(text: &str) -> Result<Self, String> {
+        let form = || {
+            let what = format!(
+                "`{}` is not LOG:mass=KG or LOG:mass=KG+-STD, e.g. loaded.csv:mass=2.8+-0.05",
+                escape(text)
+            );
+            let remedy = "logs without a payload stand before --fit-gains";
+            ErrorText::new(what).remedy(remedy).to_string()
+        };
         let (log, mass) = text.rsplit_once(":mass=").ok_or_else(form)?;
-        let number = |word: &str, least_above: bool| {
+        let number = |word: &str, from_zero: bool| {
             let word = word.trim().trim_end_matches("kg").trim_end();
             let value: f64 = word.parse().unwrap_or(f64::NAN);
-            let usable = value.is_finite() && (value > 0.0 || (!least_above && value == 0.0));
-            usable
-                .then_some(value)
-                .ok_or_else(|| PayloadError::Mass(escape(mass)))
+            let usable = value.is_finite() && (value > 0.0 || from_zero && value == 0.0);
+            let what = format!("`{}` is no mass", escape(mass));
+            let remedy = "give kilograms above 0, and a standard deviation from 0 on";
+            let wrong = ErrorText::new(what).remedy(remedy);
+            usable.then_some(value).ok_or(wrong.to_string())
         };
         let (mass_word, std) = match mass.split_once("+-").or_else(|| mass.split_once('±')) {
-            Some((mass, std)) => (mass, number(std, false)?),
+            Some((mass, std)) => (mass, number(std, true)?),
             None => (mass, 0.0),
         };
         Ok(KnownPayload {
-            mass: number(mass_word, true)?,
+            mass: number(mass_word, false)?,
             std,
-            log: log
-                .parse()
-                .map_err(|error: cft_ident_logs::log::LogError| {
-                    PayloadError::Log(error.to_string())
-                })?,
+            log: log.parse().map_err(|error: LogError| error.to_string())?,
         })
     }
 }
@@ -89,16 +76,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_mass_is_told() {
-        let error = |text: &str| text.parse::<KnownPayload>().unwrap_err().to_string();
+    fn a_text_without_a_mass_is_refused() {
+        let error = |text: &str| text.parse::<KnownPayload>().unwrap_err();
         assert!(error("loaded.csv").contains("is not LOG:mass=KG"));
-        for text in [
-            "a.csv:mass=0",
-            "a.csv:mass=-1",
-            "a.csv:mass=x",
-            "a.csv:mass=1+--2",
-        ] {
-            assert!(error(text).contains("is no mass"), "{text}");
+        for mass in ["0", "-1", "x", "1+--2"] {
+            assert!(
+                error(&format!("a.csv:mass={mass}")).contains("is no mass"),
+                "{mass}"
+            );
         }
     }
 }

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::known_payload::KnownPayload;
-use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup, typed};
+use super::{
+    CliError, Context, Outcome, arguments, files, logs, names_of, outputs, paths_of, pictures,
+    setup, typed, written,
+};
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::Document;
@@ -65,19 +68,11 @@ pub struct Args {
     pub setup: setup::SetupArgs,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let mut inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
-    inputs.extend(
-        args.fit_gains
-            .iter()
-            .flatten()
-            .map(|p| p.log.path.as_path()),
-    );
-    let mut outputs = vec![args.output.as_path()];
-    outputs.extend(args.report.as_deref());
-    outputs.extend(args.setup.fix_setup.as_deref());
-    context.check_outputs(&inputs, &outputs)?;
+    let payload = args.fit_gains.iter().flatten().map(|p| &*p.log.path);
+    let outputs = outputs::listed(Some(&args.output), &[], args.report.as_deref());
+    let outputs = outputs.chain(args.setup.fix_setup.as_deref());
+    context.check_outputs(paths_of(&args.logs).chain(payload), outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
     let mut given = vec![robot.provenance];
@@ -85,21 +80,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     given.extend(friction.iter().map(|model| model.provenance.clone()));
     let known = friction.as_ref().map(|model| &model.value);
     let data = Dataset::new(&machine, &logs(&args.leave_out.of(&args.logs))?);
-    let fitted = match &args.fit_gains {
-        None => None,
+    let (data, gains, edits) = match &args.fit_gains {
+        None => (data, None, Vec::new()),
         Some(payload) => {
             let payload = payload.as_ref().map(KnownPayload::known);
-            let control = context.control();
-            Some(identify::fit_gains(&data, payload.as_ref(), control)?)
+            let fitted = identify::fit_gains(&data, payload.as_ref(), &context.control)?;
+            let data = Dataset::new(&fitted.machine, &data.logs);
+            (data, Some(fitted.gains), fitted.edits)
         }
-    };
-    let (data, gains, edits) = match fitted {
-        None => (data, None, Vec::new()),
-        Some(fitted) => (
-            Dataset::new(&fitted.machine, &data.logs),
-            Some(fitted.gains),
-            fitted.edits,
-        ),
     };
     let settings = LsqSettings {
         estimator: args.estimator,
@@ -112,13 +100,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &edits), &args.setup, context)?;
     let (machine, logs) = (&checked.data.machine, &checked.data.logs);
-    let mut found = identify::lsq(&checked.data, &settings, context.control())?;
-    found
-        .setup
-        .splice(0..0, checked.report.findings.iter().cloned());
-    found
-        .warnings
-        .splice(0..0, checked.warnings.iter().cloned());
+    let mut found = identify::lsq(&checked.data, &settings, &context.control)?;
+    let (findings, warnings) = (&checked.report.findings, &checked.warnings);
+    found.setup.splice(0..0, findings.iter().cloned());
+    found.warnings.splice(0..0, warnings.iter().cloned());
     let mut model = found.model(machine, known.map(|given| &given.file));
     if args.open_loop.is_some() && !args.unconstrained {
         identify::project(&mut model)?;
@@ -141,37 +126,20 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             false => pictures::in_memory(&smoothed, logs, context)?,
         };
         let numbers = refined(&model, &args.output.to_string_lossy())?;
-        let replayed = pictures::replayed(
-            &smoothed,
-            in_memory.as_ref(),
-            &names,
-            (&model, &numbers),
-            &[],
-        )?;
+        let of_model = (&model, &numbers);
+        let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &names, of_model, &[])?;
         let files = args.logs.iter().filter(|l| !identify::is_reduced(&l.path));
         let quality = pictures::inspected(files, machine, context)?;
-        stages::lsq::pictures(
-            &mut report.page(),
-            &of,
-            replayed.as_ref(),
-            &given,
-            &quality,
-            context.command(),
-        );
+        let (mut page, replayed) = (report.page(), replayed.as_ref());
+        stages::lsq::pictures(&mut page, &of, replayed, &given, &quality, &context.command);
         context.check()?;
         context.write_text(path, &report.html())?;
     }
     context.check()?;
     checked.write(context)?;
     context.write_text(&args.output, &model.to_toml()?)?;
-    report
-        .terminal()
-        .line(&format!("written: {}", args.output.display()));
-    Ok(Outcome {
-        text: report.text_for(context.detail()),
-        document,
-        missed: Vec::new(),
-    })
+    written(&mut report, &args.output);
+    Ok(Outcome::new(report.text_for(context.detail), document))
 }
 
 /// Logs as a shell takes them; of many, and of reduced ones, which hold no rows to diagnose, a word.
@@ -179,8 +147,7 @@ fn typed_logs(logs: &[LogSpec]) -> String {
     if logs.len() > MAX_LOGS_ON_LINE || logs.iter().any(|log| identify::is_reduced(&log.path)) {
         return "LOG".to_owned();
     }
-    let typed = logs.iter().map(|log| typed::quoted(&log.to_string()));
-    typed.collect::<Vec<_>>().join(" ")
+    typed::logs(logs.iter().map(LogSpec::to_string))
 }
 
 /// Logs that a line has room for.

@@ -3,48 +3,48 @@
 //!
 //! A command whose `run` is not written yet is not in [`Command`], and so not on offer.
 
-mod campaign;
-pub mod compare;
-pub mod convert;
-pub mod diagnose;
-pub mod example;
-pub mod excite;
-pub mod export;
-pub mod friction;
-pub mod generate;
-pub mod identify;
-pub mod inspect;
-pub mod lsq;
-pub mod new;
-pub mod payload;
-pub mod reduce;
-pub mod show;
-pub mod simulate;
-pub mod torque;
-pub mod track;
-pub mod validate;
-pub mod watch;
-
 mod arguments;
 mod beside_truth;
 mod browser;
+mod campaign;
 mod colour;
 mod columns;
+mod compare;
 mod context;
 mod controller;
+mod convert;
+mod diagnose;
 mod error;
+mod example;
+mod excite;
 mod exit;
+mod export;
 mod files;
+mod friction;
+pub mod generate;
 mod held_out;
+mod identify;
+mod inspect;
 mod known_payload;
+mod lsq;
+mod new;
 mod outcome;
 mod outputs;
+mod payload;
 mod pictures;
+mod reduce;
 mod setup;
+mod show;
+mod simulate;
+mod torque;
+mod track;
 mod typed;
+mod validate;
+mod watch;
 
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -54,19 +54,43 @@ use clap::{Parser, Subcommand};
 
 use cft_ident_logs::log::LogSpec;
 use cft_ident_logs::output;
-use cft_ident_report::report::Detail;
 use cft_ident_report::report::table::{WIDTH, folded};
+use cft_ident_report::report::{Detail, Report};
 use cft_ident_stages::identify::{Log, ReducedLogs, is_reduced};
 
-pub use arguments::Destination;
-pub use context::{Context, RunningBar};
+use arguments::Destination;
+use context::Context;
 pub use error::CliError;
 pub use exit::Exit;
 pub use outcome::Outcome;
 
-/// Names of logs, as they are reported.
 fn names_of(specs: &[LogSpec]) -> Vec<String> {
     specs.iter().map(LogSpec::name).collect()
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// Files of logs.
+fn paths_of(specs: &[LogSpec]) -> impl Iterator<Item = &Path> {
+    specs.iter().map(|log| log.path.as_path())
+}
+
+/// Columns of a log to be written: the time, then one of each kind and joint.
+fn columns_of(kinds: &[&str], joints: &[String]) -> Vec<String> {
+    let mut columns = vec!["t".to_owned()];
+    for kind in kinds {
+        columns.extend(joints.iter().map(|joint| format!("{kind}_{joint}")));
+    }
+    columns
+}
+
+/// Says in a report for a terminal that a file was written.
+fn written(report: &mut Report, path: &Path) {
+    let line = format!("written: {}", path.display());
+    report.terminal().line(&line);
 }
 
 /// Files as logs of the library.
@@ -83,11 +107,12 @@ fn logs(specs: &[LogSpec]) -> Result<Vec<Log>, CliError> {
             continue;
         }
         if let Some(span) = spec.span.label() {
-            let name = spec.name();
-            return Err(CliError::usage(format!(
-                "{name}@{span}: a file of reduced logs has no spans"
-            ))
-            .hint("choose the span as the log is reduced: `cft-ident reduce LOG@0..70% ..`"));
+            let text = format!(
+                "{}@{span}: a file of reduced logs has no spans",
+                spec.name()
+            );
+            return Err(CliError::usage(text)
+                .hint("choose the span as the log is reduced: `cft-ident reduce LOG@0..70% ..`"));
         }
         all.extend(ReducedLogs::load(&spec.path)?.as_logs());
     }
@@ -203,7 +228,7 @@ pub fn main() -> ExitCode {
         // Without the handler Ctrl-C ends the process as it does by default.
         let _ = writeln!(std::io::stderr(), "warning: no graceful Ctrl-C: {error}");
     }
-    run(std::env::args_os(), interrupted).into()
+    run(std::env::args_os(), interrupted).code().into()
 }
 
 /// Time that a command has to end by itself after Ctrl-C; some loops do not look up that often.
@@ -281,10 +306,10 @@ fn removed(answer: &clap::Error) -> Option<CliError> {
 pub fn perform(arguments: &[OsString], interrupted: Arc<AtomicBool>) -> Result<Outcome, CliError> {
     let cli = Cli::try_parse_from(arguments)
         .map_err(|answer| CliError::usage(answer.render().to_string().trim_end()))?;
-    let context = Context::new(true, None, interrupted).called(arguments);
+    let context = Context::new(true, None, interrupted, arguments);
     let mut outcome = cli.command.run(&context)?;
     outcome.document.warn_first(context.warnings());
-    context.files().commit()?;
+    context.files.commit()?;
     Ok(outcome)
 }
 
@@ -301,29 +326,26 @@ fn execute(
             .build_global();
     }
     let json = cli.common.json.as_ref();
-    let context = Context::new(
-        cli.common.quiet,
-        json.and_then(Destination::file),
-        interrupted,
-    )
-    .called(arguments)
-    .showing(match (cli.common.quiet, cli.common.verbose) {
+    let quiet = cli.common.quiet;
+    let document = json.and_then(Destination::file);
+    let mut context = Context::new(quiet, document, interrupted, arguments);
+    context.detail = match (quiet, cli.common.verbose) {
         (true, _) => Detail::Brief,
         (_, true) => Detail::Full,
         _ => Detail::Usual,
-    })
-    .printing(matches!(json, Some(Destination::Stdout)));
+    };
+    context.prints_document = matches!(json, Some(Destination::Stdout));
     // Said before the long run, also by a command that has no other output.
-    context.check_outputs(&[], &[])?;
+    context.check_outputs([], [])?;
     let mut outcome = cli.command.run(&context)?;
     outcome.document.warn_first(context.warnings());
     if let Some(page) = context.page() {
-        outcome.says_where(&page, context.detail());
+        outcome.says_where(&page, context.detail);
     }
     let exit = outcome::show(
         &outcome,
         json,
-        (context.files(), context.detail()),
+        (&context.files, context.detail),
         &mut std::io::stdout().lock(),
         &mut std::io::stderr().lock(),
     )?;
@@ -338,6 +360,7 @@ fn execute(
 
 #[cfg(test)]
 mod tests {
+    use cft_ident_files::config::campaign::EstimatorKind;
     use clap::{CommandFactory, Parser};
 
     /// One command's arguments on a parser of their own.
@@ -363,10 +386,7 @@ mod tests {
         assert_eq!(args.joint.as_deref(), Some("q4"));
         let args: super::lsq::Args =
             parse("id.csv@0..70% -r cft.toml -m f.toml --estimator ols -o m.toml").unwrap();
-        assert_eq!(
-            args.estimator,
-            cft_ident_files::config::campaign::EstimatorKind::Ols
-        );
+        assert_eq!(args.estimator, EstimatorKind::Ols);
         assert_eq!(args.logs[0].span.label().as_deref(), Some("0..70%"));
         let args: super::validate::Args =
             parse("v.csv -m m.toml --max-relative-error 0.02 -o r.csv --plot a.svg --plot b.svg")
@@ -387,7 +407,6 @@ mod tests {
         assert_eq!((args.seed, args.seconds), (3, Some(20.0)));
     }
 
-    /// Lines of a screen.
     const SCREEN: usize = 45;
 
     #[test]
@@ -405,27 +424,25 @@ mod tests {
         }
     }
 
+    fn refused<T: clap::Args + std::fmt::Debug>(line: &str) -> clap::error::ErrorKind {
+        parse::<T>(line).unwrap_err()
+    }
+
     #[test]
     fn lines_that_contradict_the_contract_are_refused() {
+        use super::{friction, lsq, simulate, validate};
         use clap::error::ErrorKind::*;
         let two = "-r cft.toml --move q4 --reference t.toml -o a.csv";
-        let kind = parse::<super::simulate::Args>(two).unwrap_err();
-        assert_eq!(kind, ArgumentConflict);
-        let kind = parse::<super::simulate::Args>("-r cft.toml -o a.xyz").unwrap_err();
-        assert_eq!(kind, ValueValidation);
-        let kind = parse::<super::friction::Args>("-r cft.toml -o m.toml").unwrap_err();
-        assert_eq!(kind, MissingRequiredArgument);
-        let line = "a.csv@70..0% -r cft.toml -o m.toml";
-        assert_eq!(
-            parse::<super::lsq::Args>(line).unwrap_err(),
-            ValueValidation
-        );
-        let line = "a.csv -r cft.toml -o m.toml --estimator magic";
-        assert_eq!(parse::<super::lsq::Args>(line).unwrap_err(), InvalidValue);
-        let line = "a.csv -m m.toml --max-relative-error nan";
-        assert_eq!(
-            parse::<super::validate::Args>(line).unwrap_err(),
-            ValueValidation
-        );
+        assert_eq!(refused::<simulate::Args>(two), ArgumentConflict);
+        let ending = "-r cft.toml -o a.xyz";
+        assert_eq!(refused::<simulate::Args>(ending), ValueValidation);
+        let no_log = "-r cft.toml -o m.toml";
+        assert_eq!(refused::<friction::Args>(no_log), MissingRequiredArgument);
+        let span = "a.csv@70..0% -r cft.toml -o m.toml";
+        assert_eq!(refused::<lsq::Args>(span), ValueValidation);
+        let estimator = "a.csv -r cft.toml -o m.toml --estimator magic";
+        assert_eq!(refused::<lsq::Args>(estimator), InvalidValue);
+        let limit = "a.csv -m m.toml --max-relative-error nan";
+        assert_eq!(refused::<validate::Args>(limit), ValueValidation);
     }
 }

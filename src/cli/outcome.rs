@@ -25,6 +25,15 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// A result that misses no limit.
+    pub(super) fn new(text: String, document: Document) -> Self {
+        Outcome {
+            text,
+            document,
+            missed: Vec::new(),
+        }
+    }
+
     /// Names the page that was written, where the text does not yet.
     pub(super) fn says_where(&mut self, page: &Path, detail: Detail) {
         let page = page.display().to_string();
@@ -39,10 +48,7 @@ const MAX_WARNINGS: usize = 8;
 /// Those of them about one log or joint.
 const ABOUT_ONE: usize = 2;
 
-/// Shows `outcome` and returns the status that it stands for.
-///
-/// The files get their names once everything else is reported: a document that nobody could be given leaves none.
-/// `stdout` receives either the tables or, for `--json -`, the document, and nothing else.
+/// Shows an outcome; its status. Files get their names after all else, so that a failure leaves none.
 pub(super) fn show(
     outcome: &Outcome,
     json: Option<&Destination>,
@@ -67,7 +73,9 @@ pub(super) fn show(
         );
     }
     match json {
-        Some(Destination::Stdout) => write(stdout, &outcome.document.text())?,
+        Some(Destination::Stdout) => {
+            write(stdout, &outcome.document.text()).map_err(|error| no_standard_output(&error))?;
+        }
         Some(Destination::File(path)) => {
             files.write(path, outcome.document.text().as_bytes())?;
             write_for_a_person(stdout, outcome)?;
@@ -78,10 +86,9 @@ pub(super) fn show(
     for limit in &outcome.missed {
         to_stderr(stderr, &format!("limit missed: {}", indented(limit)));
     }
-    Ok(if outcome.missed.is_empty() {
-        Exit::Success
-    } else {
-        Exit::LimitMissed
+    Ok(match outcome.missed.is_empty() {
+        true => Exit::Success,
+        false => Exit::LimitMissed,
     })
 }
 
@@ -103,14 +110,12 @@ fn grouped<'a>(all: &[&'a str], detail: Detail) -> (Vec<&'a str>, usize) {
     (shown, more)
 }
 
-fn write(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
-    stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush())
-        .map_err(|error| no_standard_output(&error))
+fn write(stdout: &mut dyn Write, text: &str) -> io::Result<()> {
+    stdout.write_all(text.as_bytes())?;
+    stdout.flush()
 }
 
-/// Like [`write`], but a reader that has seen enough (`| head`) is no error.
+/// Tables; a reader that has seen enough (`| head`) is no error.
 fn write_for_a_person(stdout: &mut dyn Write, outcome: &Outcome) -> Result<(), CliError> {
     // Names come from files and folders.
     let mut shown = String::with_capacity(outcome.text.len());
@@ -123,16 +128,13 @@ fn write_for_a_person(stdout: &mut dyn Write, outcome: &Outcome) -> Result<(), C
     if colour::wanted() {
         shown = colour::coloured(&shown, outcome.missed.is_empty());
     }
-    let written = stdout
-        .write_all(shown.as_bytes())
-        .and_then(|()| stdout.flush());
-    match written {
+    match write(stdout, &shown) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(no_standard_output(&error)),
         _ => Ok(()),
     }
 }
 
-fn no_standard_output(error: &io::Error) -> CliError {
+pub(super) fn no_standard_output(error: &io::Error) -> CliError {
     CliError::output(format!("cannot write to standard output: {error}"))
         .hint("look at where it leads: a full disk, a program that has ended")
 }
@@ -152,63 +154,51 @@ mod tests {
         }
     }
 
+    fn to(
+        out: &mut dyn Write,
+        outcome: &Outcome,
+        json: Option<&Destination>,
+        detail: Detail,
+    ) -> (Result<Exit, CliError>, String) {
+        let mut err = Vec::new();
+        let files = Together::default();
+        let exit = show(outcome, json, (&files, detail), out, &mut err);
+        (exit, String::from_utf8(err).unwrap())
+    }
+
     #[test]
     fn json_on_standard_output_is_one_document_and_nothing_else() {
-        let (mut out, mut err) = (Vec::new(), Vec::new());
-        let exit = show(
-            &outcome(&[]),
-            Some(&Destination::Stdout),
-            (&Together::default(), Detail::Usual),
-            &mut out,
-            &mut err,
-        );
+        let (mut out, json) = (Vec::new(), Some(&Destination::Stdout));
+        let (exit, err) = to(&mut out, &outcome(&[]), json, Detail::Usual);
         assert_eq!(exit.unwrap(), Exit::Success);
         let document: Value = serde_json::from_slice(&out).unwrap();
         assert_eq!(document["schema"], "cft-ident/validate/1");
-        assert_eq!(err, b"warning: gap of 0.4 s at 3.1 s\n");
+        assert_eq!(err, "warning: gap of 0.4 s at 3.1 s\n");
     }
 
     #[test]
     fn json_in_a_file_leaves_the_tables_on_standard_output() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("result.json");
-        let (mut out, mut err) = (Vec::new(), Vec::new());
-        let to_file = Destination::File(path.clone());
-        let exit = show(
-            &outcome(&["q4 1.4 % > 1 %"]),
-            Some(&to_file),
-            (&Together::default(), Detail::Usual),
-            &mut out,
-            &mut err,
-        );
+        let (mut out, json) = (Vec::new(), Destination::File(path.clone()));
+        let missed = outcome(&["q4 1.4 % > 1 %"]);
+        let (exit, err) = to(&mut out, &missed, Some(&json), Detail::Usual);
         assert_eq!(exit.unwrap(), Exit::LimitMissed);
         assert_eq!(out, b"joint  rmse\n");
         let document: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
         assert_eq!(document["joints"][0]["rmse"], Value::Null);
-        assert!(
-            String::from_utf8(err)
-                .unwrap()
-                .ends_with("limit missed: q4 1.4 % > 1 %\n")
-        );
+        assert!(err.ends_with("limit missed: q4 1.4 % > 1 %\n"));
     }
 
     #[test]
     fn many_warnings_do_not_push_the_result_off_the_screen() {
         let warnings: Vec<String> = (0..40).map(|k| format!("gap at {k} s")).collect();
-        let many = Outcome {
-            document: Document::new("validate", &[], &warnings, &json!({})).unwrap(),
-            ..outcome(&[])
-        };
-        let lines = |detail| {
-            let files = Together::default();
-            let (mut out, mut err) = (Vec::new(), Vec::new());
-            show(&many, None, (&files, detail), &mut out, &mut err).unwrap();
-            String::from_utf8(err).unwrap().lines().count()
-        };
-        assert_eq!(
-            (lines(Detail::Usual), lines(Detail::Full)),
-            (MAX_WARNINGS + 1, 40)
-        );
+        let document = Document::new("validate", &[], &warnings, &json!({})).unwrap();
+        let many = Outcome::new("joint  rmse\n".into(), document);
+        for (detail, lines) in [(Detail::Usual, MAX_WARNINGS + 1), (Detail::Full, 40)] {
+            let (_, err) = to(&mut Vec::new(), &many, None, detail);
+            assert_eq!(err.lines().count(), lines);
+        }
     }
 
     #[test]
@@ -232,32 +222,14 @@ mod tests {
 
     #[test]
     fn a_closed_pipe_ends_the_tables_quietly_but_not_the_document() {
-        let result = outcome(&[]);
-        let mut pipe = Failing(io::ErrorKind::BrokenPipe);
-        let tables = show(
-            &result,
-            None,
-            (&Together::default(), Detail::Usual),
-            &mut pipe,
-            &mut Vec::new(),
-        );
-        assert_eq!(tables.unwrap(), Exit::Success);
-        let json = show(
-            &result,
-            Some(&Destination::Stdout),
-            (&Together::default(), Detail::Usual),
-            &mut pipe,
-            &mut Vec::new(),
-        );
-        assert_eq!(json.unwrap_err().exit(), Exit::OutputFailed);
-        let mut full = Failing(io::ErrorKind::StorageFull);
-        let tables = show(
-            &result,
-            None,
-            (&Together::default(), Detail::Usual),
-            &mut full,
-            &mut Vec::new(),
-        );
-        assert_eq!(tables.unwrap_err().exit(), Exit::OutputFailed);
+        use io::ErrorKind::{BrokenPipe, StorageFull};
+        for (kind, json, expected) in [
+            (BrokenPipe, None, Exit::Success),
+            (BrokenPipe, Some(&Destination::Stdout), Exit::OutputFailed),
+            (StorageFull, None, Exit::OutputFailed),
+        ] {
+            let (found, _) = to(&mut Failing(kind), &outcome(&[]), json, Detail::Usual);
+            assert_eq!(found.unwrap_or_else(|error| error.exit()), expected);
+        }
     }
 }

@@ -6,24 +6,21 @@ use std::path::{Path, PathBuf};
 use super::error::CliError;
 
 /// Checks the files that a command is going to write: see [`super::Context::check_outputs`].
-pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
-    let inputs: Vec<PathBuf> = inputs.iter().map(|path| resolved(path)).collect();
-    let mut seen: Vec<PathBuf> = Vec::with_capacity(outputs.len());
+pub(super) fn check<'a>(
+    inputs: impl IntoIterator<Item = &'a Path>,
+    outputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), CliError> {
+    let inputs: Vec<PathBuf> = inputs.into_iter().map(resolved).collect();
+    let mut seen: Vec<PathBuf> = Vec::new();
     for output in outputs {
         let full = resolved(output);
         if seen.contains(&full) {
-            return Err(CliError::usage(format!(
-                "two outputs are the same file {}",
-                output.display()
-            ))
-            .hint("give each output a name of its own"));
+            let text = format!("two outputs are the same file {}", output.display());
+            return Err(CliError::usage(text).hint("give each output a name of its own"));
         }
         if inputs.contains(&full) {
-            return Err(CliError::usage(format!(
-                "the output {} would overwrite an input",
-                output.display()
-            ))
-            .hint("give the output a name of its own"));
+            let text = format!("the output {} would overwrite an input", output.display());
+            return Err(CliError::usage(text).hint("give the output a name of its own"));
         }
         writable(output)?;
         seen.push(full);
@@ -36,9 +33,9 @@ pub(super) fn listed<'a>(
     output: Option<&'a Path>,
     plot: &'a [PathBuf],
     report: Option<&'a Path>,
-) -> Vec<&'a Path> {
+) -> impl Iterator<Item = &'a Path> {
     let plot = plot.iter().map(PathBuf::as_path);
-    output.into_iter().chain(plot).chain(report).collect()
+    output.into_iter().chain(plot).chain(report)
 }
 
 fn folder(path: &Path) -> &Path {
@@ -88,15 +85,13 @@ mod tests {
     #[test]
     fn outputs_that_collide_are_a_usage_error() {
         let folder = tempfile::tempdir().unwrap();
-        let log = folder.path().join("a.csv");
+        let [log, model, same] = ["a.csv", "m.toml", "./m.toml"].map(|f| folder.path().join(f));
         std::fs::write(&log, "t\n").unwrap();
-        let model = folder.path().join("m.toml");
-        let same = folder.path().join(".").join("m.toml");
-        let error = check(&[&log], &[&model, &same]).unwrap_err();
-        assert_eq!(error.exit(), Exit::Usage);
-        let error = check(&[&log], &[&model, &log]).unwrap_err();
-        assert_eq!(error.exit(), Exit::Usage);
-        assert!(check(&[&log], &[&model]).is_ok());
+        for other in [&same, &log] {
+            let error = check([&*log], [&*model, other]).unwrap_err();
+            assert_eq!(error.exit(), Exit::Usage);
+        }
+        assert!(check([&*log], [&*model]).is_ok());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
@@ -104,10 +99,10 @@ mod tests {
     fn a_missing_folder_and_a_folder_as_file_are_output_errors() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("no").join("m.toml");
-        let error = check(&[], &[&missing]).unwrap_err();
+        let error = check([], [&*missing]).unwrap_err();
         assert_eq!(error.exit(), Exit::OutputFailed);
         assert!(error.to_string().contains("mkdir -p"));
-        let error = check(&[], &[folder.path()]).unwrap_err();
+        let error = check([], [folder.path()]).unwrap_err();
         assert_eq!(error.exit(), Exit::OutputFailed);
     }
 }

@@ -1,8 +1,8 @@
 //! `cft-ident payload`: the body on the last link, from a log with it and a model without it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::{CliError, Context, Outcome, files, logs_of, names_of};
+use super::{CliError, Context, Outcome, files, logs_of, names_of, paths_of};
 use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
@@ -36,16 +36,12 @@ pub struct Args {
     pub output: Option<PathBuf>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let logs = args.logs.iter().map(|log| log.path.as_path());
-    let inputs: Vec<&Path> = logs.chain([args.model.as_path()]).collect();
-    let outputs: Vec<&Path> = args.output.as_deref().into_iter().collect();
-    context.check_outputs(&inputs, &outputs)?;
-    let given = files::model(&args.model, context)?;
-    let given = given.value;
+    let inputs = paths_of(&args.logs).chain([&*args.model]);
+    context.check_outputs(inputs, args.output.as_deref())?;
+    let given = files::model(&args.model, context)?.value;
     let data = Dataset::new(&given.machine(), &logs_of(&args.logs));
-    let found = identify::payload(&data, &given, context.control())?;
+    let found = identify::payload(&data, &given, &context.control)?;
     let brief = sentences(&found).join("\n");
     let tables = text_of(&found, &names_of(&args.logs).join(", "));
     let mut text = format!("{brief}\n\n{tables}");
@@ -57,14 +53,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_text(path, &model)?;
         text += &format!("written: {}{how}\n", path.display());
     }
-    Ok(Outcome {
-        text: context.text(text, &brief),
-        document: Document::new("payload", &found.inputs, &found.warnings, &found)?,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(
+        context.text(text, &brief),
+        Document::new("payload", &found.inputs, &found.warnings, &found)?,
+    ))
 }
 
-/// A number with its interval.
 fn shown(x: &Number95) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
@@ -75,7 +69,6 @@ fn shown(x: &Number95) -> String {
     }
 }
 
-/// What a person has to know first.
 fn sentences(found: &Payload) -> Vec<String> {
     let mass = |gains_free: bool| {
         let reading = found.readings.iter().find(|of| of.gains_free == gains_free);
@@ -124,7 +117,6 @@ fn made_worse(reading: &PayloadReading) -> Option<String> {
     })
 }
 
-/// Both readings, for a person.
 fn text_of(found: &Payload, logs: &str) -> String {
     let caption = format!(
         "body on {} by {}, in the frame of that link, with 95 % intervals",
@@ -143,17 +135,9 @@ fn text_of(found: &Payload, logs: &str) -> String {
             table.row([name, &shown(a), &shown(b), &a.unit]);
         };
         row("mass", &as_given.mass, &free.mass);
-        for (name, (a, b)) in ["x", "y", "z"]
-            .into_iter()
-            .zip(as_given.centre.iter().zip(&free.centre))
-        {
-            row(name, a, b);
-        }
-        let names = ["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
-        for (name, (a, b)) in names
-            .into_iter()
-            .zip(as_given.inertia.iter().zip(&free.inertia))
-        {
+        let names = ["x", "y", "z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+        let [all_given, all_free] = [as_given, free].map(|of| of.centre.iter().chain(&of.inertia));
+        for (name, (a, b)) in names.into_iter().zip(all_given.zip(all_free)) {
             row(name, a, b);
         }
     }

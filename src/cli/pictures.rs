@@ -8,14 +8,13 @@ use cft_ident_report::report::sections::quality::Inspected;
 use cft_ident_stages::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
 use cft_ident_stages::replay::{Replay, Replayed};
 
-/// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
-/// is no reason to lose the report.
+/// Reads logs whole for the pictures of a report; none where they are too long for that.
 pub(super) fn in_memory(
     machine: &LoggedRobot,
     logs: &[Log],
     context: &Context,
 ) -> Result<Option<InMemory>, CliError> {
-    match identify::read_whole(machine, logs, context.control()) {
+    match identify::read_whole(machine, logs, &context.control) {
         Ok(in_memory) => Ok(Some(in_memory)),
         Err(IdentifyError::TooManySamples { .. }) => Ok(None),
         Err(error) => Err(error.into()),

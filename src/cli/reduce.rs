@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, arguments, files, logs, setup};
+use super::{CliError, Context, Outcome, arguments, files, logs, outputs, paths_of, setup};
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::Report;
 use cft_ident_report::report::json::Document;
@@ -74,12 +74,9 @@ struct LogInFile {
     faults: Vec<String>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
-    let mut outputs = vec![args.output.as_path()];
-    outputs.extend(args.setup.fix_setup.as_deref());
-    context.check_outputs(&inputs, &outputs)?;
+    let outputs = outputs::listed(Some(&args.output), &[], args.setup.fix_setup.as_deref());
+    context.check_outputs(paths_of(&args.logs), outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
     let friction = files::friction("reduce", args.model.as_deref(), &machine.file, context)?;
@@ -87,14 +84,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let data = Dataset::new(&machine, &logs(&args.logs)?);
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
-    let found = identify::reduce(&checked.data, known, context.control())?;
+    let found = identify::reduce(&checked.data, known, &context.control)?;
     context.check()?;
     let bytes = found.to_bytes().map_err(identify::IdentifyError::from)?;
     let result = Reduced {
         format: FORMAT,
-        made_with: found
-            .made_with()
-            .cloned()
+        made_with: (found.made_with().cloned())
             .ok_or_else(|| CliError::usage("no log is given"))?,
         logs: found.logs().iter().map(|log| in_file(log)).collect(),
         bytes: bytes.len() as u64,
@@ -105,12 +100,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<Provenance> = found.logs().iter().map(|l| l.provenance.clone()).collect();
     let document = Document::new("reduce", &inputs, &warnings, &result)?;
     checked.write(context)?;
-    context.files().write(&args.output, &bytes)?;
-    Ok(Outcome {
-        text: report(&found, &result, args).text_for(context.detail()),
+    context.files.write(&args.output, &bytes)?;
+    Ok(Outcome::new(
+        report(&found, &result, args).text_for(context.detail),
         document,
-        missed: Vec::new(),
-    })
+    ))
 }
 
 fn in_file(log: &identify::ReducedLog) -> LogInFile {
@@ -123,7 +117,6 @@ fn in_file(log: &identify::ReducedLog) -> LogInFile {
     }
 }
 
-/// The file for a terminal.
 fn report(found: &ReducedLogs, result: &Reduced, args: &Args) -> Report {
     let columns = [
         ("log", Align::Left),

@@ -6,7 +6,7 @@ use super::{CliError, Context};
 use cft_ident_files::config::correction::{Edit, edited};
 use cft_ident_files::config::{self, RobotFile};
 use cft_ident_stages::identify::{CheckedSetup, Dataset, IdentifyError, LoggedRobot, check_setup};
-use cft_ident_stages::setup::{Finding, FindingSeverity, SetupReport};
+use cft_ident_stages::setup::{Finding, FindingSeverity, FrictionPower, SetupReport};
 
 /// What to do with a set-up that the torques contradict.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -19,11 +19,9 @@ pub struct SetupArgs {
     pub as_declared: bool,
 }
 
-/// A set-up that was checked.
 pub struct Checked {
     /// The robot to go on with, and the logs.
     pub data: Dataset,
-    /// What was found, for the document.
     pub report: SetupReport,
     pub warnings: Vec<String>,
     /// The new robot file, where one is to be written.
@@ -41,8 +39,7 @@ impl Checked {
     }
 }
 
-/// Checks the set-up by the logs. `robot` is the path of the robot file, in which `before` is what the
-/// machine has that the file lacks.
+/// Checks the set-up by the logs; `before` is what the machine has that its file `robot` lacks.
 pub fn checked(
     data: Dataset,
     (robot, before): (&Path, &[Edit]),
@@ -60,26 +57,24 @@ pub fn checked(
         corrected,
         edits,
     } = check(&data, context)?;
-    let mut warnings: Vec<String> = report
-        .findings
-        .iter()
-        .filter(|f| f.severity == FindingSeverity::Warning)
-        .map(likely)
-        .collect();
-    let hints = (report.findings.iter()).filter(|f| f.severity == FindingSeverity::Hint);
-    hints.for_each(|hint| context.note(&format!("hint: {}", hint.in_words())));
-    for power in &report.friction_power {
-        warnings.push(power.sentence());
-    }
+    let of = |severity| (report.findings.iter()).filter(move |f| f.severity == severity);
+    let likely = |f: &Finding| {
+        format!(
+            "the set-up may be wrong: {}; the set-up as declared is possible too, and the fit goes on with it",
+            f.in_words()
+        )
+    };
+    let mut warnings: Vec<String> = of(FindingSeverity::Warning).map(likely).collect();
+    of(FindingSeverity::Hint).for_each(|f| context.note(&format!("hint: {}", f.in_words())));
+    warnings.extend(report.friction_power.iter().map(FrictionPower::sentence));
     let refusals: Vec<&Finding> = report.refusals().collect();
     if refusals.is_empty() {
-        let new_file = match args.fix_setup.as_ref().filter(|_| !before.is_empty()) {
-            Some(path) => {
-                let text = new_text(robot, before, &machine.file, path)?;
-                Some((path.clone(), text))
-            }
-            None => None,
-        };
+        let path = args.fix_setup.as_ref().filter(|_| !before.is_empty());
+        let new_file = path.map(|path| {
+            let text = new_text(robot, before, &machine.file, path)?;
+            Ok::<_, CliError>((path.clone(), text))
+        });
+        let new_file = new_file.transpose()?;
         return Ok(Checked {
             data,
             report,
@@ -92,16 +87,11 @@ pub fn checked(
     };
     let edits = [before, &edits].concat();
     let text = new_text(robot, &edits, &corrected, path)?;
-    warnings.extend(
-        refusals
-            .iter()
-            .map(|f| format!("put right in {}: {}", path.display(), f.in_words())),
-    );
+    let right = |f: &&Finding| format!("put right in {}: {}", path.display(), f.in_words());
+    warnings.extend(refusals.iter().map(right));
+    let machine = LoggedRobot::new(&path.to_string_lossy(), corrected);
     Ok(Checked {
-        data: Dataset::new(
-            &LoggedRobot::new(&path.to_string_lossy(), corrected),
-            &data.logs,
-        ),
+        data: Dataset::new(&machine, &data.logs),
         report,
         warnings,
         new_file: Some((path.clone(), text)),
@@ -110,7 +100,7 @@ pub fn checked(
 
 /// The check; logs that cannot be checked are reported by the fit itself.
 fn check(data: &Dataset, context: &Context) -> Result<CheckedSetup, CliError> {
-    match check_setup(data, context.control()) {
+    match check_setup(data, &context.control) {
         Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
         found => Ok(found.unwrap_or_default()),
     }
@@ -144,24 +134,12 @@ fn new_text(
         .map_err(|error| CliError::output(format!("{}: {error}", path.display())))
 }
 
-fn likely(finding: &Finding) -> String {
-    format!(
-        "the set-up may be wrong: {}; the set-up as declared is possible too, and the fit goes on with it",
-        finding.in_words()
-    )
-}
-
 /// The error with which a fit refuses the logs.
 fn refused(robot: &Path, refusals: &[&Finding]) -> CliError {
-    let first = refusals
-        .first()
-        .map(|f| f.meaning.as_str())
-        .unwrap_or_default();
-    let mut error = CliError::input(format!(
-        "the torques contradict the robot file: {}",
-        first.replace("; ", ", ")
-    ))
-    .at(robot.display());
+    let first = refusals.first().map_or("", |f| &f.meaning);
+    let first = first.replace("; ", ", ");
+    let text = format!("the torques contradict the robot file: {first}");
+    let mut error = CliError::input(text).at(robot.display());
     for finding in refusals {
         error = error.hint(format!("write {}", finding.remedy));
     }

@@ -1,11 +1,11 @@
 //! `cft-ident show`: a model file as a person wants to know it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, arguments, files};
+use super::{CliError, Context, Outcome, arguments, files, written};
 use cft_ident_files::config::model_file::{EffectSection, Parameter};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::provenance;
@@ -44,10 +44,8 @@ pub struct ShownModel {
     point: Option<String>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let outputs: Vec<&Path> = args.report.as_deref().into_iter().collect();
-    context.check_outputs(&[&args.model], &outputs)?;
+    context.check_outputs([&*args.model], args.report.as_deref())?;
     let given = files::model(&args.model, context)?;
     let (model, machine) = (given.value.numbers()?, given.value.machine());
     let file = given.value.file;
@@ -62,27 +60,22 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs = vec![given.provenance];
     if let Some(path) = &args.report {
         let made_from = &file.provenance.inputs;
-        let (page, command) = (&mut report.page(), context.command());
+        let (page, command) = (&mut report.page(), &context.command);
         provenance::section(page, &file.robot, &inputs, made_from, None, command);
         context.write_text(path, &report.html())?;
-        let written = format!("written: {}", path.display());
-        report.terminal().line(&written);
+        written(&mut report, path);
     }
-    let (in_use, point) = match found {
-        Some((joints, point)) => (joints, Some(point)),
-        None => (Vec::new(), None),
-    };
+    let (in_use, point) = found.unzip();
     let shown = ShownModel {
         joints: machine.robot.joint_names().to_vec(),
         consistent: file.is_consistent(),
         parameters: file.parameters,
         effects: file.effects,
-        in_use,
+        in_use: in_use.unwrap_or_default(),
         point,
     };
-    Ok(Outcome {
-        text: report.text_for(context.detail()),
-        document: Document::new("show", &inputs, &[], &shown)?,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(
+        report.text_for(context.detail),
+        Document::new("show", &inputs, &[], &shown)?,
+    ))
 }

@@ -1,5 +1,6 @@
 //! `cft-ident simulate`: a log of the simulated robot, and its truth beside it.
 
+use std::ffi::OsStr;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,7 @@ use serde::Serialize;
 use super::context::Context;
 use super::error::CliError;
 use super::outcome::Outcome;
-use super::{arguments, files};
+use super::{arguments, file_name, files};
 use cft_ident_core::number;
 use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::model_file::Parameter;
@@ -94,113 +95,84 @@ pub struct Args {
     pub output: PathBuf,
 }
 
-/// Simulates, and writes the log and its truth.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let truth_path = truth_beside(&args.output);
-    let mut read: Vec<&Path> = vec![&args.robot];
-    read.extend(args.reference.as_deref());
-    read.extend(args.model.as_deref());
-    read.extend(args.candidates.as_deref());
-    read.extend(args.volts.as_ref().map(|log| log.path.as_path()));
-    context.check_outputs(&read, &[&args.output, &truth_path])?;
+    let log = args.volts.as_ref().map(|log| &*log.path);
+    let (reference, model) = (args.reference.as_deref(), args.model.as_deref());
+    let candidates = args.candidates.as_deref();
+    let read = [Some(&*args.robot), reference, model, candidates, log];
+    let read = read.into_iter().flatten();
+    context.check_outputs(read, [&*args.output, &*truth_path])?;
 
     let robot = files::robot(&args.robot)?;
     let mut inputs = vec![robot.provenance];
-    let robot = robot.value;
-    let model = match &args.model {
-        Some(path) => Some(files::model_of(path, &robot, context)?),
-        None => None,
-    };
+    let mut robot = robot.value;
+    let model = model
+        .map(|path| files::model_of(path, &robot, context))
+        .transpose()?;
     inputs.extend(model.iter().map(|model| model.provenance.clone()));
-    let reference = match &args.reference {
-        Some(path) => Some(files::trajectory(path)?),
-        None => None,
-    };
+    let reference = reference.map(files::trajectory).transpose()?;
     inputs.extend(reference.iter().map(|file| file.provenance.clone()));
-    let volts = match &args.volts {
-        Some(log) => Some(Volts::read(log, &robot, context)?),
-        None => None,
-    };
-    inputs.extend(volts.iter().map(|volts| volts.provenance.clone()));
-
-    let own = match &args.candidates {
-        Some(path) => Some(files::candidates(path)?),
-        None => None,
-    };
+    let motors = args.volts.as_ref();
+    let motors = motors.map(|log| volts(log, &robot, context)).transpose()?;
+    inputs.extend(motors.iter().map(|(_, provenance)| provenance.clone()));
+    let own = candidates.map(files::candidates).transpose()?;
     inputs.extend(own.iter().map(|file| file.provenance.clone()));
     let own = own.map(|file| file.value).unwrap_or_default();
     let effects = args.effects.iter().cloned();
 
-    let experiment = match (&reference, &args.move_joint, &volts) {
+    let experiment = match (&reference, &args.move_joint, &motors) {
         (Some(reference), ..) => Experiment::Trajectory(&reference.value),
         (_, Some(joint), _) => Experiment::OneJoint {
             joint,
             part: args.travel.unwrap_or(1.0),
         },
-        (_, _, Some(volts)) => Experiment::Volts {
-            times: &volts.times,
-            volts: &volts.rows,
+        (_, _, Some((log, _))) => Experiment::Volts {
+            times: &log.t,
+            volts: &log.tau,
         },
         _ => Experiment::Usual,
     };
-    let mut robot = robot;
     if let (Experiment::Usual | Experiment::OneJoint { .. }, Some(model)) = (&experiment, &model) {
         model.value.file.travel_of_seen(&mut robot.limits);
     }
+    let model = model.as_ref();
     let order = Order {
         robot: &robot,
-        model: model
-            .as_ref()
-            .map(|model| (model.name.as_str(), &model.value.file)),
+        model: model.map(|model| (model.name.as_str(), &model.value.file)),
         experiment,
         seconds: args.seconds,
         effects: effects.map(|effect| effect.or_own(&own)).collect(),
         seed: args.seed,
     };
+    // speeds that are not given are 0
+    let initial = (!args.position.is_empty()).then(|| InitialConditions {
+        position: args.position.clone(),
+        speed: match &args.speed[..] {
+            [] => vec![0.0; args.position.len()],
+            given => given.to_vec(),
+        },
+    });
     let bar = context.progress("simulating", None);
-    let initial = initial(args);
     let (simulated, log) = simulate_to(&order, initial.as_ref(), &args.output, context)?;
     drop(bar);
 
     let names = (file_name(&args.output), file_name(&truth_path));
     let result = SimulationResult::of(&simulated, args.seed, &log, &names);
     let shown = [robot.notes.0.clone(), warnings(&simulated)].concat();
-    Ok(Outcome {
-        text: context.text(
-            render(&robot, &log, &names.0),
-            &format!("written: {}", names.0),
-        ),
-        document: Document::new("simulate", &inputs, &shown, &result)?,
-        missed: Vec::new(),
-    })
+    let all = render(&robot, &log, &names.0);
+    let text = context.text(all, &format!("written: {}", names.0));
+    let document = Document::new("simulate", &inputs, &shown, &result)?;
+    Ok(Outcome::new(text, document))
 }
 
 /// The log's stem with `.truth.toml`, beside it.
 pub(super) fn truth_beside(log: &Path) -> PathBuf {
-    let packed = log
-        .extension()
-        .is_some_and(|end| end.eq_ignore_ascii_case("gz") || end.eq_ignore_ascii_case("zst"));
-    let log = if packed {
-        log.with_extension("")
-    } else {
-        log.to_owned()
-    };
-    log.with_extension("truth.toml")
-}
-
-/// The initial conditions that are given; speeds that are not are 0.
-fn initial(args: &Args) -> Option<InitialConditions> {
-    if args.position.is_empty() {
-        return None;
+    let packed = |end: &OsStr| end.eq_ignore_ascii_case("gz") || end.eq_ignore_ascii_case("zst");
+    match log.extension().is_some_and(packed) {
+        true => log.with_extension("").with_extension("truth.toml"),
+        false => log.with_extension("truth.toml"),
     }
-    let speed = match args.speed.as_slice() {
-        [] => vec![0.0; args.position.len()],
-        given => given.to_vec(),
-    };
-    Some(InitialConditions {
-        position: args.position.clone(),
-        speed,
-    })
 }
 
 /// Simulates one order and writes its log, with the truth beside it.
@@ -227,12 +199,11 @@ pub(super) fn simulate_to(
     // The log gets its name last: where it stands, its truth stands too.
     write_truth(&truth_beside(path), &simulated, context)?;
     if let Some(log) = rows.writer {
-        context.files().add_log(log)?;
+        context.files.add_log(log)?;
     }
     Ok((simulated, rows.figures))
 }
 
-/// Writes rows as they come.
 struct ToFile<'a> {
     path: &'a Path,
     context: &'a Context,
@@ -289,7 +260,6 @@ pub(super) struct LogFigures {
     last_s: f64,
 }
 
-/// One column of it.
 #[derive(Debug)]
 struct ColumnFigures {
     name: String,
@@ -324,29 +294,19 @@ impl LogFigures {
 }
 
 /// Volts of a log, to be played back.
-struct Volts {
-    times: Vec<f64>,
-    /// Row by row [V].
-    rows: Vec<f64>,
-    provenance: Provenance,
-}
-
-impl Volts {
-    fn read(log: &LogSpec, robot: &RobotFile, context: &Context) -> Result<Self, CliError> {
-        let mut reader = Reader::open(log, &robot.volts_layout())?;
-        let mut block = Block::default();
-        let (mut times, mut rows) = (Vec::new(), Vec::new());
-        while reader.read(&mut block)? {
-            context.check()?;
-            times.extend_from_slice(&block.t);
-            rows.extend_from_slice(&block.tau);
-        }
-        Ok(Volts {
-            times,
-            rows,
-            provenance: reader.provenance()?,
-        })
+fn volts(
+    log: &LogSpec,
+    robot: &RobotFile,
+    context: &Context,
+) -> Result<(Block, Provenance), CliError> {
+    let mut reader = Reader::open(log, &robot.volts_layout())?;
+    let (mut block, mut all) = (Block::default(), Block::default());
+    while reader.read(&mut block)? {
+        context.check()?;
+        all.t.extend_from_slice(&block.t);
+        all.tau.extend_from_slice(&block.tau);
     }
+    Ok((all, reader.provenance()?))
 }
 
 fn write_truth(
@@ -359,11 +319,6 @@ fn write_truth(
     })?;
     let head = "# What was true in the simulated log beside this file. SI units and radians.";
     context.write_text(path, &format!("{head}\n\n{text}"))
-}
-
-fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    name.to_string_lossy().into_owned()
 }
 
 /// Time from the first to the last row [s]; the robot file may log it in another unit.
@@ -409,6 +364,10 @@ impl<'a> SimulationResult<'a> {
         (name, truth): &'a (String, String),
     ) -> Self {
         let saturated = log.saturated.iter();
+        let saturated = saturated.map(|(coordinate, share)| Saturation {
+            coordinate,
+            share: *share,
+        });
         SimulationResult {
             effects: &log.truth.effects,
             parameters: &log.truth.parameters,
@@ -417,12 +376,7 @@ impl<'a> SimulationResult<'a> {
             duration_s: figures.duration_s(),
             ending: log.ending,
             limits_reached: &log.limits,
-            saturated: saturated
-                .map(|(coordinate, share)| Saturation {
-                    coordinate,
-                    share: *share,
-                })
-                .collect(),
+            saturated: saturated.collect(),
             files: Files { log: name, truth },
         }
     }
@@ -463,16 +417,10 @@ fn render(robot: &RobotFile, figures: &LogFigures, log: &str) -> String {
     ));
     let layout = robot.layout();
     let parts = [Some(&layout), layout.otherwise.as_deref()];
-    let channels: Vec<_> = parts
-        .into_iter()
-        .flatten()
-        .flat_map(|part| part.positions.iter().chain(&part.torques))
-        .collect();
+    let parts = parts.into_iter().flatten();
+    let channels = parts.flat_map(|part| part.positions.iter().chain(&part.torques));
     for column in &figures.columns {
-        let Some(channel) = channels
-            .iter()
-            .find(|channel| channel.column == column.name)
-        else {
+        let Some(channel) = channels.clone().find(|c| c.column == column.name) else {
             continue;
         };
         let rms = (column.squares / figures.rows.max(1) as f64).sqrt();

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::excite::LADDER_S;
-use super::{CliError, Context, Outcome, arguments, files};
+use super::{CliError, Context, Outcome, arguments, columns_of, files};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{LogSpec, Provenance};
@@ -50,13 +50,14 @@ fn planned(
     let rate = file.robot.control.rate_hz.unwrap_or(RATE_HZ);
     let rows = (motion.seconds() * rate + 1e-6).floor() + 1.0;
     if rows > MOST_ROWS {
-        return Err(CliError::input(format!(
-            "{}: {} s at {} Hz are more than {MOST_ROWS:e} samples",
-            given.name,
-            number::significant(motion.seconds(), 4),
-            number::significant(rate, 4)
-        ))
-        .hint("give a shorter motion, or a lower `rate_hz` in [control]"));
+        let [s, hz] = [motion.seconds(), rate].map(|x| number::significant(x, 4));
+        let text = format!(
+            "{}: {s} s at {hz} Hz are more than {MOST_ROWS:e} samples",
+            given.name
+        );
+        return Err(
+            CliError::input(text).hint("give a shorter motion, or a lower `rate_hz` in [control]")
+        );
     }
     let n = robot.coordinates();
     let (mut t, mut q) = (Vec::new(), Vec::new());
@@ -73,25 +74,16 @@ fn planned(
     Ok((log, Some(given.provenance)))
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: [&Path; 2] = [&args.log.path, &args.model];
-    context.check_outputs(&inputs, &[args.output.as_path()])?;
+    context.check_outputs([&*args.log.path, &*args.model], [&*args.output])?;
     let given = files::model(&args.model, context)?;
     let (name, file) = (&given.value.name, &given.value.file);
     let machine = given.value.machine();
     let joints = machine.robot.joint_names();
-    let named = |kind: &'static str| joints.iter().map(move |j| format!("{kind}_{j}"));
-    let band = match file.held_out.is_empty() {
-        true => Vec::new(),
-        false => vec!["band_lower", "band_upper"],
-    };
     let n = joints.len();
-    let columns: Vec<String> = std::iter::once("t".to_owned())
-        .chain(named("tau"))
-        .chain(named("tau_std"))
-        .chain(band.into_iter().flat_map(named))
-        .collect();
+    let kinds = ["tau", "tau_std", "band_lower", "band_upper"];
+    let kinds = &kinds[..if file.held_out.is_empty() { 2 } else { 4 }];
+    let columns = columns_of(kinds, joints);
     let (log, trajectory) = match args.log.path.extension().is_some_and(|end| end == "toml") {
         true => planned(&args.log.path, (name, file), context)?,
         false => (Log::from(&args.log), None),
@@ -101,7 +93,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let found = identify::torque(
         &given.value,
         &log,
-        context.control(),
+        &context.control,
         &mut |t, values, origin| {
             if failed.is_none() {
                 out.set_origin(origin);
@@ -136,11 +128,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut inputs = found.inputs.clone();
     inputs.splice(0..0, trajectory);
     let document = Document::new("torque", &inputs, &found.warnings, &found.along)?;
-    context.files().add_log(out)?;
+    context.files.add_log(out)?;
     let written = format!("written: {}", args.output.display());
-    Ok(Outcome {
-        text: context.text(format!("{table}{written}\n"), &written),
+    Ok(Outcome::new(
+        context.text(format!("{table}{written}\n"), &written),
         document,
-        missed: Vec::new(),
-    })
+    ))
 }

@@ -1,9 +1,10 @@
 //! `cft-ident track`: the parameters of robots over their logs.
 
+use std::ffi::OsStr;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files};
+use super::{CliError, Context, Outcome, arguments, files, outputs};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{
@@ -34,16 +35,13 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
-    let outputs = args.output.iter().chain(&args.report);
-    let outputs: Vec<&Path> = outputs.map(PathBuf::as_path).collect();
-    context.check_outputs(&inputs, &outputs)?;
-    let found = identify::track(&robots(args, context)?, context.control())?;
+    let outputs = outputs::listed(args.output.as_deref(), &[], args.report.as_deref());
+    context.check_outputs(args.files.iter().map(PathBuf::as_path), outputs)?;
+    let found = identify::track(&robots(args, context)?, &context.control)?;
     let document = Document::new("track", &found.inputs, &found.warnings, &found)?;
     let mut report = stages::track::track(&found);
-    stages::track::origin(&mut report.page(), &found, context.command());
+    stages::track::origin(&mut report.page(), &found, &context.command);
     context.check()?;
     if let Some(path) = &args.output {
         context.write_text(path, &csv(&found))?;
@@ -51,11 +49,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(path) = &args.report {
         context.write_text(path, &report.html())?;
     }
-    Ok(Outcome {
-        text: report.text_for(context.detail()),
-        document,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(report.text_for(context.detail), document))
 }
 
 /// The robots: files of one folder are one, in the order in which folders come.
@@ -77,11 +71,8 @@ fn robots(args: &Args, context: &Context) -> Result<Vec<RobotSources>, CliError>
             }
         };
         let sources = &mut robots[place].sources;
-        if is_reduced(path)
-            || path
-                .extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("cfi"))
-        {
+        let named = |end: &OsStr| end.eq_ignore_ascii_case("cfi");
+        if is_reduced(path) || path.extension().is_some_and(named) {
             let file = sources.last().map_or(0, |_| number);
             let logs = ReducedLogs::load(path)?;
             sources.extend(logs.logs().iter().map(|log| TrackSource::Part {

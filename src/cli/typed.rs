@@ -13,8 +13,7 @@ const OUTPUTS: [&str; 6] = [
     "--samples",
 ];
 
-/// The line: absolute paths are cut to their last part, and left out where they name an output, as
-/// is the number of threads, so that the same run makes the same report everywhere.
+/// The line without folders from the root on and without what changes no result, so that it is the same everywhere.
 pub(super) fn line(arguments: &[OsString]) -> String {
     let mut words = vec!["cft-ident".to_owned()];
     let mut rest = arguments.iter().skip(1).map(|a| a.to_string_lossy());
@@ -45,7 +44,6 @@ pub(super) fn line(arguments: &[OsString]) -> String {
     words.join(" ")
 }
 
-/// Logs one after the other.
 pub(super) fn logs(all: impl Iterator<Item = String>) -> String {
     all.map(|log| quoted(&log)).collect::<Vec<_>>().join(" ")
 }

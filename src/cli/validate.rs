@@ -1,10 +1,13 @@
 //! `cft-ident validate`: the torque of a log that was not used, reconstructed by a model.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::{CliError, Context, Outcome, arguments, files, logs, names_of, outputs, pictures};
+use super::{
+    CliError, Context, Outcome, arguments, columns_of, files, logs, names_of, outputs, paths_of,
+    pictures, written,
+};
 use cft_ident_core::number;
-use cft_ident_core::validate::{Reconstructed, TorqueErrors};
+use cft_ident_core::validate::{JointError, Reconstructed, TorqueErrors};
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_report::report::json::Document;
@@ -57,30 +60,13 @@ pub fn missed(errors: &TorqueErrors, limit: Option<f64>) -> Vec<String> {
     let Some(limit) = limit else {
         return Vec::new();
     };
-    errors
-        .joints
-        .iter()
-        // an error that is not a number is no error within the limit
-        .filter(|e| e.relative_error.is_nan() || e.relative_error > limit)
-        .map(|e| {
-            format!(
-                "{}: relative error {} is above {}",
-                e.joint,
-                number::percent(e.relative_error),
-                number::percent(limit)
-            )
-        })
-        .collect()
-}
-
-/// Columns of the residual file: measured, reconstructed and residual torque of every joint, and the band where
-/// there is one.
-fn columns(joints: &[String], band: bool) -> Vec<String> {
-    let kinds = ["tau", "tau_hat", "residual", "band_lower", "band_upper"];
-    let named = kinds[..if band { 5 } else { 3 }]
-        .iter()
-        .flat_map(|kind| joints.iter().map(move |joint| format!("{kind}_{joint}")));
-    std::iter::once("t".to_owned()).chain(named).collect()
+    // an error that is not a number is no error within the limit
+    let above = |e: &&JointError| e.relative_error.is_nan() || e.relative_error > limit;
+    let words = |e: &JointError| {
+        let [error, limit] = [e.relative_error, limit].map(number::percent);
+        format!("{}: relative error {error} is above {limit}", e.joint)
+    };
+    errors.joints.iter().filter(above).map(words).collect()
 }
 
 fn residual_row(r: &Reconstructed, band: bool) -> impl Iterator<Item = f64> {
@@ -91,13 +77,10 @@ fn residual_row(r: &Reconstructed, band: bool) -> impl Iterator<Item = f64> {
         (r.reconstructed.iter().zip(half)).map(move |(tau, half)| tau + sign * half)
     };
     let limits = limits(-1.0).chain(limits(1.0));
-    std::iter::once(r.t)
-        .chain(torques)
-        .chain(residual)
-        .chain(limits)
+    let columns = torques.chain(residual).chain(limits);
+    std::iter::once(r.t).chain(columns)
 }
 
-/// Errors of simulated positions, for a person.
 fn drifts(found: &OpenLoop) -> String {
     let mut table = Table::new(&[
         ("joint", Align::Left),
@@ -118,14 +101,7 @@ fn drifts(found: &OpenLoop) -> String {
         let [rms, end, largest] =
             [joint.rms, joint.rms_at_end, joint.max_abs].map(|x| number::significant(x, 4));
         let share = number::percent(joint.relative);
-        table.row([
-            joint.joint.as_str(),
-            &rms,
-            &end,
-            &largest,
-            &share,
-            joint.unit,
-        ]);
+        table.row([&joint.joint, &rms, &end, &largest, &share, joint.unit]);
     }
     let astray = match found.astray {
         0 => String::new(),
@@ -134,27 +110,19 @@ fn drifts(found: &OpenLoop) -> String {
     format!("\n{table}{astray}")
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: Vec<&Path> = args
-        .logs
-        .iter()
-        .map(|l| l.path.as_path())
-        .chain([args.model.as_path()])
-        .collect();
     let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
-    context.check_outputs(&inputs, &outputs)?;
+    context.check_outputs(paths_of(&args.logs).chain([&*args.model]), outputs)?;
     let given = files::model(&args.model, context)?;
     let (file, model) = (&given.value.file, given.value.numbers()?);
     let machine = given.value.machine();
     let band = !file.held_out.is_empty();
-    let mut residual = match &args.output {
-        None => None,
-        Some(path) => Some(LogWriter::create(
-            path,
-            &columns(machine.robot.joint_names(), band),
-        )?),
-    };
+    let kinds = ["tau", "tau_hat", "residual", "band_lower", "band_upper"];
+    let kinds = &kinds[..if band { 5 } else { 3 }];
+    let columns = columns_of(kinds, machine.robot.joint_names());
+    let output = args.output.as_ref();
+    let output = output.map(|path| LogWriter::create(path, &columns));
+    let mut residual = output.transpose()?;
     let mut failed = None;
     let logs = logs(&args.leave_out.of(&args.logs))?;
     let part = logs.iter().find(|log| matches!(log, Log::Reduced(_)));
@@ -175,7 +143,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let found = identify::validate(
         &Dataset::new(&machine, &logs),
         &settings,
-        context.control(),
+        &context.control,
         &mut |r, origin| {
             if let Some(file) = &mut residual
                 && failed.is_none()
@@ -205,7 +173,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     if args.report.is_some() {
         // pictures are of the rows that the numbers are of
-        let smoothed = machine.smoothed_for(&logs, &model, context.control())?;
+        let smoothed = machine.smoothed_for(&logs, &model, &context.control)?;
         let in_memory = pictures::in_memory(&smoothed, &logs, context)?;
         let used = match found.by_use {
             Some(_) => identify::used_for(file, &found.inputs),
@@ -220,7 +188,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let quality = pictures::inspected(&args.logs, &machine, context)?;
         let mut page = report.page();
         let replayed = replayed.as_ref();
-        stages::validate::pictures(&mut page, &of, replayed, &quality, context.command());
+        stages::validate::pictures(&mut page, &of, replayed, &quality, &context.command);
     }
     context.check()?;
     if let Some(path) = &args.report {
@@ -231,15 +199,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_picture(path, &figure.svg())?;
     }
     if let Some(file) = residual {
-        context.files().add_log(file)?;
+        context.files.add_log(file)?;
     }
     for path in args.output.iter().chain(&args.plot) {
-        report
-            .terminal()
-            .line(&format!("written: {}", path.display()));
+        written(&mut report, path);
     }
     Ok(Outcome {
-        text: report.text_for(context.detail()),
+        text: report.text_for(context.detail),
         document,
         missed: missed(found.judged(), args.max_relative_error),
     })

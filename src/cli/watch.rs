@@ -3,7 +3,9 @@
 use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, RunningBar, arguments, context, files};
+use super::context::{self, RunningBar};
+use super::outcome::no_standard_output;
+use super::{CliError, Context, Outcome, arguments, columns_of, files, logs_of, paths_of};
 use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
@@ -42,7 +44,6 @@ pub struct Args {
     pub output: Option<PathBuf>,
 }
 
-/// Where rows go.
 enum Sink {
     Lines(Lines),
     /// A line an alarm, and where the watch stands.
@@ -51,7 +52,6 @@ enum Sink {
     None,
 }
 
-/// What a person at a terminal sees.
 struct People {
     /// Whether an alarm is on.
     on: bool,
@@ -70,10 +70,8 @@ impl People {
         self.rows += 1;
         if self.rows % STATUS == 1 {
             let plural = if self.alarms == 1 { "" } else { "s" };
-            self.status.label(&format!(
-                "watching, {t:.1} s, {} alarm{plural}",
-                self.alarms
-            ));
+            let text = format!("watching, {t:.1} s, {} alarm{plural}", self.alarms);
+            self.status.label(&text);
         }
         match line.alarm {
             Some(alarm) if !self.on => {
@@ -104,74 +102,53 @@ struct Lines {
 
 impl Lines {
     fn write(&mut self, line: &WatchLine) -> io::Result<()> {
-        let out = &mut self.out;
-        write!(
-            out,
-            "{{\"t\":{},\"joints\":[",
-            line.origin.seconds() + line.t
+        let origin = line.origin.seconds();
+        let torques = line.external.iter().zip(line.std);
+        let torques = self.joints.iter().zip(torques);
+        let of = |(name, (external, std)): (&String, (&f64, &f64))| torque(name, *external, *std);
+        let joints: Vec<String> = torques.map(of).collect();
+        let alarm = line.alarm.map_or("null".to_owned(), |alarm| {
+            let of = alarm.joints.iter();
+            let joints = of.map(|of| torque(&in_json(&of.joint), of.external, of.std));
+            let (from, joints) = (origin + alarm.from_s, joints.collect::<Vec<_>>().join(","));
+            format!("{{\"from_s\":{from},\"joints\":[{joints}]}}")
+        });
+        let (t, joints) = (origin + line.t, joints.join(","));
+        writeln!(
+            self.out,
+            "{{\"t\":{t},\"joints\":[{joints}],\"alarm\":{alarm}}}"
         )?;
-        let values = line.external.iter().zip(line.std);
-        for (i, (joint, (external, std))) in self.joints.iter().zip(values).enumerate() {
-            let comma = if i > 0 { "," } else { "" };
-            write!(
-                out,
-                "{comma}{{\"joint\":{joint},\"external\":{external:.5e},\"std\":{std:.5e}}}"
-            )?;
-        }
-        match line.alarm {
-            None => writeln!(out, "],\"alarm\":null}}")?,
-            Some(alarm) => {
-                let from = line.origin.seconds() + alarm.from_s;
-                write!(out, "],\"alarm\":{{\"from_s\":{from},\"joints\":[")?;
-                for (i, of) in alarm.joints.iter().enumerate() {
-                    let comma = if i > 0 { "," } else { "" };
-                    write!(
-                        out,
-                        "{comma}{{\"joint\":{},\"external\":{:.5e},\"std\":{:.5e}}}",
-                        in_json(&of.joint),
-                        of.external,
-                        of.std
-                    )?;
-                }
-                writeln!(out, "]}}}}")?;
-            }
-        }
         if self.at_once {
-            out.flush()?;
+            self.out.flush()?;
         }
         Ok(())
     }
 }
 
-/// A name as a JSON string.
+/// External torque of a joint, whose name is a JSON string, as JSON.
+fn torque(joint: &str, external: f64, std: f64) -> String {
+    format!("{{\"joint\":{joint},\"external\":{external:.5e},\"std\":{std:.5e}}}")
+}
+
 fn in_json(name: &str) -> String {
     serde_json::Value::from(name).to_string()
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let of_stream = args.log.path == Path::new(STREAM);
-    let mut inputs = vec![args.model.as_path()];
-    inputs.extend(args.unloaded.iter().map(|log| log.path.as_path()));
-    if !of_stream {
-        inputs.push(&args.log.path);
-    }
-    let outputs: Vec<&Path> = args.output.as_deref().into_iter().collect();
-    context.check_outputs(&inputs, &outputs)?;
+    let log = (!of_stream).then_some(&*args.log.path);
+    let inputs = paths_of(&args.unloaded).chain([&*args.model]).chain(log);
+    context.check_outputs(inputs, args.output.as_deref())?;
     let given = files::model(&args.model, context)?;
     let machine = given.value.machine();
     let joints = machine.robot.joint_names();
     let mut sink = match &args.output {
         Some(path) => {
-            let named = |kind: &'static str| joints.iter().map(move |j| format!("{kind}_{j}"));
-            let columns: Vec<String> = std::iter::once("t".to_owned())
-                .chain(named("external"))
-                .chain(named("external_std"))
-                .chain(["alarm".to_owned()])
-                .collect();
+            let mut columns = columns_of(&["external", "external_std"], joints);
+            columns.push("alarm".to_owned());
             Sink::File(Box::new(LogWriter::create(path, &columns)?))
         }
-        None if context.prints_document() => Sink::None,
+        None if context.prints_document => Sink::None,
         None if io::stdout().is_terminal() => Sink::People(People {
             on: false,
             alarms: 0,
@@ -191,7 +168,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         true => Watchable::Stream(Box::new(io::stdin())),
         false => Watchable::Log(Log::from(&args.log)),
     };
-    let unloaded: Vec<Log> = args.unloaded.iter().map(Log::from).collect();
+    let unloaded = logs_of(&args.unloaded);
     let settings = WatchSettings {
         per_hour: args.false_alarms,
         unloaded: &unloaded,
@@ -201,7 +178,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         &given.value,
         input,
         &settings,
-        context.control(),
+        &context.control,
         &mut |line| match put(&mut sink, line) {
             Ok(goes_on) => goes_on,
             Err(error) => {
@@ -223,7 +200,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let text = match sink {
         Sink::File(log) => {
-            context.files().add_log(*log)?;
+            context.files.add_log(*log)?;
             let path = args.output.as_deref().unwrap_or(Path::new(""));
             format!("{text}written: {}\n", path.display())
         }
@@ -235,52 +212,39 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
         Sink::None | Sink::People(_) => text,
     };
-    Ok(Outcome {
-        text,
-        document,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(text, document))
 }
 
 /// Writes what a row shows; whether anybody reads on.
 fn put(sink: &mut Sink, line: &WatchLine) -> Result<bool, CliError> {
     match sink {
-        Sink::None => Ok(true),
-        Sink::People(people) => {
-            people.take(line);
-            Ok(true)
-        }
+        Sink::None => {}
+        Sink::People(people) => people.take(line),
         Sink::File(log) => {
             log.set_origin(line.origin);
             let alarm = f64::from(u8::from(line.alarm.is_some()));
             let values = line.external.iter().chain(line.std).copied();
             log.row(std::iter::once(line.t).chain(values).chain([alarm]))?;
-            Ok(true)
         }
         Sink::Lines(lines) => match lines.write(line) {
-            Ok(()) => Ok(true),
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
-            Err(error) => Err(CliError::output(format!(
-                "cannot write to standard output: {error}"
-            ))
-            .hint("look at where it leads: a full disk, a program that has ended")),
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(false),
+            written => written.map_err(|error| no_standard_output(&error))?,
         },
     }
+    Ok(true)
 }
 
-/// How much was seen, in a line.
 fn verdict(found: &Watched) -> String {
+    let alarms = found.alarms.len();
     format!(
-        "{} rows, {:.1} s; {} alarm{}, {} of the rows beyond the threshold",
+        "{} rows, {:.1} s; {alarms} alarm{}, {} of the rows beyond the threshold",
         found.samples,
         found.duration_s,
-        found.alarms.len(),
-        if found.alarms.len() == 1 { "" } else { "s" },
+        if alarms == 1 { "" } else { "s" },
         number::percent(found.beyond)
     )
 }
 
-/// What was seen, for a person.
 fn text_of(found: &Watched, log: &str) -> String {
     let mut table = Table::new(&[
         ("joint", Align::Left),
@@ -319,12 +283,8 @@ fn text_of(found: &Watched, log: &str) -> String {
             format!("{} {size} (std {std})", of.joint)
         });
         let joints: Vec<String> = joints.collect();
-        text += &format!(
-            "  {:.3} .. {:.3} s: {}\n",
-            alarm.from_s,
-            alarm.to_s,
-            joints.join(", ")
-        );
+        let ([from, to], joints) = ([alarm.from_s, alarm.to_s], joints.join(", "));
+        text += &format!("  {from:.3} .. {to:.3} s: {joints}\n");
     }
     if found.alarms.len() > 20 {
         text += &format!("  and {} more\n", found.alarms.len() - 20);
@@ -336,13 +296,14 @@ fn text_of(found: &Watched, log: &str) -> String {
         });
         let numbers: Vec<String> = numbers.collect();
         let of = found.joint.as_ref().map(|joint| format!(" of {joint}"));
-        text += &format!(
-            "a change of {}{} takes away {} of the alarms' power: {}\n",
+        let (kind, of, share) = (
             found.kind,
             of.unwrap_or_default(),
             number::percent(found.share),
-            numbers.join(", ")
         );
+        let numbers = numbers.join(", ");
+        text +=
+            &format!("a change of {kind}{of} takes away {share} of the alarms' power: {numbers}\n");
     }
     text
 }

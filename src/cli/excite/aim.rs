@@ -14,7 +14,6 @@ use cft_ident_stages::identify::LoggedRobot;
 /// Samples of a period of the motion that stands for a usual one.
 const SAMPLES_PER_PERIOD: usize = 100;
 
-/// What the next motion is for.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Aim {
     /// The parameters that are not identified.
@@ -32,12 +31,13 @@ impl Aim {
     /// `weak`, or `EFFECT:JOINT`.
     pub fn of(text: &str, file: &RobotFile) -> Result<Self, CliError> {
         let Some((name, joint)) = text.split_once(':') else {
+            let wrong = format!(
+                "--for takes `weak` or EFFECT:JOINT, and not `{}`",
+                escape(text)
+            );
             return match text {
                 "weak" => Ok(Self::Weak),
-                _ => Err(CliError::usage(format!(
-                    "--for takes `weak` or EFFECT:JOINT, and not `{}`",
-                    escape(text)
-                ))),
+                _ => Err(CliError::usage(wrong)),
             };
         };
         let effect = entry(name).ok_or_else(|| {
@@ -66,8 +66,7 @@ impl Aim {
     }
 }
 
-/// Fundamental of a motion that uses positions and speeds alike \[Hz\]: of the middle coordinate, the frequency of a
-/// swing over all of its positions at its speed; that of other designs at most.
+/// Frequency of the middle coordinate's swing over its positions at its speed; that of other designs at most.
 pub(super) fn fundamental(machine: &ForeseenRobot) -> f64 {
     let of = |quantity, i| {
         let mut channels = machine.channels.iter();

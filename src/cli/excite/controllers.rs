@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::{Bench, Names, samples};
-use crate::cli::error::CliError;
+use crate::cli::CliError;
+use crate::cli::controller::name_in_controller;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
 use cft_ident_logs::log::{escape, escape_whole};
@@ -16,8 +17,7 @@ const MOST_POINTS: f64 = 1e6;
 /// Joints of an arm that speaks URScript.
 const OF_UR: usize = 6;
 
-/// Writes the files for controllers that are asked for: `trajectory_msgs/msg/JointTrajectory`, as YAML or in
-/// MCAP by the ending, and a program in URScript. Their paths.
+/// Writes the files for controllers that are asked for; their paths.
 pub(super) fn write<'a>(
     bench: &Bench,
     motion: &Motion,
@@ -30,16 +30,13 @@ pub(super) fn write<'a>(
     }
     let trajectory = sampled(bench, motion, judged)?;
     if let Some(path) = &names.message {
-        let recording = path
-            .extension()
-            .is_some_and(|end| end.eq_ignore_ascii_case("mcap"));
-        match recording {
-            true => {
-                let failed = |error| CliError::input(format!("{}: {error}", path.display()));
-                let bytes = trajectory.mcap().map_err(failed)?;
-                bench.context.files().write(path, &bytes)?;
-            }
-            false => bench.context.write_text(path, &trajectory.yaml())?,
+        let end = path.extension();
+        if end.is_some_and(|end| end.eq_ignore_ascii_case("mcap")) {
+            let failed = |error| CliError::input(format!("{}: {error}", path.display()));
+            let bytes = trajectory.mcap().map_err(failed)?;
+            bench.context.files.write(path, &bytes)?;
+        } else {
+            bench.context.write_text(path, &trajectory.yaml())?;
         }
         written.push(path.as_path());
     }
@@ -47,14 +44,11 @@ pub(super) fn write<'a>(
         let robot = &bench.machine.model.robot;
         let turns = (0..robot.joints()).all(|j| robot.joint_kind(j) == JointKind::Revolute);
         if robot.joints() != OF_UR || !turns {
-            return Err(CliError::usage(format!(
-                "--urscript is for arms of {OF_UR} joints that turn"
-            ))
-            .hint(format!(
-                "this robot has the joints {}",
-                escape(&robot.joint_names().join(", "))
-            ))
-            .hint("--samples and --trajectory-message write the motion of any robot"));
+            let joints = escape(&robot.joint_names().join(", "));
+            let text = format!("--urscript is for arms of {OF_UR} joints that turn");
+            return Err(CliError::usage(text)
+                .hint(format!("this robot has the joints {joints}"))
+                .hint("--samples and --trajectory-message write the motion of any robot"));
         }
         bench.context.write_text(path, &trajectory.urscript())?;
         written.push(path.as_path());
@@ -80,10 +74,11 @@ fn sampled(
         let state = machine.joints(&at).map_err(ExciteError::Robot)?;
         points.push([state.q, state.v, state.a].map(|x| x[..n].to_vec()));
     }
-    let log = &bench.file.log.joint;
-    let named = machine.model.robot.joint_names().iter().map(|joint| {
-        let shown = log.get(joint).and_then(|channels| channels.name.clone());
-        shown.unwrap_or_else(|| joint.clone())
+    let named = machine.model.robot.joint_names().iter();
+    let named = named.map(|joint| {
+        name_in_controller(&bench.file, joint)
+            .unwrap_or(joint)
+            .clone()
     });
     Ok(JointTrajectory {
         names: named.collect(),

@@ -7,26 +7,23 @@ use cft_ident_plant::excite::machine::ForeseenRobot;
 
 /// 1/noise per joint where the criterion weighs rows, else ones.
 pub fn weights(machine: &ForeseenRobot, criterion: &Criterion) -> Vec<f64> {
-    if criterion.weighted() {
-        machine.noise.iter().map(|s| 1.0 / s).collect()
-    } else {
-        vec![1.0; machine.coordinates()]
+    match criterion.weighted() {
+        true => machine.noise.iter().map(|s| 1.0 / s).collect(),
+        false => vec![1.0; machine.coordinates()],
     }
 }
 
 pub fn criterion(bench: &Bench) -> Result<Criterion, CliError> {
     let args = bench.args;
     let names = bench.machine.unknown_names();
-    let chosen: Vec<usize> = args
-        .parameters
-        .iter()
-        .map(|name| {
-            names.iter().position(|n| n == name).ok_or_else(|| {
-                CliError::usage(format!("no parameter is called {name}"))
-                    .hint(format!("the parameters are {}", names.join(", ")))
-            })
+    let place = |name: &String| {
+        names.iter().position(|n| n == name).ok_or_else(|| {
+            CliError::usage(format!("no parameter is called {name}"))
+                .hint(format!("the parameters are {}", names.join(", ")))
         })
-        .collect::<Result<_, _>>()?;
+    };
+    let chosen = args.parameters.iter().map(place);
+    let chosen = chosen.collect::<Result<Vec<usize>, _>>()?;
     if !chosen.is_empty() && args.criterion != CriterionName::AOptimal {
         return Err(CliError::usage(
             "--parameter belongs to --criterion a-optimal",
@@ -48,11 +45,12 @@ pub fn criterion(bench: &Bench) -> Result<Criterion, CliError> {
             let mut factors = vec![0.0; names.len()];
             for k in chosen {
                 if values[k] == 0.0 {
-                    return Err(CliError::usage(format!(
-                        "{} is 0 in the model, so its relative error has no meaning",
-                        names[k]
-                    ))
-                    .hint("give a model with -m in which it is not"));
+                    let name = &names[k];
+                    let text =
+                        format!("{name} is 0 in the model, so its relative error has no meaning");
+                    return Err(
+                        CliError::usage(text).hint("give a model with -m in which it is not")
+                    );
                 }
                 factors[k] = 1.0 / (values[k] * values[k]);
             }

@@ -55,7 +55,7 @@ pub(super) fn add(
         CliError::usage(error.explanation().of(format!("--with {name}")))
     })?;
     let logs = LoggedRobot::new(name, bench.file.clone());
-    let mut log = logs.open_positions(&Log::from(&spec), bench.context.control())?;
+    let mut log = logs.open_positions(&Log::from(&spec), &bench.context.control)?;
     let (sums, summary) = accumulate(
         &logs.robot,
         &bench.machine.columns,

@@ -8,7 +8,6 @@ use cft_ident_plant::excite::{
     GivenInformation, Judgement, LawForeseen, Motion, MotionTerms, judge,
 };
 
-/// Judges a motion by the limits given.
 pub(super) fn judged(
     bench: &Bench,
     motion: &Motion,
@@ -31,13 +30,11 @@ pub(super) fn judged(
 
 /// A design that breaks a limit is never written.
 pub(super) fn refuse_broken(judged: &Judgement) -> Result<(), CliError> {
-    match judged.broken().into_iter().next() {
-        None => Ok(()),
-        Some(first) => Err(CliError::input(format!(
-            "the motion found breaks a limit, nothing was written: {first}"
-        ))
-        .hint("leave more of the limits free with --margin")),
-    }
+    let Some(first) = judged.broken().into_iter().next() else {
+        return Ok(());
+    };
+    let text = format!("the motion found breaks a limit, nothing was written: {first}");
+    Err(CliError::input(text).hint("leave more of the limits free with --margin"))
 }
 
 /// The comment at the head of the trajectory file.

@@ -18,6 +18,7 @@ use super::error::CliError;
 use super::exit::Exit;
 use super::outcome::Outcome;
 use super::{arguments, files, keep_what_there_is};
+use crate::cli;
 use cft_ident_files::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_plant::excite::ladder::foresee_ladder;
@@ -174,19 +175,12 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 /// A frequency of a machine's motion: a robot follows some Hz.
 fn frequency(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (1e-4..=1e3).contains(&value) => Ok(value),
-        Ok(_) => Err("must lie in 0.0001..1000 Hz".into()),
-        Err(_) => Err("is not a number".into()),
-    }
+    let wrong = "must lie in 0.0001..1000 Hz";
+    arguments::number(text, wrong, |x| (1e-4..=1e3).contains(&x))
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (0.0..0.9).contains(&value) => Ok(value),
-        Ok(_) => Err("must lie in 0..0.9".into()),
-        Err(_) => Err("is not a number".into()),
-    }
+    arguments::number(text, "must lie in 0..0.9", |x| (0.0..0.9).contains(&x))
 }
 
 impl From<ExciteError> for CliError {
@@ -199,7 +193,6 @@ impl From<ExciteError> for CliError {
     }
 }
 
-/// What a run works on.
 struct Bench<'a> {
     args: &'a Args,
     context: &'a Context,
@@ -214,16 +207,12 @@ struct Bench<'a> {
     inputs: Vec<Provenance>,
 }
 
-/// Designs or checks.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all = Names::of(args);
-    let mut read: Vec<&Path> = args.robot.iter().map(PathBuf::as_path).collect();
-    read.extend(args.model.as_deref());
-    read.extend(args.check.as_deref());
-    read.extend(args.offsets.as_deref());
-    read.extend(args.with.iter().map(Path::new));
-    let outputs: Vec<&Path> = all.iter().flat_map(Names::paths).collect();
-    context.check_outputs(&read, &outputs)?;
+    let read = [&args.robot, &args.model, &args.check, &args.offsets];
+    let read = read.into_iter().filter_map(|path| path.as_deref());
+    let read = read.chain(args.with.iter().map(Path::new));
+    context.check_outputs(read, all.iter().flat_map(Names::paths))?;
 
     let model = args.model.as_deref();
     let model = model.map(|path| files::model(path, context)).transpose()?;
@@ -234,42 +223,33 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             let path = path.as_deref().unwrap_or(Path::new(ROBOT));
             let given = files::robot(path)?;
             inputs.push(given.provenance);
-            let name = path.file_name().unwrap_or_default();
-            (name.to_string_lossy().into_owned(), given.value)
+            (cli::file_name(path), given.value)
         }
     };
     if let Some(given) = &model {
         given.value.file.belongs_to(&given.name, &file)?;
         inputs.push(given.provenance.clone());
     }
-    let named = model
-        .as_ref()
-        .map(|given| (given.name.as_str(), &given.value.file));
-    let aim = args
-        .aim
-        .as_ref()
-        .map(|text| Aim::of(text, &file))
-        .transpose()?;
+    let named = model.as_ref();
+    let named = named.map(|given| (given.name.as_str(), &given.value.file));
+    let aim = args.aim.as_ref();
+    let aim = aim.map(|text| Aim::of(text, &file)).transpose()?;
     if let (Some(_), Some((_, model))) = (&aim, named) {
         model.limit_to_seen(&mut file.limits);
     }
     let mut machine = machine(&file, named)?;
     let names = machine.coordinate_names();
     if let Some(from) = args.from.as_ref().filter(|from| from.len() != names.len()) {
-        return Err(
-            CliError::usage(format!("--from gives {} numbers", from.len()))
-                .hint(format!("give one for each of {}", names.join(", "))),
-        );
+        let text = format!("--from gives {} numbers", from.len());
+        let hint = format!("give one for each of {}", names.join(", "));
+        return Err(CliError::usage(text).hint(hint));
     }
     let frequency_hz = args.frequency.unwrap_or_else(|| match aim {
         Some(_) => aim::fundamental(&machine),
         None => FUNDAMENTAL_HZ,
     });
-    let usual = usual_torque(
-        &machine,
-        std::f64::consts::TAU * frequency_hz,
-        usize::from(args.harmonics),
-    );
+    let fundamental = std::f64::consts::TAU * frequency_hz;
+    let usual = usual_torque(&machine, fundamental, usize::from(args.harmonics));
     given::noise(&file, &usual, &mut machine);
     let rate_hz = args.rate.or(file.control.rate_hz).unwrap_or(RATE_HZ);
     if let (Some(_), Some((_, model))) = (&aim, named) {
@@ -311,15 +291,9 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
     bench.inputs.push(given.provenance);
     let motion = Motion::of_file(&bench.machine, &given.value, args.seconds, args.seed)?;
     let channels = bench.machine.channels.clone();
+    let joints = bench.machine.model.robot.joint_names();
     let friction = match &given.value {
-        Trajectory::SingleJoint(file)
-            if bench
-                .machine
-                .model
-                .robot
-                .joint_names()
-                .contains(&file.joint) =>
-        {
+        Trajectory::SingleJoint(file) if joints.contains(&file.joint) => {
             let task = ladder_task(bench, &file.joint);
             Some(LawForeseen {
                 joint: file.joint.clone(),
@@ -330,11 +304,11 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
         _ => None,
     };
     let judged = judged(bench, &motion, &channels, None, friction)?;
-    let report = written(bench, &motion, &judged, names, &given.name)?;
+    let report = written(bench, &motion, &judged, names, (&given.name, None))?;
+    let document = Document::new("excite", &bench.inputs, &judged.warnings, &judged)?;
     Ok(Outcome {
-        text: report.text_for(bench.context.detail()),
-        document: Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
         missed: judged.broken(),
+        ..Outcome::new(report.text_for(bench.context.detail), document)
     })
 }
 
@@ -375,17 +349,14 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         let mut judged = judged(bench, &motion, channels, any.then_some(&given), None)?;
         judged.evaluations = Some(found.evaluations);
         refuse_broken(&judged)?;
-        let file = names.trajectory.clone().unwrap_or_default();
-        let shown = file.display().to_string();
-        let mut report = written(bench, &motion, &judged, names, &shown)?;
-        let context = bench.context;
-        context.write_text(&file, &Trajectory::Fourier(fourier).to_toml(&head(&judged)))?;
-        report.terminal().line(&format!("written: {shown}"));
-        text += &report.text_for(context.detail());
+        let (shown, context) = (names.shown(), bench.context);
+        let trajectory = Some(Trajectory::Fourier(fourier));
+        let report = written(bench, &motion, &judged, names, (&shown, trajectory))?;
+        text += &report.text_for(context.detail);
         warnings.extend(judged.warnings.iter().cloned());
         all.push(judged);
         if found.stopped {
-            context.files().commit()?;
+            context.files.commit()?;
             return Err(CliError::new(Exit::Interrupted, "interrupted")
                 .hint(format!("the best motion so far is written to {shown}")));
         }
@@ -395,52 +366,44 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         any = true;
     }
     let result = Judgements::of(all).ok_or_else(|| CliError::usage("no motion is asked for"))?;
-    Ok(Outcome {
-        text,
-        document: Document::new("excite", &bench.inputs, &warnings, &result)?,
-        missed: Vec::new(),
-    })
+    let document = Document::new("excite", &bench.inputs, &warnings, &result)?;
+    Ok(Outcome::new(text, document))
 }
 
-/// The report of a motion, after page, picture and samples were written where they are asked for;
-/// `shown` is the trajectory's path.
+/// The report of a motion, after all that is asked for is written: its trajectory, named `shown`, where it is new.
 fn written(
     bench: &Bench,
     motion: &Motion,
     judged: &Judgement,
     names: &Names,
-    shown: &str,
+    (shown, trajectory): (&str, Option<Trajectory>),
 ) -> Result<Report, CliError> {
-    let title = Path::new(shown).file_name().unwrap_or_default();
-    let title = title.to_string_lossy();
+    let title = cli::file_name(Path::new(shown));
     let mut report = stages::excite::excite(judged, shown, &title);
     let figure = |title: &str| stages::excite::figure(&bench.machine, motion, judged, title);
     if let Some(path) = &names.report {
         let mut page = report.page();
         stages::excite::course(&mut page, judged, &figure(&escape(&title)));
-        let (file, command) = (&bench.file, bench.context.command());
+        let (file, command) = (&bench.file, &bench.context.command);
         provenance::section(&mut page, file, &bench.inputs, &[], None, command);
         bench.context.write_text(path, &report.html())?;
-        report
-            .terminal()
-            .line(&format!("written: {}", path.display()));
+        cli::written(&mut report, path);
     }
     if let Some(path) = &names.plot {
         bench.context.write_picture(path, &figure(&title).svg())?;
-        report
-            .terminal()
-            .line(&format!("written: {}", path.display()));
+        cli::written(&mut report, path);
     }
     if let Some(path) = &names.samples {
         samples::write(bench, motion, path)?;
-        report
-            .terminal()
-            .line(&format!("written: {}", path.display()));
+        cli::written(&mut report, path);
     }
     for path in controllers::write(bench, motion, judged, names)? {
-        report
-            .terminal()
-            .line(&format!("written: {}", path.display()));
+        cli::written(&mut report, path);
+    }
+    if let (Some(path), Some(trajectory)) = (&names.trajectory, trajectory) {
+        let text = trajectory.to_toml(&head(judged));
+        bench.context.write_text(path, &text)?;
+        cli::written(&mut report, path);
     }
     Ok(report)
 }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use super::Args;
 
-/// Files of one motion.
 pub(super) struct Names {
     pub trajectory: Option<PathBuf>,
     pub samples: Option<PathBuf>,
@@ -17,36 +16,33 @@ pub(super) struct Names {
 impl Names {
     /// One set for each motion; several are numbered.
     pub fn of(args: &Args) -> Vec<Self> {
-        (1..=args.trajectories)
-            .map(|k| {
-                let numbered = |path: &Option<PathBuf>| {
-                    path.as_ref().map(|path| match args.trajectories {
-                        1 => path.clone(),
-                        _ => with_number(path, k),
-                    })
-                };
-                Self {
-                    trajectory: numbered(&args.output),
-                    samples: numbered(&args.samples),
-                    message: numbered(&args.trajectory_message),
-                    urscript: numbered(&args.urscript),
-                    plot: numbered(&args.plot),
-                    report: numbered(&args.report),
-                }
-            })
-            .collect()
+        let numbered = |path: &Option<PathBuf>, k: u16| match args.trajectories {
+            1 => path.clone(),
+            _ => path.as_ref().map(|path| with_number(path, k)),
+        };
+        let names = |k: u16| Self {
+            trajectory: numbered(&args.output, k),
+            samples: numbered(&args.samples, k),
+            message: numbered(&args.trajectory_message, k),
+            urscript: numbered(&args.urscript, k),
+            plot: numbered(&args.plot, k),
+            report: numbered(&args.report, k),
+        };
+        (1..=args.trajectories).map(names).collect()
+    }
+
+    /// The trajectory as it is reported.
+    pub fn shown(&self) -> String {
+        let path = self.trajectory.as_deref().unwrap_or(Path::new(""));
+        path.display().to_string()
     }
 
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        let all = [
-            &self.trajectory,
-            &self.samples,
-            &self.message,
-            &self.urscript,
-            &self.plot,
-            &self.report,
-        ];
-        all.into_iter().filter_map(|path| path.as_deref())
+        let all = [&self.trajectory, &self.samples, &self.message];
+        let all = all
+            .into_iter()
+            .chain([&self.urscript, &self.plot, &self.report]);
+        all.filter_map(|path| path.as_deref())
     }
 }
 

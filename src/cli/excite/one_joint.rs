@@ -1,11 +1,10 @@
 //! The one-joint experiment.
 
 use super::aim::Aim;
-use super::judge::{head, judged, refuse_broken};
+use super::judge::{judged, refuse_broken};
 use super::names::Names;
 use super::{Bench, written};
-use crate::cli::error::CliError;
-use crate::cli::outcome::Outcome;
+use crate::cli::{CliError, Outcome};
 use cft_ident_files::config::Trajectory;
 use cft_ident_plant::excite::ladder::{LadderTask, design_ladder};
 use cft_ident_plant::excite::{LawForeseen, Motion};
@@ -26,16 +25,14 @@ pub(super) fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
     }
 }
 
-/// Designs the one-joint experiment of a joint.
 pub(super) fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError> {
     let bar = bench.context.progress("designing", None);
-    let found = design_ladder(&bench.machine, &ladder_task(bench, joint))?;
+    let task = ladder_task(bench, joint);
+    let found = design_ladder(&bench.machine, &task)?;
     drop(bar);
     bench.context.check()?;
     let trajectory = Trajectory::SingleJoint(found.file);
-    let args = bench.args;
-    let seconds = ladder_task(bench, joint).seconds;
-    let motion = Motion::of_file(&bench.machine, &trajectory, seconds, args.seed)?;
+    let motion = Motion::of_file(&bench.machine, &trajectory, task.seconds, task.seed)?;
     let friction = LawForeseen {
         joint: joint.to_owned(),
         parameters: found.expected,
@@ -45,16 +42,10 @@ pub(super) fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcom
     let mut judged = judged(bench, &motion, channels, None, Some(friction))?;
     judged.evaluations = Some(found.evaluations);
     refuse_broken(&judged)?;
-    let file = names.trajectory.clone().unwrap_or_default();
-    let shown = file.display().to_string();
-    let mut report = written(bench, &motion, &judged, names, &shown)?;
-    bench
-        .context
-        .write_text(&file, &trajectory.to_toml(&head(&judged)))?;
-    report.terminal().line(&format!("written: {shown}"));
-    Ok(Outcome {
-        text: report.text_for(bench.context.detail()),
-        document: Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
-        missed: Vec::new(),
-    })
+    let of = (&*names.shown(), Some(trajectory));
+    let report = written(bench, &motion, &judged, names, of)?;
+    Ok(Outcome::new(
+        report.text_for(bench.context.detail),
+        Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
+    ))
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Bench;
-use crate::cli::error::CliError;
+use crate::cli::{CliError, columns_of};
 use cft_ident_core::number;
 use cft_ident_files::config::trajectory::Coordinates;
 use cft_ident_logs::output::LogWriter;
@@ -14,17 +14,12 @@ const MOST_ROWS: f64 = 1e8;
 /// Rows between two looks at Ctrl-C.
 const BLOCK: usize = 4096;
 
-/// Writes t, the joints' positions, speeds and accelerations, and those of the actuator coordinates
-/// where the robot has them.
+/// Writes t, and positions, speeds and accelerations of the joints and of actuators that differ.
 pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), CliError> {
     let machine = &bench.machine;
     let n = machine.coordinates();
     let actuators = machine.designed() == Coordinates::Cartesian;
-    let mut header = vec!["t".to_owned()];
-    for prefix in ["q_", "dq_", "ddq_"] {
-        let joints = machine.model.robot.joint_names().iter();
-        header.extend(joints.map(|joint| format!("{prefix}{joint}")));
-    }
+    let mut header = columns_of(&["q", "dq", "ddq"], machine.model.robot.joint_names());
     if actuators {
         for prefix in ["", "d", "dd"] {
             let names = machine.coordinate_names().into_iter();
@@ -47,18 +42,15 @@ pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), C
         let values = values.flat_map(|values| values[..n].iter().copied());
         writer.row(std::iter::once(t).chain(values))?;
     }
-    Ok(bench.context.files().add_log(writer)?)
+    Ok(bench.context.files.add_log(writer)?)
 }
 
 /// Number of samples of a motion, of which a file may have `most`.
 pub(super) fn rows(bench: &Bench, motion: &Motion, most: f64) -> Result<usize, CliError> {
     if motion.seconds() * bench.rate_hz > most {
-        return Err(CliError::input(format!(
-            "{} s at {} Hz are more than {most:e} samples",
-            number::significant(motion.seconds(), 4),
-            number::significant(bench.rate_hz, 4),
-        ))
-        .hint("give a lower --rate, or a shorter motion"));
+        let [s, hz] = [motion.seconds(), bench.rate_hz].map(|x| number::significant(x, 4));
+        let text = format!("{s} s at {hz} Hz are more than {most:e} samples");
+        return Err(CliError::input(text).hint("give a lower --rate, or a shorter motion"));
     }
     Ok((motion.seconds() * bench.rate_hz + 1e-6).floor() as usize + 1)
 }

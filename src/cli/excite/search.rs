@@ -27,16 +27,11 @@ pub(super) fn task(bench: &mut Bench) -> Result<Task, CliError> {
     })
 }
 
-/// The search, with its bar.
 pub(super) fn searched(bench: &Bench, task: &Task) -> Result<FoundMotion, CliError> {
     let context = bench.context;
     let bar = context.progress("designing", Some(task.most_evaluations()));
-    let found = design(
-        &bench.machine,
-        task,
-        &|steps| bar.advance(steps),
-        context.stop_flag(),
-    );
+    let advance = |steps| bar.advance(steps);
+    let found = design(&bench.machine, task, &advance, context.stop_flag());
     found.map_err(|error| match context.interrupted() {
         true => CliError::interrupted(),
         false => error.into(),
@@ -47,14 +42,8 @@ pub(super) fn searched(bench: &Bench, task: &Task) -> Result<FoundMotion, CliErr
 pub(super) fn blended(bench: &Bench, series: Series) -> Result<(Motion, FourierSection), CliError> {
     let (args, machine) = (bench.args, &bench.machine);
     let reserved = machine.channels.iter().map(|c| c.reserved(args.margin));
-    let reserved: Vec<_> = reserved.collect();
-    let blend = Blend::within(
-        machine,
-        &reserved,
-        &series,
-        args.periods,
-        args.from.as_deref(),
-    )?;
+    let (reserved, from): (Vec<_>, _) = (reserved.collect(), args.from.as_deref());
+    let blend = Blend::within(machine, &reserved, &series, args.periods, from)?;
     let fourier = FourierSection {
         start_s: Some(blend.start),
         blend_s: Some(blend.seconds),
@@ -64,7 +53,6 @@ pub(super) fn blended(bench: &Bench, series: Series) -> Result<(Motion, FourierS
     Ok((Motion::Periodic { series, blend }, fourier))
 }
 
-/// Offsets that a file fixes.
 fn offsets(bench: &mut Bench) -> Result<Vec<Option<f64>>, CliError> {
     let n = bench.machine.coordinates();
     let Some(path) = &bench.args.offsets else {
@@ -80,10 +68,9 @@ fn offsets(bench: &mut Bench) -> Result<Vec<Option<f64>>, CliError> {
     };
     let series = series_of(&bench.machine, file)?;
     let names = bench.machine.coordinate_names();
-    Ok((0..n)
-        .map(|i| {
-            let named = file.series.iter().any(|c| c.name == names[i]);
-            named.then_some(series.offset[i])
-        })
-        .collect())
+    let offset = |i: usize| {
+        let named = file.series.iter().any(|c| c.name == names[i]);
+        named.then_some(series.offset[i])
+    };
+    Ok((0..n).map(offset).collect())
 }

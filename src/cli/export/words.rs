@@ -16,7 +16,6 @@ pub(super) fn effects(file: &ModelFile) -> Vec<String> {
     file.effects.iter().map(of).collect()
 }
 
-/// What the files of simulators cannot say, as a table.
 pub(super) fn beyond_table(beyond: &[Beyond]) -> String {
     if beyond.is_empty() {
         return String::new();
@@ -39,7 +38,6 @@ pub(super) fn beyond_table(beyond: &[Beyond]) -> String {
     format!("\n{table}")
 }
 
-/// What a header or module says of effects.
 pub(super) fn about_effects(program: &Program, left_out: &[String]) -> Vec<String> {
     if !left_out.is_empty() {
         let all = left_out.join(", ");
@@ -82,7 +80,6 @@ pub(super) fn never_driving(program: &Program) -> Vec<String> {
     words.collect()
 }
 
-/// What a URDF says of effects.
 pub(super) fn beside_urdf(file: &ModelFile, left_out: &[String]) -> Vec<String> {
     let (own, all) = (effects(file), left_out.join(", "));
     match (own.is_empty(), left_out.is_empty()) {

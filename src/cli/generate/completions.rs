@@ -15,15 +15,11 @@ pub struct Args {
     pub shell: Shell,
 }
 
-/// Runs the command.
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "cft-ident", &mut script);
     let text = String::from_utf8_lossy(&script).into_owned();
     let result = json!({"shell": args.shell.to_string(), "script": text});
-    Ok(Outcome {
-        document: Document::new("generate", &[], &[], &result)?,
-        text,
-        missed: Vec::new(),
-    })
+    let document = Document::new("generate", &[], &[], &result)?;
+    Ok(Outcome::new(text, document))
 }

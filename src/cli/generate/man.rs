@@ -17,7 +17,6 @@ pub struct Args {
     pub folder: PathBuf,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if !args.folder.is_dir() {
         return Err(
@@ -49,9 +48,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let text = format!("written: {}\n", written.join(", "));
     let result = json!({"files": written});
-    Ok(Outcome {
+    Ok(Outcome::new(
         text,
-        document: Document::new("generate", &[], &[], &result)?,
-        missed: Vec::new(),
-    })
+        Document::new("generate", &[], &[], &result)?,
+    ))
 }

@@ -29,7 +29,6 @@ pub enum What {
     Man(man::Args),
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     match &args.what {
         What::Schema(args) => schema::run(args),

@@ -113,15 +113,13 @@ pub fn schema(kind: Kind) -> Value {
     }
 }
 
-/// Runs the command.
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let found = schema(args.kind);
     let text = format!("{found:#}\n");
     let name = args.kind.to_possible_value();
     let result = serde_json::json!({"kind": name.as_ref().map(|n| n.get_name()), "of": found});
-    Ok(Outcome {
-        document: Document::new("generate", &[], &[], &result)?,
+    Ok(Outcome::new(
         text,
-        missed: Vec::new(),
-    })
+        Document::new("generate", &[], &[], &result)?,
+    ))
 }

@@ -8,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, inspect};
+use super::{CliError, Context, Outcome, file_name, inspect};
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::{Capsules, RobotFile, UrdfChain};
 use cft_ident_logs::inspect::{LogFault, Severity};
@@ -57,12 +57,11 @@ pub struct Args {
 }
 
 pub(super) fn rate(text: &str) -> Result<f64, String> {
-    let rate: Option<f64> = text.parse().ok();
-    rate.filter(|rate| rate.is_finite() && *rate > 0.0)
-        .ok_or_else(|| "give a number above 0".to_owned())
+    let rate = text.parse().ok();
+    let rate = rate.filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    rate.ok_or_else(|| "give a number above 0".to_owned())
 }
 
-/// What the robot is, as far as it can be seen.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shape {
     /// A URDF beside the robot file, by the path that the file will hold.
@@ -94,7 +93,6 @@ pub struct Drafted {
     faults: Option<Vec<LogFault>>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let target = match args.name.extension() {
         Some(end) if end == "toml" => args.name.clone(),
@@ -105,74 +103,41 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     };
     if target.exists() {
-        return Err(
-            CliError::output(format!("{} is there already", target.display()))
-                .hint("choose another name, or delete the file"),
-        );
+        let text = format!("{} is there already", target.display());
+        return Err(CliError::output(text).hint("choose another name, or delete the file"));
     }
-    let inputs: Vec<&Path> = [
-        args.urdf.as_deref(),
-        args.log.as_ref().map(|l| l.path.as_path()),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    context.check_outputs(&inputs, &[&target])?;
-    let Described {
-        text,
-        file,
-        mapping,
-        seen,
-        shape,
-        model,
-        cutoff_hz,
-        mut warnings,
-    } = describe(args, &target, context)?;
+    let log = args.log.as_ref().map(|l| &*l.path);
+    let inputs = args.urdf.as_deref().into_iter().chain(log);
+    context.check_outputs(inputs, [&*target])?;
+    let found = describe(args, &target, context)?;
+    let (mapping, seen, mut warnings) = (found.mapping, found.seen, found.warnings);
+    let place = target.display();
     let (mut unread, mut faults) = (false, None);
     if let Some(spec) = &args.log {
-        if let Err(error) = Reader::open(spec, &file.layout()) {
+        if let Err(error) = Reader::open(spec, &found.file.layout()) {
             unread = true;
-            warnings.push(format!(
-                "the log cannot be read with this file yet: {error}; correct [log] in {}",
-                target.display()
-            ));
+            let text = "the log cannot be read with this file yet";
+            warnings.push(format!("{text}: {error}; correct [log] in {place}"));
         } else {
-            let machine = LoggedRobot::new(&target.to_string_lossy(), file);
-            let found = inspect::findings(spec, &machine, context);
-            faults = Some(found?.faults);
+            let machine = LoggedRobot::new(&target.to_string_lossy(), found.file);
+            faults = Some(inspect::findings(spec, &machine, context)?.faults);
         }
     }
-    context.write_text(&target, &text)?;
-    let mut provenance = Vec::new();
-    if let Some(path) = &args.urdf {
-        provenance.push(Provenance::of_file(path)?);
-    }
-    if let Some(seen) = &seen {
-        provenance.push(seen.provenance.clone());
-    }
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("position", Align::Left),
-        ("velocity", Align::Left),
-        ("torque", Align::Left),
-    ])
-    .caption(&format!("written: {}", target.display()));
-    let or_dash = |column: &Option<String>| column.clone().unwrap_or_else(|| "-".to_owned());
+    context.write_text(&target, &found.text)?;
+    let urdf = args.urdf.as_deref().map(Provenance::of_file).transpose()?;
+    let log = seen.as_ref().map(|seen| seen.provenance.clone());
+    let provenance: Vec<Provenance> = urdf.into_iter().chain(log).collect();
+    let columns = ["joint", "position", "velocity", "torque"].map(|name| (name, Align::Left));
+    let mut table = Table::new(&columns).caption(&format!("written: {place}"));
     for joint in &mapping.joints {
-        table.row([
-            joint.joint.as_str(),
-            &or_dash(&joint.position),
-            &or_dash(&joint.velocity),
-            &or_dash(&joint.torque),
-        ]);
+        let found = [&joint.position, &joint.velocity, &joint.torque];
+        let [q, v, tau] = found.map(|column| column.as_deref().unwrap_or("-"));
+        table.row([&joint.joint, q, v, tau]);
     }
-    let place = target.display();
-    let wrong = faults
-        .iter()
-        .flatten()
-        .any(|f| f.severity == Severity::Error);
+    let mut all = faults.iter().flatten();
+    let wrong = all.any(|f| f.severity == Severity::Error);
     let next = match &args.log {
-        _ if shape == Shape::Rows => format!(
+        _ if found.shape == Shape::Rows => format!(
             "next: fill in the modified Denavit-Hartenberg rows ([[robot.link]]) of {place}\n"
         ),
         None => format!("next: cft-ident inspect LOG -r {place}\n"),
@@ -190,30 +155,25 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let all: Vec<&String> = mapping.checks.iter().chain(&mapping.torque_check).collect();
     let checks = checks_in_lines(&all);
-    let found = inspected(faults.as_deref());
+    let inspected = inspected(faults.as_deref());
     let result = Drafted {
-        file: target
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
-        model,
+        file: file_name(&target),
+        model: found.model,
         joints: mapping.joints.clone(),
         rate_hz: seen.as_ref().and_then(|s| s.rate_hz),
-        cutoff_hz,
+        cutoff_hz: found.cutoff_hz,
         topic: seen.as_ref().and_then(|s| s.topic.clone()),
         checks: all.iter().map(|check| (*check).clone()).collect(),
         faults,
     };
     let brief = match all.len() {
-        0 => format!("written: {}", target.display()),
-        n => format!("written: {}, {n} to look at (CHECK IT)", target.display()),
+        0 => format!("written: {place}"),
+        n => format!("written: {place}, {n} to look at (CHECK IT)"),
     };
-    Ok(Outcome {
-        text: context.text(format!("{table}{checks}{found}{next}"), &brief),
-        document: Document::new("new", &provenance, &warnings, &result)?,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(
+        context.text(format!("{table}{checks}{inspected}{next}"), &brief),
+        Document::new("new", &provenance, &warnings, &result)?,
+    ))
 }
 
 /// A robot file as it was drafted.
@@ -232,10 +192,8 @@ impl Described {
     /// What is a guess, each with the line to change.
     pub fn guesses(&self) -> Vec<String> {
         let mapping = &self.mapping;
-        let of_joints = mapping.checks.iter().map(|check| {
-            let place = "[log.joint] of robot.toml";
-            format!("{check} ({place})")
-        });
+        let of_joints = mapping.checks.iter();
+        let of_joints = of_joints.map(|check| format!("{check} ([log.joint] of robot.toml)"));
         let torque = mapping.torque_check.iter();
         let torque = torque.map(|check| format!("{check} (torque_is in [log] of robot.toml)"));
         let clock = self.seen.iter().filter_map(|seen| match &seen.clock {
@@ -266,12 +224,11 @@ pub(super) fn describe(
     target: &Path,
     context: &Context,
 ) -> Result<Described, CliError> {
-    let (mut chain, mut capsules) = (None, Capsules::default());
-    if let Some(path) = &args.urdf {
-        let found = UrdfChain::load(path, args.tip.as_deref())?;
-        capsules = found.capsules(path);
-        chain = Some(found);
-    }
+    let urdf = args.urdf.as_deref();
+    let chain = urdf.map(|path| UrdfChain::load(path, args.tip.as_deref()));
+    let chain = chain.transpose()?;
+    let both = chain.as_ref().zip(urdf);
+    let capsules = both.map(|(chain, path)| chain.capsules(path));
     let known: Option<Vec<Known>> = chain.as_ref().map(joints_of);
     let asked = Asked {
         rate_hz: args.rate,
@@ -279,10 +236,10 @@ pub(super) fn describe(
     };
     let bar = context.progress("looking at the log", None);
     let joints = known.as_ref().map(Vec::len);
-    let seen = match &args.log {
-        Some(spec) => Some(look(spec, &asked, joints, &|| context.interrupted())?),
-        None => None,
-    };
+    let stop = || context.interrupted();
+    let log = args.log.as_ref();
+    let seen = log.map(|spec| look(spec, &asked, joints, &stop));
+    let seen = seen.transpose()?;
     drop(bar);
     let mapping = Mapping::of(known.as_deref(), seen.as_ref());
     let shape = match (&args.urdf, mapping.joints.len()) {
@@ -294,15 +251,12 @@ pub(super) fn describe(
         (None, _) => Shape::Rows,
     };
     let mut draft = Draft {
-        name: target
-            .file_stem()
-            .map(|stem| escape(&stem.to_string_lossy()))
-            .unwrap_or_default(),
+        name: escape(&target.file_stem().unwrap_or_default().to_string_lossy()),
         shape,
         mapping: &mapping,
         seen: seen.as_ref(),
         chain: chain.as_ref(),
-        capsules,
+        capsules: capsules.unwrap_or_default(),
         touching: Vec::new(),
     };
     // what is written must be readable, and the log by it
@@ -354,7 +308,6 @@ pub(super) fn describe(
 /// Lines of a terminal that say what is to be looked at.
 const CHECKS: usize = 5;
 
-/// What is to be looked at, in a few lines.
 fn checks_in_lines(checks: &[&String]) -> String {
     let shown = match checks.len() > CHECKS {
         true => CHECKS - 1,
@@ -364,7 +317,7 @@ fn checks_in_lines(checks: &[&String]) -> String {
     let mut out: String = lines.map(|check| format!("CHECK IT: {check}\n")).collect();
     if shown < checks.len() {
         let more = checks.len() - shown;
-        out.push_str(&format!("CHECK IT: {more} more, marked so in the file\n"));
+        out += &format!("CHECK IT: {more} more, marked so in the file\n");
     }
     out
 }
@@ -444,15 +397,10 @@ fn beside(file: &Path, from: &Path) -> String {
     let (Ok(file_full), Ok(folder_full)) = (file.canonicalize(), folder.canonicalize()) else {
         return file.display().to_string();
     };
-    let (to, at): (Vec<Component>, Vec<Component>) = (
-        file_full.components().collect(),
-        folder_full.components().collect(),
-    );
-    let shared = to.iter().zip(&at).take_while(|(a, b)| a == b).count();
-    let mut path = PathBuf::new();
-    for _ in shared..at.len() {
-        path.push("..");
-    }
-    path.extend(&to[shared..]);
+    let (to, at) = (file_full.components(), folder_full.components());
+    let pairs = to.clone().zip(at.clone());
+    let shared = pairs.take_while(|(a, b)| a == b).count();
+    let up = at.skip(shared).map(|_| Component::ParentDir);
+    let path: PathBuf = up.chain(to.skip(shared)).collect();
     path.display().to_string()
 }

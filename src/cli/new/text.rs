@@ -9,7 +9,6 @@ use cft_ident_files::config::{Capsules, UrdfChain};
 use cft_ident_logs::log::{escape, list};
 use cft_ident_logs::mapping::{ClockSource, JointColumns, Mapping, SeenColumns};
 
-/// What the text is made from.
 pub(super) struct Draft<'a> {
     pub name: String,
     pub shape: Shape,
@@ -45,14 +44,12 @@ impl Draft<'_> {
         }
     }
 
-    /// Cut-off of the parallel filter: some twelve samples a period, and at most 20 Hz, above which
-    /// few drives and no arm follow.
+    /// Cut-off of the parallel filter: some twelve samples a period, and 20 Hz, above which no arm follows.
     pub(super) fn cutoff_hz(&self) -> Option<f64> {
         let rate = self.seen.and_then(|s| s.rate_hz)?;
         Some((rate / 12.5).min(20.0))
     }
 
-    /// The whole file.
     pub(super) fn text(&self) -> String {
         let mut out = format!(
             "# {}: a robot file of cft-ident. SI units and radians.\n",
@@ -123,10 +120,8 @@ impl Draft<'_> {
             "\n# Capsules that hold the collision shapes of the URDF. Those of links that are no neighbours keep apart.\n",
         );
         if !self.touching.is_empty() {
-            let pairs = self.touching.iter();
-            let pairs: Vec<String> = pairs
-                .map(|[one, other]| format!("[{}, {}]", quoted(one), quoted(other)))
-                .collect();
+            let pair = |[one, other]: &[String; 2]| format!("[{}, {}]", quoted(one), quoted(other));
+            let pairs: Vec<String> = self.touching.iter().map(pair).collect();
             let _ = writeln!(
                 out,
                 "[limits]\n# They overlap in every pose that was tried.\ntouching = [{}]",
@@ -158,20 +153,15 @@ impl Draft<'_> {
                     "urdf = {}   # from the folder of this file",
                     quoted(path)
                 );
-                match tip {
-                    Some(tip) => {
-                        let _ = writeln!(out, "tip = {}", quoted(tip));
-                    }
-                    None => out.push_str("# tip = \"tool0\"               # link where the chain ends, where the URDF branches\n"),
-                }
+                out.push_str(&match tip {
+                    Some(tip) => format!("tip = {}\n", quoted(tip)),
+                    None => "# tip = \"tool0\"               # link where the chain ends, where the URDF branches\n".to_owned(),
+                });
                 out.push_str(serial);
             }
             Shape::Single(kind) => {
-                let name = self
-                    .mapping
-                    .joints
-                    .first()
-                    .map_or("q1", |j| j.joint.as_str());
+                let first = self.mapping.joints.first();
+                let name = first.map_or("q1", |j| j.joint.as_str());
                 let (kind, why) = match kind {
                     JointKind::Prismatic => (
                         "prismatic",
@@ -243,11 +233,8 @@ impl Draft<'_> {
             let _ = writeln!(out, "# CHECK IT: {check}.");
         }
         if !self.mapping.others.is_empty() {
-            let _ = writeln!(
-                out,
-                "# Others of the kind: {}.",
-                self.mapping.others.join(", ")
-            );
+            let others = self.mapping.others.join(", ");
+            let _ = writeln!(out, "# Others of the kind: {others}.");
         }
         self.temperatures(out);
         self.offered(out);
@@ -267,10 +254,7 @@ impl Draft<'_> {
              # torque_unit, torque_sign, torque_scale (gear ratio times torque constant).\n[log.joint]\n",
             self.mapping.how
         );
-        for line in lines {
-            out.push_str(&line);
-            out.push('\n');
-        }
+        lines.iter().for_each(|line| *out += &format!("{line}\n"));
     }
 
     /// Columns that nothing was found for, by the names that they share.
@@ -292,20 +276,16 @@ impl Draft<'_> {
     fn temperatures(&self, out: &mut String) {
         let joints = self.mapping.joints.iter();
         let found = joints.filter_map(|joint| Some((joint, joint.temperature.as_ref()?)));
-        let lines: Vec<String> = found
-            .map(|(joint, name)| {
-                format!(
-                    "#   {}: temperature = {}\n",
-                    key(&joint.joint),
-                    column(name)
-                )
-            })
-            .collect();
+        let lines = found.map(|(joint, name)| {
+            let (joint, column) = (key(&joint.joint), column(name));
+            format!("#   {joint}: temperature = {column}\n")
+        });
+        let lines: String = lines.collect();
         if !lines.is_empty() {
             out.push_str(
                 "# CHECK IT: temperatures of the drives? This key in the line of each joint in [log.joint] makes them signals:\n",
             );
-            out.push_str(&lines.concat());
+            out.push_str(&lines);
         }
     }
 
@@ -338,10 +318,8 @@ impl Draft<'_> {
                 if name != "t" || !guessed.is_empty() {
                     let _ = writeln!(out, "time = {}{guessed}", column(name));
                 }
-                let unit = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]
-                    .into_iter()
-                    .find(|(_, size)| size == seconds);
-                if let Some((unit, _)) = unit {
+                let mut units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)].into_iter();
+                if let Some((unit, _)) = units.find(|(_, size)| size == seconds) {
                     let _ = writeln!(out, "time_unit = {}", quoted(unit));
                 }
             }
@@ -350,11 +328,8 @@ impl Draft<'_> {
             let _ = writeln!(out, "topic = {}", quoted(topic));
             if !seen.other_topics.is_empty() {
                 let others: Vec<String> = seen.other_topics.iter().map(|t| escape(t)).collect();
-                let _ = writeln!(
-                    out,
-                    "# Other machines in the recording: {}.",
-                    others.join(", ")
-                );
+                let others = others.join(", ");
+                let _ = writeln!(out, "# Other machines in the recording: {others}.");
             }
         }
     }
@@ -409,23 +384,19 @@ fn columns(joint: &JointColumns, recording: bool) -> Option<String> {
             keys.push(format!("{what} = {}", column(found)));
         }
     }
-    if let Some(unit) = joint.position_unit {
-        keys.push(format!("position_unit = {}", quoted(unit)));
-    }
-    if joint.position_unit == Some("counts") && joint.position_scale.is_none() {
-        keys.push("position_scale = 1.0".to_owned());
-    }
-    if let Some(scale) = joint.position_scale {
-        keys.push(format!("position_scale = {scale:?}"));
-    }
-    if let Some(wrap) = joint.wrap {
-        keys.push(format!("wrap = {wrap:?}"));
-    }
-    if let Some(unit) = joint.torque_unit {
-        keys.push(format!("torque_unit = {}", quoted(unit)));
-    }
-    if let Some(scale) = joint.torque_scale {
-        keys.push(format!("torque_scale = {scale:?}"));
-    }
+    let counts = joint.position_unit == Some("counts");
+    let scale = joint.position_scale.or(counts.then_some(1.0));
+    let number = |x: f64| format!("{x:?}");
+    let values = [
+        ("position_unit", joint.position_unit.map(quoted)),
+        ("position_scale", scale.map(number)),
+        ("wrap", joint.wrap.map(number)),
+        ("torque_unit", joint.torque_unit.map(quoted)),
+        ("torque_scale", joint.torque_scale.map(number)),
+    ];
+    let given = values
+        .into_iter()
+        .filter_map(|(key, value)| Some((key, value?)));
+    keys.extend(given.map(|(key, value)| format!("{key} = {value}")));
     (!keys.is_empty()).then(|| format!("{} = {{ {} }}", key(&joint.joint), keys.join(", ")))
 }

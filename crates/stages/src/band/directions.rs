@@ -30,7 +30,6 @@ pub struct Direction {
 }
 
 impl Direction {
-    /// Nothing of each.
     /// Of all of them, in the order of [`ModelFile::model_covariance`].
     pub fn of(model: &Model, all: &[f64]) -> Self {
         let (theta, rest) = all.split_at(model.theta.len());
@@ -78,8 +77,7 @@ impl Directions {
         &self.each
     }
 
-    /// Variance of every joint's torque by these directions at a position, velocity and acceleration
-    /// \[N^2 or Nm^2\].
+    /// Variance of every joint's torque by these directions at a motion \[N^2 or Nm^2\].
     pub fn variances(&mut self, [q, v, a]: [&[f64]; 3], out: &mut [f64]) {
         out.fill(0.0);
         for direction in &self.each {
@@ -147,11 +145,11 @@ fn least_told(model: &Model, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec
     }
     // units aside
     let scale = DVector::from_fn(u, |i, _| covariance[(i, i)].max(0.0).sqrt());
-    let scaled = |m: &DMatrix<f64>, by: &dyn Fn(f64) -> f64| {
-        DMatrix::from_fn(u, u, |i, k| m[(i, k)] * by(scale[i]) * by(scale[k]))
+    let scaled = |m: &DMatrix<f64>, by: &DVector<f64>| {
+        DMatrix::from_fn(u, u, |i, k| m[(i, k)] * by[i] * by[k])
     };
-    let correlation = scaled(covariance, &|s| if s > 0.0 { 1.0 / s } else { 0.0 });
-    let reach = scaled(&reach, &|s| s);
+    let inverse = scale.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 });
+    let (correlation, reach) = (scaled(covariance, &inverse), scaled(&reach, &scale));
     if !(correlation.iter().chain(reach.iter())).all(|x| x.is_finite()) {
         return Vec::new();
     }

@@ -4,12 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use cft_ident_core::effect::{Added, AugmentedModel, Role, Scene};
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch, rest};
-use cft_ident_core::robot::model::{JointFriction, Model};
+use cft_ident_core::robot::model::JointFriction;
 
 /// Samples that are looked at together.
 const PIECE: usize = 16_384;
-/// Share of the information of all blocks that holds a model to itself: no direction is left without it that one
-/// block alone determines.
+/// Share of all blocks' information that holds a model to itself: without a block no direction is left free.
 const HOLD_SHARE: f64 = 0.01;
 
 /// Blocks of the same number of samples, one behind the other through all logs.
@@ -104,11 +103,7 @@ fn linear_of(law: &JointFriction) -> usize {
     }
 }
 
-/// The model with the linear parameters that all blocks but one give it, for each block: one step of least squares
-/// from the model, weighted by the residual of each joint, rows at rest left out.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
+/// The model that all blocks but one give: a weighted step of least squares from it, rows at rest left out.
 pub fn without_each(
     model: &AugmentedModel,
     free: &FreeColumns,
@@ -121,10 +116,8 @@ pub fn without_each(
     let (n, u) = (model.model.robot.joints(), layout.count);
     let mut sums = vec![vec![Sums::new(u); n]; folds.count()];
     for stretch in stretches {
-        add(model, &layout, stretch, filters, rest_speed, &mut |row| {
-            let fold = folds.of_time(stretch.log, row.t);
-            sums[fold][row.joint].add(row.places, row.columns, row.error);
-        })?;
+        let into = (folds, &mut sums[..]);
+        add(model, &layout, stretch, filters, rest_speed, into)?;
     }
     // one weight a joint, that of its residual in all blocks
     let weight = |j: usize| {
@@ -144,12 +137,11 @@ pub fn without_each(
         (h, g)
     };
     let each: Vec<(DMatrix<f64>, DVector<f64>)> = sums.iter().map(joined).collect();
-    let mut whole = (DMatrix::zeros(u, u), DVector::zeros(u));
-    for (h, g) in &each {
-        whole.0 += h;
-        whole.1 += g;
+    let (mut h, mut g) = (DMatrix::zeros(u, u), DVector::zeros(u));
+    for (of_h, of_g) in &each {
+        h += of_h;
+        g += of_g;
     }
-    let (h, g) = whole;
     let scale = DVector::from_fn(u, |i, _| {
         let d: f64 = h[(i, i)];
         if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
@@ -206,24 +198,14 @@ impl Sums {
     }
 }
 
-/// A filtered row of one joint.
-struct Row<'a> {
-    t: f64,
-    joint: usize,
-    /// Where its entries stand among the unknowns.
-    places: &'a [usize],
-    columns: &'a [f64],
-    error: f64,
-}
-
-/// Filtered, decimated rows of a stretch, piece by piece.
+/// Adds filtered, decimated rows of a stretch to the sums of their block and joint, piece by piece.
 fn add(
     model: &AugmentedModel,
     layout: &Layout,
     stretch: &Stretch,
     filters: &ParallelFilters,
     rest_speed: &[f64],
-    take: &mut dyn FnMut(&Row),
+    (folds, sums): (&Folds, &mut [Vec<Sums>]),
 ) -> Result<(), MotionError> {
     let n = model.model.robot.joints();
     let filter = filters.of(stretch);
@@ -242,13 +224,10 @@ fn add(
         direction: &torques.direction,
         tilt: Some(&torques.tilt),
     };
-    let joints: Vec<OfJoint> = model
-        .model
-        .robot
-        .parameters_by_joint()
-        .into_iter()
-        .enumerate()
-        .map(|(j, theta)| OfJoint::new(model, layout, &scene, (j, theta)))
+    let own = model.model.robot.parameters_by_joint();
+    let own = own.into_iter().enumerate();
+    let joints: Vec<OfJoint> = own
+        .map(|of| OfJoint::new(model, layout, &scene, of))
         .collect();
     let p = layout.theta;
     let speeds = rest_speed.iter().enumerate();
@@ -259,10 +238,10 @@ fn add(
         })
         .collect();
     let mut regressor = vec![0.0; n * p];
-    let mut channels: Vec<Vec<Vec<f64>>> = joints
+    let channels = joints
         .iter()
-        .map(|of| vec![Vec::new(); of.places.len() + 2])
-        .collect();
+        .map(|of| vec![Vec::new(); of.places.len() + 2]);
+    let mut channels: Vec<Vec<Vec<f64>>> = channels.collect();
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     for from in (0..stretch.len()).step_by(PIECE) {
         let piece = from..(from + PIECE).min(stretch.len());
@@ -284,16 +263,13 @@ fn add(
                 let weight = weights[j][k];
                 let last = [residual[j][k]];
                 let all = theta.chain(friction).chain(offset).chain(added).chain(last);
-                channels
-                    .iter_mut()
-                    .zip(all)
-                    .for_each(|(channel, x)| channel.push(weight * x));
-                if let Some(moving) = channels.last_mut() {
-                    moving.push(match model.model.friction[j].jumps() {
-                        true => rest::movement(v[j], rest_speed[j]),
-                        false => 1.0,
-                    });
-                }
+                let moving = match model.model.friction[j].jumps() {
+                    true => rest::movement(v[j], rest_speed[j]),
+                    false => 1.0,
+                };
+                let all = all.map(|x| weight * x).chain([moving]);
+                let pairs = channels.iter_mut().zip(all);
+                pairs.for_each(|(channel, x)| channel.push(x));
             }
         }
         for (j, (of, channels)) in joints.iter().zip(&channels).enumerate() {
@@ -308,13 +284,9 @@ fn add(
                 for (x, row) in columns.iter_mut().zip(&rows) {
                     *x = row[i];
                 }
-                take(&Row {
-                    t: stretch.t[piece.start + filter.sample_of(i)],
-                    joint: j,
-                    places: &of.places,
-                    columns: &columns,
-                    error: rows[u][i],
-                });
+                let t = stretch.t[piece.start + filter.sample_of(i)];
+                let fold = folds.of_time(stretch.log, t);
+                sums[fold][j].add(&of.places, &columns, rows[u][i]);
             }
         }
     }
@@ -346,10 +318,9 @@ impl OfJoint {
         places.extend(first..first + friction);
         places.extend(layout.offset[j]);
         let mut added = Vec::new();
+        let here = |effect: &Added| is_linear(effect) && effect.place.touches(j);
         let effects = model.effects.iter().zip(&layout.effects);
-        for (effect, first) in
-            effects.filter(|(effect, _)| is_linear(effect) && effect.place.touches(j))
-        {
+        for (effect, first) in effects.filter(|(effect, _)| here(effect)) {
             let columns = effect.columns(scene, j);
             places.extend(*first..*first + columns.len());
             added.extend(columns);
@@ -368,19 +339,14 @@ fn is_linear(effect: &Added) -> bool {
     effect.law.entry.role != Role::Shift
 }
 
-/// The model a step further.
 fn moved(model: &AugmentedModel, layout: &Layout, step: &DVector<f64>) -> AugmentedModel {
     let mut out = model.clone();
-    let Model {
-        theta,
-        friction,
-        offset,
-        ..
-    } = &mut out.model;
-    for (i, theta) in theta.iter_mut().enumerate() {
-        *theta += step[i];
-    }
-    for (law, (first, count)) in friction.iter_mut().zip(&layout.friction) {
+    let theta = out.model.theta.iter_mut();
+    theta
+        .zip(step.iter())
+        .for_each(|(theta, step)| *theta += step);
+    let friction = out.model.friction.iter_mut();
+    for (law, (first, count)) in friction.zip(&layout.friction) {
         let by = |c: usize| if c < *count { step[first + c] } else { 0.0 };
         match law {
             JointFriction::None => {}
@@ -395,7 +361,7 @@ fn moved(model: &AugmentedModel, layout: &Layout, step: &DVector<f64>) -> Augmen
             }
         }
     }
-    for (offset, place) in offset.iter_mut().zip(&layout.offset) {
+    for (offset, place) in out.model.offset.iter_mut().zip(&layout.offset) {
         *offset += place.map_or(0.0, |place| step[place]);
     }
     for (effect, first) in out.effects.iter_mut().zip(&layout.effects) {

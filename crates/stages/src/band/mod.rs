@@ -1,28 +1,21 @@
 //! Prediction bands of torques: noise, the parameters' deviations, and the model's own error as data show
 //! it that were set aside.
 //!
-//! [`without_each`] moves a model's linear parameters to what the logs say without each of some blocks; what
+//! `without_each` moves a model's linear parameters to what the logs say without each of some blocks; what
 //! those models leave in the block that they did not see is an error of prediction, and its quantiles are the
 //! band (split conformal prediction: Papadopoulos et al. 2002; Lei et al. 2018; blocks, as errors of
 //! neighbouring samples are alike: Chernozhukov, Wuthrich and Zhu 2018). They are kept by ranges of speed and
 //! of the model's torque. Half the width at a sample is sqrt(h^2 + 1.96^2 g'Cg), g the torque's gradient by the
 //! parameters, C their covariance: h is the quantile of sqrt(e^2 - 1.96^2 g'Cg), so that the band holds what
 //! it is asked to where data were and widens where parameters are used that the data hardly determine.
-//!
-//! | file | what |
-//! |---|---|
-//! | `folds` | blocks, and models without each |
-//! | `directions` | the deviation by the parameters that logs determine least, for observers |
-//! | `quantiles` | from errors to [`HeldOut`] |
-//! | this one | the band at a sample; motions that leave what was seen |
 
 mod directions;
 mod folds;
 mod quantiles;
 
-pub use directions::{Direction, Directions};
-pub use folds::{Folds, FreeColumns, without_each};
-pub use quantiles::{Error, edges, held_out, quantile};
+pub(crate) use directions::{Direction, Directions};
+pub(crate) use folds::{Folds, FreeColumns, without_each};
+pub(crate) use quantiles::{Error, held_out, quantile};
 
 use cft_ident_core::number;
 pub use cft_ident_core::robot::deviation::{Deviation, NORMAL_95};
@@ -61,7 +54,7 @@ impl<'a> Band<'a> {
 }
 
 /// How to get a band where the model file has none.
-pub const NO_BAND: &str = "the model file holds no [[held_out]], so that it is not known how far its torques are off: no band; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside for that";
+pub(crate) const NO_BAND: &str = "the model file holds no [[held_out]], so that it is not known how far its torques are off: no band; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside for that";
 
 /// Ranges that a motion takes up, beside those that a model was fitted and tried in.
 pub struct Reach<'a> {
@@ -125,8 +118,8 @@ impl<'a> Reach<'a> {
             let [from, to] = held.positions_seen;
             let room = BEYOND_SEEN_SHARE * (to - from);
             if low < from - room || high > to + room {
-                let [low, high, from, to] =
-                    [low, high, from, to].map(|x| number::significant(x, 3));
+                let ends = [low, high, from, to].map(|x| number::significant(x, 3));
+                let [low, high, from, to] = ends;
                 parts.push(format!(
                     "positions {low}..{high}, where {from}..{to} was seen"
                 ));

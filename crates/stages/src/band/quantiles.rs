@@ -42,14 +42,12 @@ pub fn edges(x: impl Iterator<Item = f64>, at: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Share of a sample of so many independent numbers whose quantile holds 95 % of the next ones on average:
-/// (n + 1) 0.95 of n.
+/// Quantile of so many independent numbers that holds 95 % of the next ones on average: (n + 1) 0.95 of n.
 fn level(effective: f64) -> f64 {
     (0.95 * (effective + 1.0) / effective.max(1.0)).min(1.0)
 }
 
-/// The band's widths, and what was seen; `independent` is the share of the samples that are. What alarms take is
-/// left open.
+/// The band's widths and what was seen, alarms left open; `independent` is the share of samples that are.
 pub fn held_out(joint: &str, errors: &[Error], samples: u64, independent: f64) -> HeldOut {
     let speed_edges = edges(errors.iter().map(|e| e.speed), &SPEEDS);
     let torque_edges = edges(errors.iter().map(|e| e.torque), &TORQUES);

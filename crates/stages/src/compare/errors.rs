@@ -46,16 +46,12 @@ const PIECES: usize = 30;
 const FEWEST: usize = 12;
 /// Rows of a piece, at least.
 const MIN_PIECE_ROWS: usize = 10;
-/// Seed of the bootstrap.
 const SEED: u64 = 19_890_901;
 
-/// PieceSquares of one joint over one piece: squared errors of both, squared torque.
+/// Of one joint over one piece: squared errors of both, squared torque.
 type PieceSquares = [f64; 3];
 
 /// Compares two models on stretches that are filtered alike.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
 pub fn differences(
     models: [&AugmentedModel; 2],
     stretches: &[Stretch],
@@ -68,25 +64,20 @@ pub fn differences(
     for stretch in stretches {
         let parallel = filters.of(stretch);
         let hats = models.map(|model| model.reconstruct(stretch));
-        let channels: Vec<&[f64]> = stretch
-            .tau
-            .iter()
-            .chain(hats.iter().flatten())
-            .map(Vec::as_slice)
-            .collect();
+        let channels = stretch.tau.iter().chain(hats.iter().flatten());
+        let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
         let count = parallel.rows(stretch.len());
         for first in (0..count).step_by(length) {
             let last = (first + length).min(count);
             let joint = |j: usize| {
                 let (tau, a, b) = (&rows[j], &rows[n + j], &rows[2 * n + j]);
-                (first..last).fold([0.0; 3], |sums: PieceSquares, i| {
-                    [
-                        sums[0] + (tau[i] - a[i]).powi(2),
-                        sums[1] + (tau[i] - b[i]).powi(2),
-                        sums[2] + tau[i] * tau[i],
-                    ]
-                })
+                let sum = |of: &dyn Fn(usize) -> f64| (first..last).fold(0.0, |s, i| s + of(i));
+                [
+                    sum(&|i| (tau[i] - a[i]).powi(2)),
+                    sum(&|i| (tau[i] - b[i]).powi(2)),
+                    sum(&|i| tau[i] * tau[i]),
+                ]
             };
             pieces.push((0..n).map(joint).collect());
         }
@@ -136,19 +127,17 @@ fn bootstrapped(pieces: &[Vec<PieceSquares>], n: usize) -> ErrorDifferences {
 mod tests {
     use super::*;
 
-    fn pieces(
-        a: impl Fn(usize) -> f64,
-        b: impl Fn(usize) -> f64,
-        count: usize,
-    ) -> Vec<Vec<PieceSquares>> {
-        (0..count).map(|k| vec![[a(k), b(k), 1.0]]).collect()
+    /// What is found of one joint with these squared errors in each of so many pieces.
+    fn found(a: impl Fn(usize) -> f64, b: impl Fn(usize) -> f64, count: usize) -> ErrorDifferences {
+        let pieces: Vec<_> = (0..count).map(|k| vec![[a(k), b(k), 1.0]]).collect();
+        bootstrapped(&pieces, 1)
     }
 
     #[test]
     fn what_both_models_miss_alike_cancels_from_the_interval() {
         // the error varies tenfold from piece to piece, and B is better by a tenth in each
         let wild = |k: usize| 0.01 * (1.0 + (k % 10) as f64);
-        let found = bootstrapped(&pieces(wild, |k| 0.81 * wild(k), 30), 1);
+        let found = found(wild, |k| 0.81 * wild(k), 30);
         let [low, high] = found.overall.interval_95.unwrap();
         let expected = -0.1 * (0.055_f64).sqrt();
         assert!((found.overall.difference - expected).abs() < 1e-12);
@@ -160,13 +149,12 @@ mod tests {
     fn a_difference_that_changes_its_sign_from_piece_to_piece_is_none() {
         let even = |k: usize| if k.is_multiple_of(2) { 0.04 } else { 0.05 };
         let odd = |k: usize| if k.is_multiple_of(2) { 0.05 } else { 0.04 };
-        let found = bootstrapped(&pieces(even, odd, 30), 1);
-        assert_eq!(found.overall.sign(), 0);
+        assert_eq!(found(even, odd, 30).overall.sign(), 0);
     }
 
     #[test]
     fn a_few_rows_give_no_interval() {
-        let found = bootstrapped(&pieces(|_| 0.04, |_| 0.01, 5), 1);
+        let found = found(|_| 0.04, |_| 0.01, 5);
         assert_eq!(found.overall.interval_95, None);
         assert!((found.overall.difference + 0.1).abs() < 1e-12);
         assert_eq!(found.overall.sign(), 0);

@@ -6,6 +6,8 @@ mod errors;
 mod parameters;
 mod runs;
 
-pub use errors::{Difference, ErrorDifferences, differences};
-pub use parameters::{Apart, ParameterEstimate, ParameterPair, Reason, SideBySide, side_by_side};
+pub use errors::Difference;
+pub(crate) use errors::{ErrorDifferences, differences};
+pub(crate) use parameters::side_by_side;
+pub use parameters::{Apart, ParameterEstimate, ParameterPair, Reason, SideBySide};
 pub use runs::{DiffError, ErrorChange, InputChange, RunDifference, VerdictChange, runs};

@@ -86,7 +86,7 @@ pub(super) struct ParameterEntry {
     pub(super) estimate: ParameterEstimate,
 }
 
-/// Pairs the parameters of two models by name, joint, unit and meaning.
+/// Pairs the parameters of two models.
 pub fn side_by_side(a: &ModelFile, b: &ModelFile) -> SideBySide {
     paired(&entries(a), &entries(b))
 }
@@ -126,10 +126,9 @@ fn partner<'a>(
 
 fn pair(a: &ParameterEntry, b: &ParameterEntry) -> ParameterPair {
     let difference = b.estimate.value - a.estimate.value;
-    let difference_std = spread(&a.estimate)
-        .zip(spread(&b.estimate))
-        .map(|(a, b)| a.hypot(b))
-        .filter(|std| *std > 0.0 && std.is_finite());
+    let both = spread(&a.estimate).zip(spread(&b.estimate));
+    let std = both.map(|(a, b)| a.hypot(b));
+    let difference_std = std.filter(|std| *std > 0.0 && std.is_finite());
     ParameterPair {
         name: a.name.clone(),
         joint: a.joint.clone(),
@@ -169,22 +168,19 @@ fn entries(model: &ModelFile) -> Vec<ParameterEntry> {
         let inertial = known.find(|info| p.joint.is_none() && info.name == p.name);
         inertial.map_or(String::new(), |info| info.meaning.to_string())
     };
-    let mut out: Vec<ParameterEntry> = model
-        .parameters
-        .iter()
-        .map(|p| ParameterEntry {
-            name: p.name.clone(),
-            joint: p.joint.clone(),
-            theta: p.theta,
-            unit: p.unit.clone(),
-            meaning: meaning(p),
-            estimate: ParameterEstimate {
-                value: p.value,
-                std: p.std,
-                verdict: p.verdict,
-            },
-        })
-        .collect();
+    let own = model.parameters.iter().map(|p| ParameterEntry {
+        name: p.name.clone(),
+        joint: p.joint.clone(),
+        theta: p.theta,
+        unit: p.unit.clone(),
+        meaning: meaning(p),
+        estimate: ParameterEstimate {
+            value: p.value,
+            std: p.std,
+            verdict: p.verdict,
+        },
+    });
+    let mut out: Vec<ParameterEntry> = own.collect();
     for (at, effect) in model.effects.iter().enumerate() {
         // an effect may be there more than once, as two ripples of one joint are
         let before = model.effects[..at].iter();

@@ -87,26 +87,23 @@ pub struct VerdictChange {
     pub b: Option<String>,
 }
 
-/// What one document says.
 #[derive(Default)]
 struct Said {
     parameters: Vec<ParameterEntry>,
-    errors: Vec<Error>,
-    verdicts: Vec<Judged>,
+    errors: Vec<Of<RelativeError>>,
+    verdicts: Vec<Of<String>>,
 }
 
-struct Error {
+/// Something that a document says, and what it is of.
+struct Of<T> {
     of: String,
     joint: Option<String>,
-    value: Option<f64>,
-    interval: Option<[f64; 2]>,
+    said: T,
 }
 
-struct Judged {
-    of: String,
-    joint: Option<String>,
-    verdict: String,
-}
+/// A relative error and its interval, where the document has them.
+#[derive(Clone, Copy)]
+struct RelativeError(Option<f64>, Option<[f64; 2]>);
 
 /// Sets two documents side by side; each is given with the name of its file.
 ///
@@ -140,7 +137,6 @@ pub fn runs(a: (&str, &Value), b: (&str, &Value)) -> Result<RunDifference, DiffE
     })
 }
 
-/// The command that wrote a document.
 fn command((file, document): (&str, &Value)) -> Result<String, DiffError> {
     let schema = document["schema"].as_str().unwrap_or_default();
     let mut parts = schema.split('/');
@@ -225,21 +221,20 @@ impl Said {
         }
         let overall = &document["overall"];
         if overall.is_object() {
-            self.errors.push(Error {
+            let value = overall["mean_relative_error"].as_f64();
+            self.errors.push(Of {
                 of: of.to_owned(),
                 joint: None,
-                value: overall["mean_relative_error"].as_f64(),
-                interval: interval(overall),
+                said: RelativeError(value, interval(overall)),
             });
         }
     }
 
     fn error(&mut self, of: &str, joint: &Value) {
-        self.errors.push(Error {
+        self.errors.push(Of {
             of: of.to_owned(),
             joint: text(&joint["joint"]),
-            value: joint["relative_error"].as_f64(),
-            interval: interval(joint),
+            said: RelativeError(joint["relative_error"].as_f64(), interval(joint)),
         });
     }
 
@@ -258,19 +253,17 @@ impl Said {
             estimate: ParameterEstimate {
                 value,
                 std: found["std"].as_f64(),
-                verdict: verdict(&found["verdict"]),
+                verdict: serde_json::from_value::<Verdict>(found["verdict"].clone()).ok(),
             },
         });
     }
 
     fn judge(&mut self, of: &str, joint: Option<String>, verdict: &Value) {
-        if let Some(verdict) = text(verdict) {
-            self.verdicts.push(Judged {
-                of: of.to_owned(),
-                joint,
-                verdict,
-            });
-        }
+        self.verdicts.extend(text(verdict).map(|said| Of {
+            of: of.to_owned(),
+            joint,
+            said,
+        }));
     }
 }
 
@@ -291,47 +284,45 @@ fn changed_inputs(a: &Value, b: &Value) -> Vec<InputChange> {
     [only(a, b, "a"), only(b, a, "b")].concat()
 }
 
-fn errors(ours: &[Error], theirs: &[Error]) -> Vec<ErrorChange> {
-    let same = |x: &Error, y: &Error| x.of == y.of && x.joint == y.joint;
-    let change = |a: Option<&Error>, b: Option<&Error>| {
-        let known = a.or(b)?;
-        Some(ErrorChange {
-            of: known.of.clone(),
-            joint: known.joint.clone(),
-            a: a.and_then(|error| error.value),
-            b: b.and_then(|error| error.value),
-            a_interval_95: a.and_then(|error| error.interval),
-            b_interval_95: b.and_then(|error| error.interval),
-        })
-    };
-    let both = ours
-        .iter()
-        .map(|a| change(Some(a), theirs.iter().find(|b| same(a, b))));
-    let added = theirs
-        .iter()
-        .filter(|b| !ours.iter().any(|a| same(a, b)))
-        .map(|b| change(None, Some(b)));
-    both.chain(added).flatten().collect()
+/// What both documents say of the same, then what the second says alone.
+fn both<'a, T>(ours: &'a [Of<T>], theirs: &'a [Of<T>]) -> Vec<(&'a Of<T>, [Option<&'a T>; 2])> {
+    let same = |x: &Of<T>, y: &Of<T>| x.of == y.of && x.joint == y.joint;
+    let of_ours = ours.iter().map(|a| {
+        let b = theirs.iter().find(|b| same(a, b));
+        (a, [Some(&a.said), b.map(|b| &b.said)])
+    });
+    let added = theirs.iter().filter(|b| !ours.iter().any(|a| same(a, b)));
+    of_ours
+        .chain(added.map(|b| (b, [None, Some(&b.said)])))
+        .collect()
 }
 
-fn verdicts(ours: &[Judged], theirs: &[Judged]) -> Vec<VerdictChange> {
-    let same = |x: &Judged, y: &Judged| x.of == y.of && x.joint == y.joint;
-    let change = |of: &Judged, a: Option<&Judged>, b: Option<&Judged>| VerdictChange {
+fn errors(ours: &[Of<RelativeError>], theirs: &[Of<RelativeError>]) -> Vec<ErrorChange> {
+    let none = RelativeError(None, None);
+    let change = |(of, said): (&Of<RelativeError>, [Option<&RelativeError>; 2])| {
+        let [a, b] = said.map(|said| said.copied().unwrap_or(none));
+        ErrorChange {
+            of: of.of.clone(),
+            joint: of.joint.clone(),
+            a: a.0,
+            b: b.0,
+            a_interval_95: a.1,
+            b_interval_95: b.1,
+        }
+    };
+    both(ours, theirs).into_iter().map(change).collect()
+}
+
+fn verdicts(ours: &[Of<String>], theirs: &[Of<String>]) -> Vec<VerdictChange> {
+    let mut all = both(ours, theirs);
+    all.retain(|(_, [a, b])| a != b);
+    let change = |(of, [a, b]): (&Of<String>, [Option<&String>; 2])| VerdictChange {
         of: of.of.clone(),
         joint: of.joint.clone(),
-        a: a.map(|judged| judged.verdict.clone()),
-        b: b.map(|judged| judged.verdict.clone()),
+        a: a.cloned(),
+        b: b.cloned(),
     };
-    let both = ours.iter().filter_map(|a| {
-        let b = theirs.iter().find(|b| same(a, b));
-        let changed = b.is_none_or(|b| b.verdict != a.verdict);
-        changed.then(|| change(a, Some(a), b))
-    });
-    let added = theirs
-        .iter()
-        .filter(|b| !ours.iter().any(|a| same(a, b)))
-        .map(|b| change(b, None, Some(b)));
-    both.chain(added).collect()
+    all.into_iter().map(change).collect()
 }
 
 fn list(value: &Value) -> impl Iterator<Item = &Value> {
@@ -345,10 +336,6 @@ fn fields(value: &Value) -> impl Iterator<Item = (&str, &Value)> {
 
 fn text(value: &Value) -> Option<String> {
     value.as_str().map(str::to_owned)
-}
-
-fn verdict(value: &Value) -> Option<Verdict> {
-    serde_json::from_value(value.clone()).ok()
 }
 
 fn interval(of: &Value) -> Option<[f64; 2]> {
@@ -388,14 +375,9 @@ mod tests {
         let [change] = found.verdicts.as_slice() else {
             panic!("one verdict changed: {:?}", found.verdicts)
         };
-        assert_eq!(
-            (change.of.as_str(), change.b.as_deref()),
-            ("m1", Some("weak"))
-        );
-        assert_eq!(
-            (found.errors[0].a, found.errors[0].b),
-            (Some(0.05), Some(0.04))
-        );
+        assert_eq!((&*change.of, change.b.as_deref()), ("m1", Some("weak")));
+        let error = &found.errors[0];
+        assert_eq!((error.a, error.b), (Some(0.05), Some(0.04)));
         assert!(found.changed_inputs.is_empty());
     }
 

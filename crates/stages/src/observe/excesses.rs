@@ -34,8 +34,7 @@ pub struct QuietSample<'a> {
     pub variance: &'a [f64],
 }
 
-/// External torques of a robot that nothing touched, the samples one behind the other. There are hundreds of thousands
-/// of them, and seven digits are more than their quantiles have.
+/// External torques of a robot that nothing touched: hundreds of thousands, of which seven digits are enough.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Quiet {
     /// Time since the sample before \[s\], infinite where none goes before.
@@ -48,24 +47,23 @@ pub struct Quiet {
     pub step_s: f64,
 }
 
-/// A sample that was kept.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 struct Kept<'a> {
     gap: f64,
     numbers: &'a [f32],
 }
 
 impl Kept<'_> {
-    fn external(&self, j: usize) -> f64 {
-        f64::from(self.numbers[j])
+    /// Of a joint: external torque, speed, variance.
+    fn of(&self, j: usize) -> [f64; 3] {
+        let n = self.numbers.len() / 3;
+        [0, 1, 2].map(|kind| f64::from(self.numbers[kind * n + j]))
     }
 
-    fn speed(&self, j: usize) -> f64 {
-        f64::from(self.numbers[self.numbers.len() / 3 + j])
-    }
-
-    fn variance(&self, j: usize) -> f64 {
-        f64::from(self.numbers[2 * self.numbers.len() / 3 + j])
+    /// External torque of a joint over its deviation.
+    fn share(&self, j: usize, held: &HeldOut) -> f64 {
+        let [external, speed, variance] = self.of(j);
+        external.abs() / held.external_std(speed, variance)
     }
 }
 
@@ -84,14 +82,11 @@ impl Quiet {
     fn samples(&self) -> impl Iterator<Item = Kept<'_>> + Clone {
         let width = self.numbers.len() / self.gaps.len().max(1);
         let rows = self.numbers.chunks_exact(width.max(1));
-        self.gaps
-            .iter()
-            .zip(rows)
-            .map(|(gap, numbers)| Kept { gap: *gap, numbers })
+        let each = self.gaps.iter().zip(rows);
+        each.map(|(gap, numbers)| Kept { gap: *gap, numbers })
     }
 
-    /// Completes what was held out with deviations of external torques, and returns their excesses; none where there
-    /// are too few samples.
+    /// Completes what was held out with deviations of external torques; excesses where there are enough samples.
     pub fn learn(
         &self,
         held: &mut [HeldOut],
@@ -103,16 +98,16 @@ impl Quiet {
         }
         for (j, held) in held.iter_mut().enumerate() {
             let squares = |range: Option<usize>| {
-                let own = |s: &Kept| {
-                    let of = |edge: &&f64| s.speed(j) > **edge;
-                    let at = held.speed_edges.iter().take_while(of).count();
+                let within = |[_, speed, _]: &[f64; 3]| {
+                    let below = |edge: &&f64| *speed > **edge;
+                    let at = held.speed_edges.iter().take_while(below).count();
                     range.is_none_or(|range| range == at)
                 };
-                let chosen = self.samples().filter(own);
-                let (sum, own, count) = chosen.fold((0.0, 0.0, 0usize), |(sum, own, n), s| {
-                    let square = s.external(j) * s.external(j);
-                    (sum + square, own + square - s.variance(j), n + 1)
-                });
+                let chosen = self.samples().map(|s| s.of(j)).filter(within);
+                let add = |(sum, own, n): (f64, f64, usize), [x, _, variance]: [f64; 3]| {
+                    (sum + x * x, own + x * x - variance, n + 1)
+                };
+                let (sum, own, count) = chosen.fold((0.0, 0.0, 0), add);
                 // what the parameters' deviation leaves, of which something always is there
                 (own.max(MIN_VARIANCE_SHARE * sum), count)
             };
@@ -123,36 +118,32 @@ impl Quiet {
                 _ => all,
             });
             held.external_std = each.collect();
-            let share =
-                |s: Kept| s.external(j).abs() / held.external_std(s.speed(j), s.variance(j));
-            let mut shares: Vec<f64> = self.samples().map(share).collect();
+            let mut shares: Vec<f64> = self.samples().map(|s| s.share(j, held)).collect();
             held.external_99 = quantile(&mut shares, 0.99).max(f64::MIN_POSITIVE);
         }
         let greatest = |s: Kept| {
             let each = held.iter().enumerate().map(|(j, held)| {
-                s.external(j).abs()
-                    / (held.external_std(s.speed(j), s.variance(j)) * held.external_99)
+                let [external, speed, variance] = s.of(j);
+                external.abs() / (held.external_std(speed, variance) * held.external_99)
             });
             each.fold(0.0, f64::max)
         };
         let sizes: Vec<f64> = self.samples().map(greatest).collect();
         let mut sorted = sizes.clone();
-        let tried: Vec<(f64, Vec<f64>)> = LEVELS
-            .iter()
-            .map(|p| {
-                let level = quantile(&mut sorted, *p);
-                (level, self.peaks(&sizes, level, hold_s(cutoff_hz)))
-            })
-            .collect();
-        let enough = tried
-            .iter()
-            .find(|(_, peaks)| peaks.len() >= USUAL_CLUSTERS);
+        let tried = LEVELS.map(|p| {
+            let level = quantile(&mut sorted, p);
+            (level, self.peaks(&sizes, level, hold_s(cutoff_hz)))
+        });
+        let usual = |(_, peaks): &&(f64, Vec<f64>)| peaks.len() >= USUAL_CLUSTERS;
         let most = || tried.iter().max_by_key(|(_, peaks)| peaks.len());
-        let (level, peaks) = enough.or_else(most)?;
+        let (level, peaks) = tried.iter().find(usual).or_else(most)?;
         if peaks.is_empty() || *level <= 0.0 {
             return None;
         }
         let (scale, shape) = pareto(peaks.iter().map(|peak| peak - level).collect());
+        let mut largest = peaks.clone();
+        largest.sort_by(|a, b| b.total_cmp(a));
+        largest.truncate(MAX_PEAKS);
         Some(Excesses {
             observed_s: self.gaps.len() as f64 * self.step_s,
             position_cutoff_hz,
@@ -160,7 +151,7 @@ impl Quiet {
             clusters: peaks.len() as u64,
             scale,
             shape,
-            largest: largest(peaks),
+            largest,
         })
     }
 
@@ -183,16 +174,7 @@ impl Quiet {
     }
 }
 
-/// The largest of some peaks, from the largest on.
-fn largest(peaks: &[f64]) -> Vec<f64> {
-    let mut peaks = peaks.to_vec();
-    peaks.sort_by(|a, b| b.total_cmp(a));
-    peaks.truncate(MAX_PEAKS);
-    peaks
-}
-
-/// Scale and shape of the generalised Pareto law of excesses by probability-weighted moments (Hosking and Wallis
-/// 1987); of shape 0, an exponential, where they are few.
+/// Scale and shape of their Pareto law by weighted moments (Hosking and Wallis 1987); shape 0 where they are few.
 fn pareto(mut x: Vec<f64>) -> (f64, f64) {
     x.sort_by(f64::total_cmp);
     let n = x.len() as f64;

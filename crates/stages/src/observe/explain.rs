@@ -69,8 +69,7 @@ impl Sums {
         }
     }
 
-    /// Numbers, their covariance for rows of deviation 1, and the power that they take away. Directions that no
-    /// row determines stay at 0.
+    /// Numbers, covariance for rows of deviation 1, power that they take away; 0 in directions that no row determines.
     fn solve(&self) -> (DVector<f64>, DMatrix<f64>, f64) {
         let u = self.right.len();
         let scale = DVector::from_fn(u, |i, _| {
@@ -138,46 +137,37 @@ impl Explainer {
             if share < LEAST_SHARE || best.as_ref().is_some_and(|(b, _)| *b <= criterion) {
                 return;
             }
-            let std = |g: &DVector<f64>| {
-                (noise * (g.transpose() * &covariance * g)[0])
-                    .max(0.0)
-                    .sqrt()
+            let mut changes = Vec::new();
+            // a value, and its slope by the numbers of the explanation
+            let mut add = |name: &str, value: f64, slope: &[f64], unit: &str| {
+                let g = DVector::from_column_slice(slope);
+                let variance = noise * (g.transpose() * &covariance * &g)[0];
+                changes.push(ExplainedNumber {
+                    name: name.to_owned(),
+                    value,
+                    std: variance.max(0.0).sqrt(),
+                    unit: unit.to_owned(),
+                });
             };
-            let plain = |i: usize| {
-                std(&DVector::from_fn(x.len(), |k, _| {
-                    f64::from(u8::from(k == i))
-                }))
-            };
-            let number = |name: &str, value, std, unit: String| ExplainedNumber {
-                name: name.to_owned(),
-                value,
-                std,
-                unit,
-            };
-            let changes = match joint {
-                None => {
-                    let mut out = vec![number("mass", x[0], plain(0), "kg".to_owned())];
-                    if self.robot.knows_links() && x[0] != 0.0 {
-                        for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
-                            let mut slope = DVector::zeros(4);
-                            slope[0] = -x[i + 1] / (x[0] * x[0]);
-                            slope[i + 1] = 1.0 / x[0];
-                            let name = format!("centre_{axis}");
-                            out.push(number(&name, x[i + 1] / x[0], std(&slope), "m".to_owned()));
-                        }
-                    }
-                    out
+            if let Some(j) = joint {
+                let unit = self.robot.joint_unit(j);
+                let position = self.robot.joint_kind(j).position_unit();
+                add("coulomb", x[0], &[1.0, 0.0], unit);
+                add(
+                    "viscous",
+                    x[1],
+                    &[0.0, 1.0],
+                    &format!("{unit} s/{position}"),
+                );
+            } else {
+                add("mass", x[0], &[1.0, 0.0, 0.0, 0.0], "kg");
+                let axes = ["x", "y", "z"].into_iter().enumerate();
+                for (i, axis) in axes.filter(|_| self.robot.knows_links() && x[0] != 0.0) {
+                    let mut slope = [-x[i + 1] / (x[0] * x[0]), 0.0, 0.0, 0.0];
+                    slope[i + 1] = 1.0 / x[0];
+                    add(&format!("centre_{axis}"), x[i + 1] / x[0], &slope, "m");
                 }
-                Some(j) => {
-                    let unit = self.robot.joint_unit(j);
-                    let position = self.robot.joint_kind(j).position_unit();
-                    let viscous = format!("{unit} s/{position}");
-                    vec![
-                        number("coulomb", x[0], plain(0), unit.to_owned()),
-                        number("viscous", x[1], plain(1), viscous),
-                    ]
-                }
-            };
+            }
             let joint = joint.map(|j| names[j].clone());
             let found = Explanation {
                 kind,

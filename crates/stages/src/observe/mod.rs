@@ -9,14 +9,6 @@
 //! the logs that the model was fitted to, each seen by the model of the others; an alarm is an external torque
 //! beyond a threshold that such torques cross so often an hour (peaks over a threshold: Pickands 1975). Excesses
 //! that touch are one, so that their being alike from sample to sample makes no alarms more.
-//!
-//! | file | what |
-//! |---|---|
-//! | `observer` | from rows to external torques |
-//! | `alarms` | their deviations, alarms with joints, size, begin and end |
-//! | `excesses` | from torques of an untouched robot to thresholds |
-//! | `recipe` | the same as numbers for generated code |
-//! | `explain` | a payload or a change of friction behind what was left |
 
 mod alarms;
 mod excesses;
@@ -25,7 +17,9 @@ mod observer;
 mod recipe;
 
 pub use alarms::{Alarm, Alarms, JointOfAlarm};
-pub use excesses::{KEPT, Quiet, QuietSample, hold_s};
-pub use explain::{ExplainedNumber, Explainer, Explanation};
+pub(crate) use excesses::{KEPT, Quiet, QuietSample};
+pub(crate) use explain::Explainer;
+pub use explain::{ExplainedNumber, Explanation};
 pub use observer::{Observed, Observer};
-pub use recipe::{Recipe, recipe};
+pub use recipe::Recipe;
+pub(crate) use recipe::recipe;

@@ -43,7 +43,6 @@ pub struct Observer {
     temperatures: Temperatures,
 }
 
-/// What is there once the sampling step is known.
 struct Core {
     plant: Sampled,
     smooth: Causal,
@@ -117,27 +116,25 @@ impl Observer {
         out: &mut dyn FnMut(&Observed),
     ) -> Result<(), MotionError> {
         self.first = self.first.or(rows.t.first().copied());
-        let (core, model, cutoff) = (&mut self.core, &self.model, self.cutoff_hz);
         let first = self.first.unwrap_or(0.0);
+        let (core, model, cutoff) = (&mut self.core, &self.model, self.cutoff_hz);
         let (uncertain, temperatures) = (&mut self.uncertain, &self.temperatures);
         let mut failed = None;
         self.motion.push(rows, last, &mut |dt, sample| {
             if failed.is_some() {
                 return;
             }
-            let core = match &mut *core {
-                Some(core) => core,
-                none => match Core::design(model, cutoff, dt) {
-                    Ok(core) => none.insert(core),
-                    Err(error) => {
-                        failed = Some(error);
-                        return;
-                    }
-                },
-            };
-            let t = sample.motion.t;
-            core.plant.set_temperatures(|j| temperatures.at(j, t));
-            core.take(first, &sample.motion, sample.begins, uncertain, out);
+            if core.is_none() {
+                match Core::design(model, cutoff, dt) {
+                    Ok(designed) => *core = Some(designed),
+                    Err(error) => failed = Some(error),
+                }
+            }
+            if let Some(core) = core {
+                let t = sample.motion.t;
+                core.plant.set_temperatures(|j| temperatures.at(j, t));
+                core.take(first, &sample.motion, sample.begins, uncertain, out);
+            }
         })?;
         failed.map_or(Ok(()), Err)
     }
@@ -182,9 +179,8 @@ impl Core {
         let (external, speed) = self.row.split_at_mut(n);
         match &mut self.late {
             None => {
-                for ((x, tau), model) in external.iter_mut().zip(sample.tau).zip(&self.tau) {
-                    *x = tau - model;
-                }
+                let torques = sample.tau.iter().zip(&self.tau);
+                (external.iter_mut().zip(torques)).for_each(|(x, (tau, model))| *x = tau - model);
             }
             Some(late) => {
                 late.keep(self.count, sample.tau, &self.tau);
@@ -198,8 +194,8 @@ impl Core {
             *speed = v.abs();
         }
         self.smooth.step(&mut self.row);
-        let waited = self.late.as_ref().map_or(0, |late| late.size);
-        if self.count <= self.settle + waited {
+        let settled = self.settle + self.late.as_ref().map_or(0, |late| late.size);
+        if self.count <= settled {
             return;
         }
         if let Some(directions) = uncertain {
@@ -213,7 +209,7 @@ impl Core {
             q: sample.q,
             v: sample.v,
             a: sample.a,
-            begins: self.count == self.settle + waited + 1,
+            begins: self.count == settled + 1,
         });
     }
 }
@@ -300,17 +296,14 @@ mod tests {
         block
     }
 
-    fn observe(model: AugmentedModel, rows: &Block) -> (Vec<(f64, f64)>, f64) {
+    /// Observes such a motion; the delay.
+    fn check(model: AugmentedModel, late: f64) -> f64 {
         let mut observer = Observer::new(model, &FilterSettings::default()).unwrap();
-        let mut out = Vec::new();
-        observer
-            .push(rows, true, &mut |o| out.push((o.t, o.external[0])))
-            .unwrap();
-        (out, observer.delay_s().unwrap())
-    }
-
-    fn check(found: &[(f64, f64)], delay: f64) {
-        for (t, x) in found {
+        let mut found = Vec::new();
+        let push = &mut |o: &Observed| found.push((o.t, o.external[0]));
+        observer.push(&rows(late), true, push).unwrap();
+        let delay = observer.delay_s().unwrap();
+        for (t, x) in &found {
             match t - delay {
                 t if t < 2.9 => assert!(x.abs() < 2e-3, "{t} {x}"),
                 t if t > 3.2 => assert!((x - 2.0).abs() < 2e-3, "{t} {x}"),
@@ -320,13 +313,13 @@ mod tests {
         // half of the step is reached when the delay says
         let half = found.iter().find(|(_, x)| *x > 1.0).unwrap().0;
         assert!((half - 3.0 - delay).abs() < 0.01, "{half} {delay}");
+        delay
     }
 
     #[test]
-    fn a_push_is_found_with_its_size_and_the_told_delay() {
-        let (found, delay) = observe(model(), &rows(0.0));
+    fn a_push_is_found_with_its_size_and_the_stated_delay() {
+        let delay = check(model(), 0.0);
         assert!((0.02..0.05).contains(&delay), "{delay}");
-        check(&found, delay);
     }
 
     #[test]
@@ -336,8 +329,7 @@ mod tests {
             let values = [("d".to_owned(), late)].into_iter().collect();
             let delay = cft_ident_core::effect::read(&of.model.robot, "delay", Some("q1"), &values);
             of.effects.push(delay.unwrap());
-            let (found, delay) = observe(of, &rows(late));
-            check(&found, delay);
+            check(of, late);
         }
     }
 }

@@ -11,28 +11,20 @@ use cft_ident_export::export::recipe::{Cascade, Late as LateOf, Uncertain, Untou
 use cft_ident_files::config::held_out::{Excesses, HeldOut};
 
 fn cascade(sos: Option<&Sos>, settle: usize) -> Cascade {
-    let Some(sos) = sos else {
-        // lets everything through
-        return Cascade {
-            sections: vec![[1.0, 0.0, 0.0, 0.0, 0.0]],
-            steady: vec![[0.0; 2]],
-            settle,
-        };
-    };
-    let sections = sos.sections();
     let flat = |s: &Section| [s.b[0], s.b[1], s.b[2], s.a[0], s.a[1]];
+    let (sections, steady) = match sos.map(Sos::sections) {
+        Some(sections) => (sections.iter().map(flat).collect(), steady(sections)),
+        // lets everything through
+        None => (vec![[1.0, 0.0, 0.0, 0.0, 0.0]], vec![[0.0; 2]]),
+    };
     Cascade {
-        sections: sections.iter().map(flat).collect(),
-        steady: steady(sections),
+        sections,
+        steady,
         settle,
     }
 }
 
-/// What [`super::Observer`] and [`super::Alarms`] do with rows `step_s` seconds apart, at so many false alarms an
-/// hour.
-///
-/// # Errors
-/// [`MotionError`] for filters that the sampling rate does not carry.
+/// What an observer does with rows `step_s` seconds apart, at so many false alarms an hour.
 pub fn recipe(
     (model, uncertain): (&AugmentedModel, &Directions),
     settings: &FilterSettings,
@@ -59,10 +51,8 @@ pub fn recipe(
     let mut each = uncertain.each().to_vec();
     if each.is_empty() {
         // tables of C have at least one entry
-        each.push(Direction::of(
-            &model.model,
-            &vec![0.0; model.model.parameters()],
-        ));
+        let nothing = vec![0.0; model.model.parameters()];
+        each.push(Direction::of(&model.model, &nothing));
     }
     let uncertain = each.iter().map(|of| Uncertain {
         bodies: robot.link_parameters(&of.theta),

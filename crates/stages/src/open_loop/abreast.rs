@@ -1,11 +1,11 @@
 //! Windows of one axis side by side: all of them a step on at a time, so that a law of speed is asked once for all.
+//! Effects depend on the speed of now alone.
 
 use super::stepper::{Held, held, stopped_by};
-use cft_ident_core::effect::{AugmentedModel, Family, Role};
+use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::dynamics::Dynamics;
 
-/// One axis in many windows.
 pub(super) struct Abreast<'a> {
     model: &'a AugmentedModel,
     dynamics: Dynamics,
@@ -15,15 +15,6 @@ pub(super) struct Abreast<'a> {
     mass: Option<f64>,
     /// States, a window in the place of a sample.
     at: Stretch,
-}
-
-/// Whether a model's effects hang on the speed of now alone.
-pub(super) fn is_of_speed(model: &AugmentedModel) -> bool {
-    model.effects.iter().all(|effect| {
-        let (law, entry) = (effect.law, effect.law.entry);
-        let plain = law.memory.is_none() && law.varied.is_none() && law.formula.is_none();
-        plain && entry.role == Role::Columns && entry.families.contains(&Family::Velocity)
-    })
 }
 
 impl<'a> Abreast<'a> {

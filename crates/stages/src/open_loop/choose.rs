@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::fit::{Fitted, RunSpan, apart, errors, fit, rms, windows};
+use super::fit::{Fitted, POSITIONS, RunSpan, apart, errors, fit, rms, windows};
 use super::numbers::{Columns, columns, numbers};
 use cft_ident_core::effect::{
     Added, AugmentedModel, Cover, Family, LAWS, Law, Place, Role, Search,
@@ -94,8 +94,7 @@ pub struct AxisFit {
     pub tried: Vec<TriedAxis>,
 }
 
-/// Fits a model of one axis to its motion, in windows of `window` seconds or of a length that blocks set aside choose.
-/// `offset` says whether the constant torque is fitted; `stop` is asked now and then.
+/// Fits a model without effects to the motion of one axis, in windows of `window` seconds or of a chosen length.
 pub fn fit_axis(
     start: &AugmentedModel,
     stretches: &[Stretch],
@@ -126,35 +125,22 @@ pub fn fit_axis(
     let mut model = start.clone();
     let mut chosen = trial.best_length(start, &lengths, &mut tried)?;
     loop {
-        let rivals: Vec<AugmentedModel> = trial.rivals(&model);
-        let scores: Vec<Option<(f64, AugmentedModel)>> = rivals
-            .iter()
-            .map(|rival| trial.held_out((rival, rival), chosen.length))
-            .collect::<Result<_, _>>()?;
-        let first = tried.len();
-        let pairs = rivals.iter().zip(&scores);
-        tried.extend(pairs.map(|(rival, found)| TriedAxis {
-            window_s: chosen.length,
-            effect: rival.effects.last().map(Added::name),
-            held_out: found.as_ref().map(|(error, _)| *error),
-            taken: false,
-        }));
-        let found = scores.into_iter().enumerate();
-        let best = found
-            .filter_map(|(i, found)| Some((i, found?)))
-            .min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let mut best: Option<(Chosen, AugmentedModel)> = None;
+        for rival in trial.rivals(&model) {
+            let effect = rival.effects.last().map(Added::name);
+            let found = trial.tried((&rival, &rival), (chosen.length, effect), &mut tried)?;
+            let least = best.as_ref().map(|(best, _)| best.error);
+            let better = |found: &Chosen| least.is_none_or(|least| found.error < least);
+            best = found.filter(better).map(|found| (found, rival)).or(best);
+        }
         let enough = (1.0 - MIN_GAIN) * chosen.error;
-        let Some((i, (error, near))) = best.filter(|(_, (error, _))| *error < enough) else {
+        let Some((found, rival)) = best.filter(|(best, _)| best.error < enough) else {
             break;
         };
-        tried[first + i].taken = true;
-        model = rivals[i].clone();
+        tried[found.at].taken = true;
+        model = rival;
         chosen = match lengths.len() {
-            1 => Chosen {
-                error,
-                length: chosen.length,
-                near,
-            },
+            1 => found,
             _ => trial.best_length(&model, &lengths, &mut tried)?,
         };
     }
@@ -165,7 +151,8 @@ pub fn fit_axis(
         .fit(&chosen.near, &columns, (&all, chosen.length), true)?
         .ok_or(AxisError::Astray)?;
     let of_start = |windows: &[RunSpan], positions| {
-        errors(start, stretches, windows, positions).ok_or(AxisError::Astray)
+        let errors = errors(start, stretches, windows, positions);
+        errors.map(|errors| rms(&errors)).ok_or(AxisError::Astray)
     };
     let blocks: Vec<RunSpan> = (0..BLOCKS).flat_map(|b| trial.block(b)).collect();
     Ok(AxisFit {
@@ -173,8 +160,8 @@ pub fn fit_axis(
         free: columns.free,
         apart: apart(&windows, stretches, chosen.length),
         before: PositionErrors {
-            windows: rms(&of_start(&windows, super::fit::POSITIONS)?),
-            blocks: rms(&of_start(&blocks, ALL)?),
+            windows: of_start(&windows, POSITIONS)?,
+            blocks: of_start(&blocks, ALL)?,
         },
         after: PositionErrors {
             windows: fitted.rms,
@@ -189,13 +176,15 @@ pub fn fit_axis(
     })
 }
 
-/// A length of windows.
+/// A model with a length of windows, tried on blocks set aside.
 struct Chosen {
     /// On blocks set aside.
     error: f64,
     length: f64,
     /// The model of a fit to all.
     near: AugmentedModel,
+    /// Its place among those that were tried.
+    at: usize,
 }
 
 struct Trial<'a> {
@@ -206,7 +195,6 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// All samples.
     fn whole(&self) -> Vec<RunSpan> {
         let each = self.stretches.iter().enumerate();
         each.map(|(s, stretch)| (s, 0, stretch.len())).collect()
@@ -224,12 +212,11 @@ impl Trial<'_> {
 
     /// What is before and behind one of the blocks.
     fn without(&self, block: usize) -> Vec<RunSpan> {
-        let out = self
-            .block(block)
-            .into_iter()
-            .flat_map(|(s, from, to)| [(s, 0, from + 1), (s, to - 1, self.stretches[s].len())]);
-        out.filter(|(_, from, to)| to - from >= MIN_WINDOW_SAMPLES)
-            .collect()
+        let sides =
+            |(s, from, to): RunSpan| [(s, 0, from + 1), (s, to - 1, self.stretches[s].len())];
+        let mut out: Vec<RunSpan> = self.block(block).into_iter().flat_map(sides).collect();
+        out.retain(|(_, from, to)| to - from >= MIN_WINDOW_SAMPLES);
+        out
     }
 
     /// Which numbers of a model may move.
@@ -251,17 +238,11 @@ impl Trial<'_> {
             return Err(AxisError::Stopped);
         }
         let windows = windows(self.stretches, spans, length);
-        Ok(fit(
-            model,
-            self.stretches,
-            &windows,
-            columns,
-            with_covariance,
-        ))
+        let (stretches, windows) = (self.stretches, &windows);
+        Ok(fit(model, stretches, windows, columns, with_covariance))
     }
 
-    /// Error on each block of a fit to the others, and the model of a fit to all that began at `near`; none where a motion
-    /// goes astray.
+    /// Error on each block of a fit to the others, and the model of a fit to all; none where a motion goes astray.
     fn held_out(
         &self,
         (model, near): (&AugmentedModel, &AugmentedModel),
@@ -290,32 +271,43 @@ impl Trial<'_> {
         lengths: &[f64],
         tried: &mut Vec<TriedAxis>,
     ) -> Result<Chosen, AxisError> {
-        let mut best: Option<(Chosen, usize)> = None;
+        let mut best: Option<Chosen> = None;
         let mut near = model.clone();
         for length in lengths {
-            let found = self.held_out((model, &near), *length)?;
-            let held_out = found.as_ref().map(|(error, _)| *error);
-            if let Some((error, found)) = found {
-                near = found;
-                if best.as_ref().is_none_or(|(least, _)| error < least.error) {
-                    let chosen = Chosen {
-                        error,
-                        length: *length,
-                        near: near.clone(),
-                    };
-                    best = Some((chosen, tried.len()));
-                }
+            let Some(found) = self.tried((model, &near), (*length, None), tried)? else {
+                continue;
+            };
+            near = found.near.clone();
+            if best.as_ref().is_none_or(|best| found.error < best.error) {
+                best = Some(found);
             }
-            tried.push(TriedAxis {
-                window_s: *length,
-                effect: None,
-                held_out,
-                taken: false,
-            });
         }
-        let (chosen, at) = best.ok_or(AxisError::Astray)?;
-        tried[at].taken = true;
+        let chosen = best.ok_or(AxisError::Astray)?;
+        tried[chosen.at].taken = true;
         Ok(chosen)
+    }
+
+    /// Tries a model on blocks set aside, as one that adds `effect`.
+    fn tried(
+        &self,
+        models: (&AugmentedModel, &AugmentedModel),
+        (length, effect): (f64, Option<&'static str>),
+        tried: &mut Vec<TriedAxis>,
+    ) -> Result<Option<Chosen>, AxisError> {
+        let found = self.held_out(models, length)?;
+        let at = tried.len();
+        tried.push(TriedAxis {
+            window_s: length,
+            effect,
+            held_out: found.as_ref().map(|(error, _)| *error),
+            taken: false,
+        });
+        Ok(found.map(|(error, near)| Chosen {
+            error,
+            length,
+            near,
+            at,
+        }))
     }
 
     /// The model with one more effect: friction that is a law of speed, each from the shape that the torques determine best.

@@ -8,10 +8,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::abreast::{Abreast, is_of_speed};
+use super::abreast::Abreast;
 use super::numbers::{Columns, numbers, with_numbers};
-use super::stepper::Stepper;
-use super::windows::run;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::math::descent::{Ending, StepControl, Trial, descend};
 use cft_ident_core::math::long_run::long_run;
@@ -26,7 +24,6 @@ pub(super) const HOPS: usize = 4;
 const MOST_SAMPLES: usize = 500_000;
 /// Positions of a window that count.
 pub(super) const POSITIONS: usize = 50;
-/// Most steps that are tried.
 const MAX_STEPS: usize = 40;
 /// Share of the cost below which a step brings nothing.
 const MIN_COST_DECREASE: f64 = 1e-4;
@@ -67,47 +64,13 @@ pub(super) fn errors(
     windows: &[RunSpan],
     positions: usize,
 ) -> Option<Vec<f64>> {
-    if is_of_speed(model) {
-        let alike = windows.chunk_by(|a, b| a.0 == b.0 && a.2 - a.1 == b.2 - b.1);
-        let found =
-            alike.map(|windows| side_by_side(model, &stretches[windows[0].0], windows, positions));
-        return found.collect::<Option<Vec<_>>>().map(|all| all.concat());
-    }
-    let mut out = Vec::new();
-    let mut stepper: Option<(usize, Stepper)> = None;
-    for &(s, begin, end) in windows {
-        let stretch = &stretches[s];
-        let parts = parts(stretch);
-        if stepper.as_ref().is_none_or(|(of, _)| *of != s) {
-            stepper = Some((s, Stepper::new(model, stretch.dt / parts)));
-        }
-        let (_, stepper) = stepper.as_mut()?;
-        let every = every(begin, end, positions);
-        let mut keep = |k: usize, q: &[f64]| {
-            if (end - 1 - k).is_multiple_of(every) {
-                out.push(q[0] - stretch.q[0][k]);
-            }
-        };
-        if !run(
-            stepper,
-            stretch,
-            &stretch.tau,
-            (begin, end),
-            parts,
-            &mut keep,
-        ) {
-            return None;
-        }
-    }
-    Some(out)
+    let alike = windows.chunk_by(|a, b| a.0 == b.0 && a.2 - a.1 == b.2 - b.1);
+    let found =
+        alike.map(|windows| side_by_side(model, &stretches[windows[0].0], windows, positions));
+    Some(found.collect::<Option<Vec<_>>>()?.concat())
 }
 
-/// Steps of a sample.
-fn parts(stretch: &Stretch) -> f64 {
-    (stretch.dt / STEP_S).ceil().max(1.0)
-}
-
-/// The same of windows of one length in one stretch, by a model whose effects are laws of speed.
+/// The same of windows of one length in one stretch.
 fn side_by_side(
     model: &AugmentedModel,
     stretch: &Stretch,
@@ -115,7 +78,8 @@ fn side_by_side(
     positions: usize,
 ) -> Option<Vec<f64>> {
     let size = windows[0].2 - windows[0].1;
-    let (parts, every) = (parts(stretch), every(0, size, positions));
+    let every = every(0, size, positions);
+    let parts = (stretch.dt / STEP_S).ceil().max(1.0);
     let begins = windows.iter().map(|w| w.1);
     let mut abreast = Abreast::begin(model, stretch, begins.clone(), stretch.dt / parts);
     let (q, tau) = (&stretch.q[0], &stretch.tau[0]);
@@ -146,12 +110,10 @@ fn side_by_side(
     Some(out)
 }
 
-/// Root mean square.
 pub(super) fn rms(e: &[f64]) -> f64 {
     (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt()
 }
 
-/// What a fit found.
 #[derive(Debug, Clone)]
 pub(super) struct Fitted {
     pub model: AugmentedModel,
@@ -169,8 +131,7 @@ struct At {
     slopes: DMatrix<f64>,
 }
 
-/// Fits the free numbers, from those that the model has; none where the first motion goes astray. `with_covariance` says that
-/// the covariance is wanted for itself.
+/// Fits the free numbers, from those that the model has; none where the first motion goes astray.
 pub(super) fn fit(
     start: &AugmentedModel,
     stretches: &[Stretch],
@@ -231,20 +192,18 @@ pub(super) fn fit(
         Ok(point(x, errors).map_or(Trial::Rejected, Trial::Accepted))
     });
     let Ok((mut at, ending, steps)) = found;
-    // differences to both sides where deviations hang on them
+    let mut of_all = DMatrix::zeros(0, 0);
     if with_covariance {
+        // differences to both sides where deviations depend on them
         at.slopes = slopes(&at.x, &at.errors, true)?;
+        of_all = covariance(&at, stretches, windows, free);
     }
-    let covariance = match with_covariance {
-        true => covariance(&at, stretches, windows, free),
-        false => DMatrix::zeros(0, 0),
-    };
     Some(Fitted {
         rms: rms(at.errors.as_slice()),
         model: with_numbers(start, &at.x),
         ending,
         steps,
-        covariance,
+        covariance: of_all,
     })
 }
 
@@ -263,16 +222,14 @@ fn covariance(at: &At, stretches: &[Stretch], windows: &[RunSpan], free: &[usize
     let normal = at.slopes.tr_mul(&at.slopes);
     let inverse = RankRevealingInverse::of(&normal);
     let mut first = 0;
-    let scores: Vec<(usize, DVector<f64>)> = windows
-        .iter()
-        .map(|&(s, begin, end)| {
-            let size = (end - begin - 1) / every(begin, end, POSITIONS) + 1;
-            let rows = at.slopes.rows(first, size);
-            let score = rows.tr_mul(&at.errors.rows(first, size));
-            first += size;
-            (s, score)
-        })
-        .collect();
+    let score = |&(s, begin, end): &RunSpan| {
+        let size = (end - begin - 1) / every(begin, end, POSITIONS) + 1;
+        let rows = at.slopes.rows(first, size);
+        let score = rows.tr_mul(&at.errors.rows(first, size));
+        first += size;
+        (s, score)
+    };
+    let scores: Vec<(usize, DVector<f64>)> = windows.iter().map(score).collect();
     // windows overlap, and those that do not are still alike where they touch
     let sum = long_run(&scores, free.len(), 2.0 * HOPS as f64);
     let length = windows

@@ -6,9 +6,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fit::RunSpan;
-use super::stepper::Stepper;
-use super::windows::run;
-use cft_ident_core::effect::{AugmentedModel, shifted};
+use super::windows::Follower;
+use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::deviation::NORMAL_95;
 
@@ -159,42 +158,28 @@ fn windows(stretches: &[Stretch], spans: &[RunSpan]) -> Vec<RunSpan> {
 
 /// Errors of every joint in one window; none where the motion goes astray.
 fn one(model: &AugmentedModel, stretch: &Stretch, (_, begin, end): RunSpan) -> Option<Vec<Sums>> {
-    // where the model's torque comes late, the torque that moves it at t is logged later
-    let mut tau = stretch.tau.clone();
-    for (j, tau) in tau.iter_mut().enumerate() {
-        shifted(tau, -model.shift(j) / stretch.dt);
-    }
-    let parts = (stretch.dt / STEP_S).ceil().max(1.0);
-    let mut stepper = Stepper::new(model, stretch.dt / parts);
-    let mut sums = vec![Sums::default(); tau.len()];
+    let mut sums = vec![Sums::default(); stretch.tau.len()];
     let looked: [usize; SHARES.len()] =
         SHARES.map(|share| begin + (share * (end - 1 - begin) as f64).round() as usize);
-    let follows = run(
-        &mut stepper,
-        stretch,
-        &tau,
-        (begin, end),
-        parts,
-        &mut |k, found| {
-            for (j, s) in sums.iter_mut().enumerate() {
-                let q = &stretch.q[j];
-                let square = (found[j] - q[k]).powi(2);
-                s.square += square;
-                s.moved += (q[k] - q[begin]).powi(2);
-                s.samples += 1.0;
-                for (at, looked) in s.at.iter_mut().zip(looked) {
-                    if k == looked {
-                        *at = square;
-                    }
+    let mut follower = Follower::new(model, stretch, STEP_S);
+    let follows = follower.run((begin, end), &mut |k, found| {
+        for (j, s) in sums.iter_mut().enumerate() {
+            let q = &stretch.q[j];
+            let square = (found[j] - q[k]).powi(2);
+            s.square += square;
+            s.moved += (q[k] - q[begin]).powi(2);
+            s.samples += 1.0;
+            for (at, looked) in s.at.iter_mut().zip(looked) {
+                if k == looked {
+                    *at = square;
                 }
             }
-        },
-    );
+        }
+    });
     let finite = sums.iter().all(|s| s.square.is_finite());
     (follows && finite).then_some(sums)
 }
 
-/// The error over windows.
 fn error(windows: &[Sums]) -> PositionError {
     let sum = |of: fn(&Sums) -> f64| windows.iter().map(of).sum::<f64>();
     let square = sum(|s| s.square);
@@ -232,39 +217,23 @@ fn change(before: &[Sums], after: &[Sums]) -> Option<PositionErrorChange> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cft_ident_core::robot::model::{JointFriction, Model};
-    use cft_ident_core::robot::{JointKind, Robot};
+    use crate::open_loop::one_axis::{inertia, sine};
 
-    fn model(inertia: f64) -> AugmentedModel {
-        AugmentedModel::plain(Model {
-            robot: Robot::single_joint("q1", JointKind::Revolute),
-            theta: vec![inertia],
-            friction: vec![JointFriction::None],
-            offset: vec![0.0],
-        })
-    }
-
-    /// A mass of 0.2 on a sine, for so many seconds.
-    fn stretch(seconds: usize) -> Stretch {
-        let dt = 2e-3;
-        let t: Vec<f64> = (0..=500 * seconds).map(|k| k as f64 * dt).collect();
-        let of = |f: fn(f64) -> f64| vec![t.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
-        Stretch {
-            dt,
-            q: of(|t| (3.0 * t).sin()),
-            v: of(|t| 3.0 * (3.0 * t).cos()),
-            a: of(|t| -9.0 * (3.0 * t).sin()),
-            tau: of(|t| -1.8 * (3.0 * t).sin()),
-            t,
-            ..Stretch::default()
-        }
+    /// The free run of an inertia, and of another after it, along a sine of 0.2 for so many seconds.
+    fn run(seconds: usize, given: f64, after: Option<f64>) -> Option<FreeRun> {
+        let along = [sine(2e-3, 500 * seconds)];
+        let after = after.map(inertia);
+        free_run(
+            &inertia(given),
+            after.as_ref(),
+            &along,
+            &[(0, 0, along[0].len())],
+        )
     }
 
     #[test]
     fn a_wrong_mass_errs_more_the_longer_it_runs_and_is_worse_by_its_whole_interval() {
-        let along = [stretch(10)];
-        let spans = [(0, 0, along[0].len())];
-        let right = free_run(&model(0.2), Some(&model(0.25)), &along, &spans).unwrap();
+        let right = run(10, 0.2, Some(0.25)).unwrap();
         assert_eq!((right.windows, right.astray), (20, 0));
         let joint = &right.joints[0];
         let after = joint.after.as_ref().unwrap();
@@ -272,19 +241,15 @@ mod tests {
         let growth: Vec<f64> = after.growth.iter().map(|g| g.rms).collect();
         assert!(growth.windows(2).all(|p| p[0] < p[1]), "{growth:?}");
         assert_eq!(right.worse().count(), 1);
-        let mended = free_run(&model(0.25), Some(&model(0.2)), &along, &spans).unwrap();
+        let mended = run(10, 0.25, Some(0.2)).unwrap();
         assert_eq!(mended.worse().count(), 0);
         assert!(mended.joints[0].change.unwrap().interval_95[1] < 0.0);
     }
 
     #[test]
     fn a_log_of_few_windows_compares_nothing_and_a_long_one_is_looked_at_all_along() {
-        let short = [stretch(1)];
-        assert_eq!(
-            free_run(&model(0.2), None, &short, &[(0, 0, short[0].len())]),
-            None
-        );
-        let long = [stretch(100)];
+        assert_eq!(run(1, 0.2, None), None);
+        let long = [sine(2e-3, 50_000)];
         let found = windows(&long, &[(0, 0, long[0].len())]);
         assert_eq!(found.len(), MAX_WINDOWS);
         assert!(found[MAX_WINDOWS - 1].1 > 40_000);
@@ -292,8 +257,7 @@ mod tests {
 
     #[test]
     fn a_mass_below_nothing_goes_astray_and_has_no_error() {
-        let along = [stretch(10)];
-        let found = free_run(&model(-0.2), None, &along, &[(0, 0, along[0].len())]).unwrap();
+        let found = run(10, -0.2, None).unwrap();
         assert_eq!(found.astray, found.windows);
         assert!(found.joints[0].given.rms.is_nan());
     }

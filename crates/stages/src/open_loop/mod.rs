@@ -6,8 +6,8 @@
 //! until all agree (Moreau 1988): a joint that rests stays at rest, however long the step. A motion judges a model
 //! where torques alone hardly do: errors of slow friction and of gravity add up.
 //!
-//! [`free_run`] says how the error grows in windows, and whether a changed model runs worse. [`fit_axis`] moves the
-//! numbers of a single axis until its motion is that of the log.
+//! [`FreeRun`] says how the error grows in windows, and whether a changed model runs worse. A fit moves the numbers of a
+//! single axis until its motion is that of the log.
 
 mod abreast;
 mod choose;
@@ -17,10 +17,13 @@ mod numbers;
 mod stepper;
 mod windows;
 
-pub use choose::{AxisError, AxisFit, BLOCKS, PositionErrors, TriedAxis, fit_axis};
-pub use fit::RunSpan;
-pub use free_run::{
-    FREE_RUN_S, FreeRun, JointFreeRun, PositionError, PositionErrorChange, free_run,
-};
-pub use stepper::Stepper;
-pub use windows::{JointDrift, OpenLoop, WindowLength, along};
+#[cfg(test)]
+mod one_axis;
+
+pub use choose::{AxisError, PositionErrors, TriedAxis};
+pub(crate) use choose::{AxisFit, BLOCKS, fit_axis};
+pub(crate) use fit::RunSpan;
+pub(crate) use free_run::free_run;
+pub use free_run::{FreeRun, JointFreeRun, PositionError, PositionErrorChange};
+pub use windows::{JointDrift, OpenLoop};
+pub(crate) use windows::{WindowLength, along};

@@ -13,8 +13,7 @@ const STEP_TORQUE_SHARE: f64 = 1e-3;
 /// Samples along which columns of torque are looked at.
 const MAX_SAMPLES: usize = 4000;
 
-/// Inertial parameters, viscous and Coulomb friction of each joint, offsets, then shape and coefficients of each
-/// effect.
+/// Inertial parameters, viscous and Coulomb friction, offsets, then shape and coefficients of each effect.
 pub(super) fn numbers(model: &AugmentedModel) -> Vec<f64> {
     let mut x = model.model.theta.clone();
     for law in &model.model.friction {
@@ -77,11 +76,8 @@ pub(super) fn columns(model: &AugmentedModel, stretches: &[Stretch], held: &[boo
         .iter()
         .flat_map(|s| s.tau[0].iter().copied().step_by(every));
     let at = along(&x);
-    let residual: Vec<f64> = measured
-        .clone()
-        .zip(&at)
-        .map(|(tau, hat)| tau - hat)
-        .collect();
+    let residual = measured.clone().zip(&at).map(|(tau, hat)| tau - hat);
+    let residual: Vec<f64> = residual.collect();
     let power: f64 = measured.map(|tau| tau * tau).sum();
     let mut steps = vec![0.0; x.len()];
     let mut table = DMatrix::zeros(at.len(), x.len() + 1);
@@ -100,10 +96,7 @@ pub(super) fn columns(model: &AugmentedModel, stretches: &[Stretch], held: &[boo
     table.column_mut(x.len()).copy_from_slice(&residual);
     let normal = table.tr_mul(&table);
     let inverse = RankRevealingInverse::of(&normal.view((0, 0), (x.len(), x.len())).into_owned());
-    let target = normal
-        .view((0, x.len()), (x.len(), 1))
-        .column(0)
-        .into_owned();
+    let target = normal.column(x.len()).rows(0, x.len()).into_owned();
     let explained = target.dot(&inverse.solve(&target));
     Columns {
         free: (0..x.len())

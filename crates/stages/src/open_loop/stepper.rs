@@ -74,8 +74,7 @@ impl Stepper {
         self.effects.set_temperatures(of);
     }
 
-    /// Goes one step on under these torques, `since` seconds after the begin of the log; false where the inertia
-    /// matrix is none or the motion is no longer finite.
+    /// One step on, `since` seconds after the log began; false without an inertia or where the motion is not finite.
     pub fn step(&mut self, since: f64, tau: &[f64]) -> bool {
         let (n, dt) = (self.q.len(), self.dt);
         self.dynamics
@@ -192,20 +191,13 @@ pub(super) fn stopped_by(limit: f64, push: f64, mass: f64, v: f64) -> Option<f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::open_loop::one_axis::model;
     use cft_ident_core::robot::friction::ViscousCoulomb;
-    use cft_ident_core::robot::model::Model;
-    use cft_ident_core::robot::{JointKind, Robot};
 
+    /// A mass of 2 kg.
     fn mass(viscous: f64, coulomb: f64) -> AugmentedModel {
-        AugmentedModel::plain(Model {
-            robot: Robot::single_joint("q1", JointKind::Prismatic),
-            theta: vec![2.0],
-            friction: vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
-                viscous,
-                coulomb,
-            })],
-            offset: vec![0.0],
-        })
+        let law = ViscousCoulomb { viscous, coulomb };
+        model(2.0, JointFriction::ViscousCoulomb(law))
     }
 
     #[test]

@@ -61,8 +61,7 @@ struct Sums {
 /// Simulates stretches of logs window after window.
 pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength) -> OpenLoop {
     let robot = &model.model.robot;
-    let n = robot.joints();
-    let mut sums = vec![Sums::default(); n];
+    let mut sums = vec![Sums::default(); robot.joints()];
     let (mut windows, mut astray) = (0, 0);
     for stretch in stretches {
         let size = match length {
@@ -72,27 +71,27 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
         if size < MIN_WINDOW_SAMPLES {
             continue;
         }
-        // where the model's torque comes late, the torque that moves it at t is logged later
-        let mut tau = stretch.tau.clone();
-        for (j, tau) in tau.iter_mut().enumerate() {
-            shifted(tau, -model.shift(j) / stretch.dt);
-        }
-        let parts = (stretch.dt / STEP_S).ceil().max(1.0);
-        let mut stepper = Stepper::new(model, stretch.dt / parts);
-        let mut begin = 0;
-        while begin + size <= stretch.len() {
+        let mut follower = Follower::new(model, stretch, STEP_S);
+        // the last sample of a window is the first of the next
+        let begins = (0..).step_by(size - 1);
+        for begin in begins.take_while(|begin| begin + size <= stretch.len()) {
             windows += 1;
-            let window = (begin, begin + size);
-            astray += u64::from(!score(
-                &mut stepper,
-                stretch,
-                &tau,
-                window,
-                parts,
-                &mut sums,
-            ));
-            // the last sample of a window is the first of the next
-            begin += size - 1;
+            let end = begin + size;
+            let follows = follower.run((begin, end), &mut |k, found| {
+                for (j, s) in sums.iter_mut().enumerate() {
+                    let q = &stretch.q[j];
+                    let e = found[j] - q[k];
+                    s.square += e * e;
+                    s.moved += (q[k] - q[begin]).powi(2);
+                    s.samples += 1;
+                    s.largest = s.largest.max(e.abs());
+                    if k + 1 == end {
+                        s.at_end += e * e;
+                        s.ends += 1;
+                    }
+                }
+            });
+            astray += u64::from(!follows);
         }
     }
     let names = robot.joint_names().iter().zip(&sums).enumerate();
@@ -116,106 +115,77 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
     }
 }
 
-/// Simulates one window and adds up its errors; false where it goes astray.
-fn score(
-    stepper: &mut Stepper,
-    stretch: &Stretch,
-    tau: &[Vec<f64>],
-    (begin, end): (usize, usize),
+/// A model that follows the torques of a stretch.
+pub(super) struct Follower<'a> {
+    stepper: Stepper,
+    stretch: &'a Stretch,
+    /// Torques where they move the model: one that comes late is logged later.
+    tau: Vec<Vec<f64>>,
+    /// Steps of a sample.
     parts: f64,
-    sums: &mut [Sums],
-) -> bool {
-    run(
-        stepper,
-        stretch,
-        tau,
-        (begin, end),
-        parts,
-        &mut |k, found| {
-            for (j, s) in sums.iter_mut().enumerate() {
-                let q = &stretch.q[j];
-                let e = found[j] - q[k];
-                s.square += e * e;
-                s.moved += (q[k] - q[begin]).powi(2);
-                s.samples += 1;
-                s.largest = s.largest.max(e.abs());
-                if k + 1 == end {
-                    s.at_end += e * e;
-                    s.ends += 1;
-                }
-            }
-        },
-    )
 }
 
-/// Simulates one window from its measured begin, each sample in so many parts: `each` gets the number of the sample
-/// and the positions that were found; false where it goes astray.
-pub(super) fn run(
-    stepper: &mut Stepper,
-    stretch: &Stretch,
-    tau: &[Vec<f64>],
-    (begin, end): (usize, usize),
-    parts: f64,
-    each: &mut dyn FnMut(usize, &[f64]),
-) -> bool {
-    let n = tau.len();
-    let [mut q, mut v, mut a, mut now] = [(); 4].map(|()| vec![0.0; n]);
-    stretch.at(begin, &mut q, &mut v, &mut a);
-    stepper.begin(&q, &v);
-    for k in begin..end {
-        if k > begin {
-            stepper.set_temperatures(stretch, k);
-            for part in 0..parts as usize {
-                let share = (part as f64 + 0.5) / parts;
-                for (now, tau) in now.iter_mut().zip(tau) {
-                    *now = tau[k - 1] + share * (tau[k] - tau[k - 1]);
-                }
-                let since = stretch.began + stretch.dt * (k as f64 - 1.0 + share);
-                if !stepper.step(since, &now) {
-                    return false;
+impl<'a> Follower<'a> {
+    /// By steps of at most so many seconds.
+    pub fn new(model: &AugmentedModel, stretch: &'a Stretch, step_s: f64) -> Self {
+        let mut tau = stretch.tau.clone();
+        for (j, tau) in tau.iter_mut().enumerate() {
+            shifted(tau, -model.shift(j) / stretch.dt);
+        }
+        let parts = (stretch.dt / step_s).ceil().max(1.0);
+        Self {
+            stepper: Stepper::new(model, stretch.dt / parts),
+            stretch,
+            tau,
+            parts,
+        }
+    }
+
+    /// One window from its measured begin: `each` gets samples and the positions found; false where it goes astray.
+    pub fn run(
+        &mut self,
+        (begin, end): (usize, usize),
+        each: &mut dyn FnMut(usize, &[f64]),
+    ) -> bool {
+        let (stepper, stretch, parts) = (&mut self.stepper, self.stretch, self.parts);
+        let [mut q, mut v, mut a, mut now] = [(); 4].map(|()| vec![0.0; self.tau.len()]);
+        stretch.at(begin, &mut q, &mut v, &mut a);
+        stepper.begin(&q, &v);
+        for k in begin..end {
+            if k > begin {
+                stepper.set_temperatures(stretch, k);
+                for part in 0..parts as usize {
+                    let share = (part as f64 + 0.5) / parts;
+                    for (now, tau) in now.iter_mut().zip(&self.tau) {
+                        *now = tau[k - 1] + share * (tau[k] - tau[k - 1]);
+                    }
+                    let since = stretch.began + stretch.dt * (k as f64 - 1.0 + share);
+                    if !stepper.step(since, &now) {
+                        return false;
+                    }
                 }
             }
+            each(k, &stepper.q);
         }
-        each(k, &stepper.q);
+        true
     }
-    true
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cft_ident_core::robot::model::{JointFriction, Model};
-    use cft_ident_core::robot::{JointKind, Robot};
+    use crate::open_loop::one_axis::{inertia, sine};
 
     #[test]
     fn the_true_model_follows_and_a_wrong_mass_is_off_by_its_share() {
-        let model = |inertia: f64| {
-            AugmentedModel::plain(Model {
-                robot: Robot::single_joint("q1", JointKind::Revolute),
-                theta: vec![inertia],
-                friction: vec![JointFriction::None],
-                offset: vec![0.0],
-            })
-        };
-        let dt = 1e-3;
-        let t: Vec<f64> = (0..2001).map(|k| f64::from(k) * dt).collect();
-        let of = |f: fn(f64) -> f64| vec![t.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
-        let stretch = [Stretch {
-            dt,
-            q: of(|t| (3.0 * t).sin()),
-            v: of(|t| 3.0 * (3.0 * t).cos()),
-            a: of(|t| -9.0 * (3.0 * t).sin()),
-            tau: of(|t| -1.8 * (3.0 * t).sin()),
-            t,
-            ..Stretch::default()
-        }];
-        let right = along(&model(0.2), &stretch, WindowLength::Whole);
+        let stretch = [sine(1e-3, 2000)];
+        let right = along(&inertia(0.2), &stretch, WindowLength::Whole);
         assert_eq!((right.windows, right.astray), (1, 0));
         assert!(right.joints[0].rms < 1e-5, "{}", right.joints[0].rms);
-        let windows = along(&model(0.2), &stretch, WindowLength::Seconds(0.5));
+        let windows = along(&inertia(0.2), &stretch, WindowLength::Seconds(0.5));
         assert_eq!(windows.windows, 4);
         // a quarter of the acceleration is missing: q errs by a quarter of what it integrates to
-        let wrong = along(&model(0.25), &stretch, WindowLength::Whole);
+        let wrong = along(&inertia(0.25), &stretch, WindowLength::Whole);
         let error = |t: f64| 0.2 * (3.0 * t - (3.0 * t).sin());
         assert!((wrong.joints[0].max_abs - error(2.0)).abs() < 1e-3);
     }

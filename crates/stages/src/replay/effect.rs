@@ -1,7 +1,5 @@
 //! One effect along logs: the residual without it over the signal on which it depends, and the torque that it adds.
 
-use serde::Serialize;
-
 use super::Replay;
 use cft_ident_core::effect::empirical::ways;
 use cft_ident_core::effect::{Added, AugmentedModel, CurveSignal, Family, Role, Search};
@@ -9,7 +7,7 @@ use cft_ident_core::motion::{MotionError, Stretch};
 use cft_ident_core::robot::JointKind;
 
 /// The rows of one effect at one joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct EffectRows {
     /// Which of the model's effects it is.
     pub effect: usize,
@@ -24,7 +22,6 @@ pub struct EffectRows {
     pub rows: Vec<[f64; 3]>,
 }
 
-/// The rows of an effect along some logs.
 pub(super) fn effect(
     replay: &Replay,
     model: &AugmentedModel,
@@ -32,7 +29,7 @@ pub(super) fn effect(
     logs: &[usize],
 ) -> Result<EffectRows, MotionError> {
     let effect = &model.effects[at];
-    let (joint, rows) = rows(replay, model, at, logs)?;
+    let (joint, mut rows) = rows(replay, model, at, logs)?;
     let rms = |of: fn(&[f64; 3]) -> f64| {
         let squares = rows.iter().map(|row| of(row).powi(2));
         let sum: f64 = squares.filter(|x| x.is_finite()).sum();
@@ -40,16 +37,16 @@ pub(super) fn effect(
     };
     let rms = [rms(|row| row[1]), rms(|row| row[1] - row[2])];
     let signal = OfSignal::of(effect, joint);
+    if signal == OfSignal::Way {
+        keep_near(&mut rows);
+    }
     Ok(EffectRows {
         effect: at,
         joint,
         over: signal.named(replay, effect, joint),
         along_motion: flips(effect),
         rms,
-        rows: match signal {
-            OfSignal::Way => near(rows),
-            _ => rows,
-        },
+        rows,
     })
 }
 
@@ -63,7 +60,7 @@ fn rows(
     let effect = &model.effects[at];
     let mut without = model.clone();
     without.effects.remove(at);
-    let joints = replay.machine.robot.joint_names().len();
+    let joints = replay.machine.robot.joints();
     let mut all: Vec<Vec<[f64; 3]>> = vec![Vec::new(); joints];
     let wanted = |stretch: &&Stretch| logs.contains(&stretch.log);
     for stretch in replay.stretches.iter().filter(wanted) {
@@ -73,12 +70,9 @@ fn rows(
             if !effect.place.touches(j) {
                 continue;
             }
-            let less = |x: &[f64], y: &[f64]| -> Vec<f64> {
-                x.iter().zip(y).map(|(x, y)| x - y).collect()
-            };
-            let residual = less(&stretch.tau[j], &bare[j]);
-            let shape = less(&full[j], &bare[j]);
-            let filtered = parallel.run(&[&residual, &shape])?;
+            let less =
+                |x: &[f64]| -> Vec<f64> { x.iter().zip(&bare[j]).map(|(x, y)| x - y).collect() };
+            let filtered = parallel.run(&[&less(&stretch.tau[j]), &less(&full[j])])?;
             let signal = OfSignal::of(effect, j);
             let values = signal.along(model, (effect, stretch), &bare, j);
             rows.extend((0..filtered[0].len()).map(|i| {
@@ -97,12 +91,10 @@ fn rows(
     Ok((joint, std::mem::take(&mut all[joint])))
 }
 
-/// The rows about those in which the effect is at work.
-fn near(mut rows: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
-    let mut by_way: Vec<[f64; 2]> = rows
-        .iter()
-        .map(|row| [row[0].abs(), row[2] * row[2]])
-        .collect();
+/// Keeps the rows about those in which the effect is at work.
+fn keep_near(rows: &mut Vec<[f64; 3]>) {
+    let ways = rows.iter().map(|row| [row[0].abs(), row[2] * row[2]]);
+    let mut by_way: Vec<[f64; 2]> = ways.collect();
     by_way.retain(|[way, square]| way.is_finite() && square.is_finite());
     by_way.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let whole: f64 = by_way.iter().map(|[_, square]| square).sum();
@@ -114,7 +106,6 @@ fn near(mut rows: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     if let Some([reach, _]) = reach.filter(|[reach, _]| *reach > 0.0) {
         rows.retain(|row| row[0].abs() <= PICTURE_FACTOR * reach);
     }
-    rows
 }
 
 /// Whether the torque of an effect flips with the direction of motion, over a signal that does not.
@@ -157,39 +148,36 @@ impl OfSignal {
         }
     }
 
-    /// Name and unit.
     fn named(self, replay: &Replay, effect: &Added, joint: usize) -> (String, String) {
         let robot = &replay.machine.robot;
-        let name = |what: &str, j: usize| format!("{what} of {}", robot.joint_names()[j]);
         let unit = |j: usize| robot.joint_kind(j).position_unit();
         let torque = replay.machine.file.torque_unit(joint);
         let force = if torque == "N" { "force" } else { "torque" };
-        match self {
-            OfSignal::Wave(_) => {
-                let what = match effect.place.joint() {
-                    Some(_) => "position within a wave",
-                    None => "position",
-                };
-                (name(what, joint), unit(joint).to_owned())
-            }
-            OfSignal::Position => (name("position", joint), unit(joint).to_owned()),
-            OfSignal::Velocity => (name("velocity", joint), format!("{}/s", unit(joint))),
-            OfSignal::OtherVelocity(j) => (name("velocity", j), format!("{}/s", unit(j))),
-            OfSignal::Way => (
-                name("travel since the last reversal", joint),
+        let (what, joint, unit) = match self {
+            OfSignal::Wave(_) if effect.place.joint().is_some() => (
+                "position within a wave".to_owned(),
+                joint,
                 unit(joint).to_owned(),
             ),
-            OfSignal::Load => (name(&format!("load {force}"), joint), torque.to_owned()),
-            OfSignal::TorqueRate => (
-                name(&format!("rate of the {force}"), joint),
-                format!("{torque}/s"),
-            ),
+            OfSignal::Wave(_) | OfSignal::Position => {
+                ("position".to_owned(), joint, unit(joint).to_owned())
+            }
+            OfSignal::Velocity => ("velocity".to_owned(), joint, format!("{}/s", unit(joint))),
+            OfSignal::OtherVelocity(j) => ("velocity".to_owned(), j, format!("{}/s", unit(j))),
+            OfSignal::Way => {
+                let what = "travel since the last reversal".to_owned();
+                (what, joint, unit(joint).to_owned())
+            }
+            OfSignal::Load => (format!("load {force}"), joint, torque.to_owned()),
+            OfSignal::TorqueRate => (format!("rate of the {force}"), joint, format!("{torque}/s")),
             OfSignal::Acceleration => (
-                name("acceleration", joint),
+                "acceleration".to_owned(),
+                joint,
                 format!("{}/s\u{b2}", unit(joint)),
             ),
-            OfSignal::Time => ("time".to_owned(), "s".to_owned()),
-        }
+            OfSignal::Time => return ("time".to_owned(), "s".to_owned()),
+        };
+        (format!("{what} of {}", robot.joint_names()[joint]), unit)
     }
 
     /// Its values along a stretch, sample by sample; `bare` is the torque of the model without the effect.
@@ -201,26 +189,21 @@ impl OfSignal {
         joint: usize,
     ) -> Vec<f64> {
         match self {
-            OfSignal::Wave(turns) => {
+            OfSignal::Wave(turns) if effect.place.joint().is_some() => {
                 let length = match model.model.robot.joint_kind(joint) {
                     JointKind::Revolute => std::f64::consts::TAU * turns,
                     JointKind::Prismatic => turns,
                 };
-                match effect.place.joint() {
-                    Some(_) => s.q[joint].iter().map(|q| q.rem_euclid(length)).collect(),
-                    None => s.q[joint].clone(),
-                }
+                s.q[joint].iter().map(|q| q.rem_euclid(length)).collect()
             }
-            OfSignal::Position => s.q[joint].clone(),
+            OfSignal::Wave(_) | OfSignal::Position => s.q[joint].clone(),
             OfSignal::Velocity => s.v[joint].clone(),
             OfSignal::OtherVelocity(j) => s.v[j].clone(),
             OfSignal::Way => {
-                let [low, high] = s.q[joint]
-                    .iter()
-                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
-                        [low.min(*q), high.max(*q)]
-                    });
-                let ways = ways(&s.q[joint], REVERSAL_SHARE_OF_TRAVEL * (high - low));
+                let q = &s.q[joint];
+                let low = q.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let ways = ways(q, REVERSAL_SHARE_OF_TRAVEL * (high - low));
                 let signed = ways.iter().zip(&s.v[joint]);
                 signed.map(|(way, v)| way * v.signum()).collect()
             }

@@ -1,7 +1,5 @@
 //! Friction of a model, with everything that was found, beside what was measured.
 
-use serde::Serialize;
-
 use super::Replay;
 use crate::identify::friction_curve;
 use cft_ident_core::effect::{Added, AugmentedModel};
@@ -14,7 +12,7 @@ use cft_ident_files::config::ModelFile;
 const POINTS: usize = 90;
 
 /// The friction of one joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct FrictionRows {
     pub joint: usize,
     /// By the declared law, in order of velocity; empty for a joint without one.

@@ -13,8 +13,6 @@ pub use poses::Poses;
 pub use residual::{ResidualEvidence, ResidualPair};
 pub use torque::{JointSeries, TorqueSeries};
 
-use serde::Serialize;
-
 use crate::identify::{Compared, Diagnosed, InMemory, LoggedRobot};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch};
@@ -52,11 +50,9 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Names of some of the logs.
     fn named(&self, logs: &[usize]) -> Vec<String> {
-        let mut names: Vec<String> = (logs.iter().filter_map(|log| self.names.get(*log)))
-            .cloned()
-            .collect();
+        let names = logs.iter().filter_map(|log| self.names.get(*log));
+        let mut names: Vec<String> = names.cloned().collect();
         // spans of one log have its name
         names.dedup();
         names
@@ -66,7 +62,6 @@ impl<'a> Replay<'a> {
         (0..self.names.len()).collect()
     }
 
-    /// Stretches of one log.
     fn of_log(&self, log: usize) -> impl Iterator<Item = &Stretch> {
         self.stretches.iter().filter(move |s| s.log == log)
     }
@@ -82,7 +77,7 @@ impl<'a> Replay<'a> {
 }
 
 /// What logs show beside one model.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Replayed {
     /// Names of the logs.
     pub logs: Vec<String>,
@@ -121,7 +116,7 @@ impl Replayed {
 
 /// What logs show beside the model of a diagnosis: the torque and the effects on held-out logs, where there are any,
 /// and the residual on those that were fitted.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct ReplayedDiagnosis {
     /// Names of the logs of torque and effects.
     pub logs: Vec<String>,
@@ -170,7 +165,7 @@ impl ReplayedDiagnosis {
 }
 
 /// What logs show beside two models.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct ReplayedPair {
     /// Names of the logs.
     pub logs: Vec<String>,
@@ -187,13 +182,10 @@ impl ReplayedPair {
     /// Stretches that are too short for the filter.
     pub fn new(replay: &Replay, of: &Compared) -> Result<Self, MotionError> {
         let models = [0, 1].map(|k| &of.sides[k].model);
-        let friction = models.map(|model| {
-            let effects = !model.effects.is_empty();
-            effects
-                .then(|| friction::friction_rows(replay, model))
-                .transpose()
+        let [a, b] = models.map(|model| match model.effects.is_empty() {
+            true => Ok(None),
+            false => friction::friction_rows(replay, model).map(Some),
         });
-        let [a, b] = friction;
         Ok(ReplayedPair {
             logs: replay.names.clone(),
             torque: torque::torque(replay, &replay.all(), &models)?,

@@ -1,7 +1,5 @@
 //! The robot along its motion, as points of its links.
 
-use serde::Serialize;
-
 use super::Replay;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::tree::pose::{driven, origins};
@@ -12,7 +10,7 @@ const POSES: usize = 5;
 const WAY: usize = 200;
 
 /// Poses of a tree of links, in a frame whose third axis points upwards.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Poses {
     /// Names of the logs.
     pub logs: Vec<String>,

@@ -1,14 +1,12 @@
 //! What the residual depends on, and the waves that a model has.
 
-use serde::Serialize;
-
 use super::Replay;
 use cft_ident_core::diagnose::{JointEvidence, evidence, one_after_the_other};
 use cft_ident_core::effect::{AugmentedModel, Place, Search};
 use cft_ident_core::motion::{MotionError, Stretch};
 
 /// The residual of one joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct ResidualPair {
     pub before: JointEvidence,
     /// By a second model, where there is one.
@@ -18,7 +16,7 @@ pub struct ResidualPair {
 }
 
 /// The residual of one or two models along the same logs.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct ResidualEvidence {
     /// Names of the logs.
     pub logs: Vec<String>,
@@ -48,16 +46,15 @@ pub(super) fn residual(
     let after = after.map(of).transpose()?;
     let mut after = after.into_iter().flatten();
     let joints = before.into_iter().zip(waves);
+    let joints = joints.map(|(before, orders)| ResidualPair {
+        before,
+        after: after.next(),
+        orders,
+    });
     Ok(ResidualEvidence {
         logs: replay.named(logs),
         begins: begins(replay, &stretches),
-        joints: joints
-            .map(|(before, orders)| ResidualPair {
-                before,
-                after: after.next(),
-                orders,
-            })
-            .collect(),
+        joints: joints.collect(),
     })
 }
 

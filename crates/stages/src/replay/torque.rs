@@ -1,13 +1,11 @@
 //! Measured and reconstructed torque over time.
 
-use serde::Serialize;
-
 use super::Replay;
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::motion::{MotionError, Stretch};
+use cft_ident_core::motion::MotionError;
 
 /// The torque of one joint along a log [Nm or N].
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default)]
 pub struct JointSeries {
     pub measured: Vec<f64>,
     /// Of each model.
@@ -18,7 +16,7 @@ pub struct JointSeries {
 }
 
 /// The torques of one log.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct TorqueSeries {
     /// Name of the log.
     pub log: String,
@@ -42,19 +40,15 @@ pub(super) fn torque(
         let mut smooth = Series::new(replay, models.len());
         let mut plain = Series::new(replay, models.len());
         for stretch in replay.of_log(log) {
-            let hats: Vec<Vec<Vec<f64>>> = models
-                .iter()
-                .map(|model| model.reconstruct(stretch))
-                .collect();
-            let channels: Vec<&[f64]> = stretch
-                .tau
-                .iter()
-                .chain(hats.iter().flatten())
-                .map(Vec::as_slice)
-                .collect();
+            let hats = models.iter().map(|model| model.reconstruct(stretch));
+            let hats: Vec<Vec<Vec<f64>>> = hats.collect();
+            let channels = stretch.tau.iter().chain(hats.iter().flatten());
+            let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
             plain.add(&stretch.t, &channels);
-            let rows = replay.filters.of(stretch).run(&channels)?;
-            let times = sampled(replay, stretch);
+            let filter = replay.filters.of(stretch);
+            let rows = filter.run(&channels)?;
+            let at = |i| stretch.t.get(filter.sample_of(i)).copied();
+            let times: Vec<f64> = (0..filter.rows(stretch.len())).filter_map(at).collect();
             let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
             smooth.add(&times, &rows);
         }
@@ -63,13 +57,6 @@ pub(super) fn torque(
         all.push(plain.finish(name, None));
     }
     Ok(all)
-}
-
-fn sampled(replay: &Replay, stretch: &Stretch) -> Vec<f64> {
-    let filter = replay.filters.of(stretch);
-    let rows = filter.rows(stretch.len());
-    let at = |i| stretch.t.get(filter.sample_of(i)).copied();
-    (0..rows).filter_map(at).collect()
 }
 
 /// Torques of one log, stretch after stretch.

@@ -10,7 +10,6 @@ use cft_ident_core::robot::friction::sign;
 /// What the channels of a log are of.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drive {
-    /// Joints.
     Joints,
     /// Motors behind coupled gears, p = R q and tau = R' c: R and its inverse.
     Gears(DMatrix<f64>, DMatrix<f64>),
@@ -34,14 +33,12 @@ pub(super) struct Carried {
     pub v: Vec<f64>,
     pub a: Vec<f64>,
     pub sign: Vec<f64>,
-    /// What each channel gives to each joint, n x n row-major by joint: summed with the weights of
-    /// [`Channels::mix`].
+    /// What each channel gives to each joint, n x n row-major by joint: summed with the weights of [`Channels::mix`].
     pub tau: Vec<f64>,
-    /// Work space.
-    x: [Vec<f64>; 3],
-    before: [Vec<f64>; 3],
-    u: Vec<f64>,
-    force: Vec<f64>,
+    /// Positions, speeds and accelerations of motors.
+    motors: [Vec<f64>; 3],
+    /// Torques of motors and of joints.
+    torques: [Vec<f64>; 2],
 }
 
 impl Carried {
@@ -53,10 +50,8 @@ impl Carried {
             a: zeros(),
             sign: zeros(),
             tau: vec![0.0; n * n],
-            x: [zeros(), zeros(), zeros()],
-            before: [zeros(), zeros(), zeros()],
-            u: zeros(),
-            force: zeros(),
+            motors: [zeros(), zeros(), zeros()],
+            torques: [zeros(), zeros()],
         }
     }
 }
@@ -141,7 +136,7 @@ impl Channels {
         out: &mut Carried,
     ) {
         let n = row.q.len();
-        let [position, velocity, acceleration] = &mut out.before;
+        let [position, velocity, acceleration] = &mut out.motors;
         for j in 0..n {
             let times = |x: &dyn Fn(usize) -> f64| (0..n).map(|i| r[(j, i)] * x(i)).sum::<f64>();
             position[j] = times(&|i| row.q[i] - self.position_offset[i]);
@@ -177,28 +172,19 @@ impl Channels {
     ) -> Option<()> {
         let n = row.q.len();
         let drive = robot.transmission();
-        let Carried {
-            q,
-            v,
-            a,
-            x,
-            u,
-            force,
-            ..
-        } = out;
         let offset = &self.position_offset;
-        let [moved, speed, change] = x;
-        let coordinates = moved.iter_mut().zip(speed).zip(change).enumerate();
-        for (j, ((x, xd), xdd)) in coordinates {
+        let [moved, speed, change] = &mut out.motors;
+        for j in 0..n {
             let (k, f) = (by.position_from[j], self.position_factor(by, j));
-            *x = f * (row.q[k] - offset[k]) + offset[j] + by.zero[j];
-            *xd = f * row.v[k];
-            *xdd = f * row.a[k];
+            moved[j] = f * (row.q[k] - offset[k]) + offset[j] + by.zero[j];
+            speed[j] = f * row.v[k];
+            change[j] = f * row.a[k];
         }
-        let [moved, speed, change] = x;
+        let (q, v, a) = (&mut out.q, &mut out.v, &mut out.a);
         drive.joints(moved, q).ok()?;
         drive.joint_velocities(q, speed, v).ok()?;
         drive.joint_accelerations(q, v, change, a).ok()?;
+        let [u, force] = &mut out.torques;
         for k in 0..n {
             let from = by.torque_from[k];
             u.fill(0.0);
@@ -211,8 +197,9 @@ impl Channels {
         for (to, v) in out.sign.iter_mut().zip(&out.v) {
             *to = sign(*v);
         }
-        let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
-        (finite(&out.q) && finite(&out.v) && finite(&out.a) && finite(&out.tau)).then_some(())
+        let all = [&out.q, &out.v, &out.a, &out.tau];
+        let finite = all.into_iter().flatten().all(|x| x.is_finite());
+        finite.then_some(())
     }
 }
 

@@ -2,8 +2,7 @@
 
 use super::finding::ChannelKind::{self, Both, Position, Torque};
 
-/// One thing that may be wrong with a set-up, as what puts it right. Joints are channels where motors
-/// have coordinates of their own.
+/// One thing that may be wrong with a set-up, as what puts it right; of motors with coordinates, not of joints.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
     /// These channels are to be multiplied by a factor, -1 for a sign.
@@ -62,11 +61,11 @@ impl Correction {
         match change {
             Change::Two(first, second) => return self.with(first).with(second),
             Change::Scale(channel, joints, factor) => {
-                for j in joints {
-                    out.multiply(*j, [*channel, *channel], [*factor; 2]);
-                }
+                joints
+                    .iter()
+                    .for_each(|j| out.multiply(*j, *channel, [*factor; 2]));
             }
-            Change::Gear(j, ratio) => out.multiply(*j, [Both; 2], [ratio.recip(), *ratio]),
+            Change::Gear(j, ratio) => out.multiply(*j, Both, [ratio.recip(), *ratio]),
             Change::Exchange(channel, a, b) => {
                 if *channel != Torque {
                     out.position_from.swap(*a, *b);
@@ -95,11 +94,11 @@ impl Correction {
             && self.gravity == other.gravity
     }
 
-    fn multiply(&mut self, j: usize, of: [ChannelKind; 2], [position, torque]: [f64; 2]) {
-        if of[0] != Torque {
+    fn multiply(&mut self, j: usize, of: ChannelKind, [position, torque]: [f64; 2]) {
+        if of != Torque {
             self.position_factor[j] *= position;
         }
-        if of[1] != Position {
+        if of != Position {
             self.torque_factor[j] *= torque;
         }
     }
@@ -185,9 +184,7 @@ mod tests {
         assert_eq!(both.torque_from, [2, 1, 0]);
         assert_eq!(both.with(&moved).with(&turned), none);
         let geared = none.with(&Change::Gear(1, 4.0));
-        assert_eq!(
-            (geared.position_factor[1], geared.torque_factor[1]),
-            (0.25, 4.0)
-        );
+        assert_eq!(geared.position_factor[1], 0.25);
+        assert_eq!(geared.torque_factor[1], 4.0);
     }
 }

@@ -18,7 +18,6 @@ const STEP: f64 = 0.2;
 /// Newton steps to the best value.
 const STEPS: usize = 4;
 
-/// What is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Free {
     Factor(ChannelKind, usize),
@@ -146,24 +145,17 @@ fn best(
     // by what the steps that follow go down, and the nearest to the declared set-up of equals
     let scored = |x: f64| {
         let change = free.change(problem, x);
-        Some((
-            Trial::least(problem, (base, Some(&change)), every, &[few])?,
-            x,
-        ))
+        let score = Trial::least(problem, (base, Some(&change)), every, &[few])?;
+        Some((score, x))
     };
     let lower =
         |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0).then(a.1.abs().total_cmp(&b.1.abs()));
     let (_, mut x) = grid.filter_map(scored).min_by(lower)?;
     let change = free.change(problem, x);
-    let found = Trial::new(
-        problem,
-        (base, Some(&change)),
-        (every, f64::INFINITY),
-        &[few],
-    )?;
-    let own: Vec<usize> = free
-        .joint()
-        .map_or_else(|| problem.channels_that_move(), |j| vec![j]);
+    let rows = (every, f64::INFINITY);
+    let found = Trial::new(problem, (base, Some(&change)), rows, &[few])?;
+    let own = free.joint().map(|j| vec![j]);
+    let own = own.unwrap_or_else(|| problem.channels_that_move());
     let turns = (low, high) == (-PI, PI);
     let at_end = !turns && (x <= low || x >= high);
     if at_end || found.square(&own) > LIMITS.floor * few.square(&own) {

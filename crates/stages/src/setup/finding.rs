@@ -142,6 +142,37 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// A finding of another check than the search, with what the file declares and what it should say.
+    pub fn new(
+        kind: FindingKind,
+        joint: Option<String>,
+        [declared, found]: [Setting; 2],
+        meaning: String,
+        remedy: String,
+        sure: bool,
+    ) -> Self {
+        Self {
+            kind,
+            channel: None,
+            joint,
+            with: None,
+            declared,
+            found,
+            found_std: None,
+            error_before: None,
+            error_after: None,
+            remedy,
+            severity: match sure {
+                true => FindingSeverity::Error,
+                false => FindingSeverity::Warning,
+            },
+            sure,
+            joints: Vec::new(),
+            tied_with: Vec::new(),
+            meaning,
+        }
+    }
+
     /// As it is reported: what is wrong, what to write, and what these data say as well.
     pub fn in_words(&self) -> String {
         let mut out = self.meaning.clone();
@@ -182,40 +213,6 @@ impl SetupReport {
     /// What a fit refuses the logs for.
     pub fn refusals(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| finding.sure)
-    }
-}
-
-impl Finding {
-    /// A finding of another check than the search, with what the file declares and what it should say.
-    pub fn new(
-        kind: FindingKind,
-        joint: Option<String>,
-        [declared, found]: [Setting; 2],
-        meaning: String,
-        remedy: String,
-        sure: bool,
-    ) -> Self {
-        Self {
-            kind,
-            channel: None,
-            joint,
-            with: None,
-            declared,
-            found,
-            found_std: None,
-            error_before: None,
-            error_after: None,
-            remedy,
-            severity: if sure {
-                FindingSeverity::Error
-            } else {
-                FindingSeverity::Warning
-            },
-            sure,
-            joints: Vec::new(),
-            tied_with: Vec::new(),
-            meaning,
-        }
     }
 }
 

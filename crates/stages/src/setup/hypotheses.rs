@@ -31,11 +31,10 @@ pub(super) fn all(problem: &Problem) -> Vec<Change> {
     out.push(Change::Scale(Torque, moving.clone(), -1.0));
     out.push(Change::Scale(Position, moving.clone(), -1.0));
     for side in SIDES {
-        let pairs = moving.iter().enumerate().flat_map(|(i, a)| {
+        for (i, a) in moving.iter().enumerate() {
             let others = moving[i + 1..].iter();
-            others.map(move |b| Change::Exchange(side, *a, *b))
-        });
-        out.extend(pairs);
+            out.extend(others.map(|b| Change::Exchange(side, *a, *b)));
+        }
     }
     if moving.len() == problem.robot.joints() && moving.len() > 2 {
         out.push(Change::Reverse);
@@ -72,11 +71,8 @@ fn units(problem: &Problem, moving: &[usize]) -> Vec<Change> {
     let alike = |j: &usize| kind(*j) == kind(moving[0]);
     let alike: Vec<usize> = moving.iter().copied().filter(alike).collect();
     if alike.len() > 1 {
-        out.extend(
-            factors(moving[0])
-                .iter()
-                .map(|f| scaled(Position, &alike, f)),
-        );
+        let factors = factors(moving[0]).iter();
+        out.extend(factors.map(|f| scaled(Position, &alike, f)));
     }
     out
 }
@@ -139,8 +135,7 @@ pub(super) fn is_unit(factor: f64) -> bool {
     ANGLES.contains(&factor) || THOUSANDS.contains(&factor)
 }
 
-/// The factors of a list within an interval: gear ratios that are written in the robot file, whole and half numbers,
-/// units. Ratios multiply a torque and divide a position.
+/// The factors of a list within an interval; ratios multiply a torque and divide a position.
 pub(super) fn round_numbers(side: ChannelKind, ratios: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
     let halves = (3..=2 * LARGEST as u32).map(|k| f64::from(k) / 2.0);
     let written: Vec<f64> = ratios.iter().copied().filter(|r| *r > 1.0).collect();

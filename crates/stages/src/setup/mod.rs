@@ -10,22 +10,6 @@
 //!
 //! A hypothesis is a mistake that a person makes, from a list. A factor that is on no list is an estimate and no fault.
 //! Blocks, parts and what counts as sure are those of the judge ([`cft_ident_core::judge`]).
-//!
-//! | file | holds |
-//! |---|---|
-//! | `finding` | the entries of the key `setup` |
-//! | `correction` | changes of a set-up, and their sum |
-//! | `hypotheses` | the list of mistakes |
-//! | `sample` | a bounded number of smoothed rows, spread over the logs |
-//! | `channels` | from logged channels to joints under a correction |
-//! | `problem` | sums of products under a correction, by block and joint |
-//! | `trial` | the fit of one hypothesis, its errors on blocks left out |
-//! | `physics` | what no machine does: friction that drives, inertia below zero |
-//! | `estimate` | factors, zeros and directions that are fitted |
-//! | `weight` | the masses of the robot file as a yardstick of its torques |
-//! | `undecided` | why data cannot tell |
-//! | `search` | all of it |
-//! | `found` | what it comes to |
 
 mod channels;
 mod correction;
@@ -41,24 +25,24 @@ mod trial;
 mod undecided;
 mod weight;
 
-pub use channels::{Channels, Drive};
-pub use correction::{Change, Correction};
-pub use estimate::SetupEstimate;
+pub(crate) use channels::{Channels, Drive};
+pub(crate) use correction::{Change, Correction};
+pub(crate) use estimate::SetupEstimate;
 pub use finding::{
     Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, Setting,
     SetupErrors, SetupReport,
 };
-pub use found::{Found, Searched};
-pub use physics::Driven;
-pub use problem::{KnownBeforehand, Problem};
-pub use sample::{Sample, Thinner};
-pub use search::search;
-pub use undecided::{Cause, Undecided};
-pub use weight::{Weight, WeightGain};
+pub(crate) use found::{Found, Searched};
+pub(crate) use physics::Driven;
+pub(crate) use problem::{KnownBeforehand, Problem};
+pub(crate) use sample::{Sample, Thinner};
+pub(crate) use search::search;
+pub(crate) use undecided::{Cause, Undecided};
+pub(crate) use weight::{Weight, WeightGain};
 
 /// The numbers that decide beside those of the judge.
 #[derive(Debug, Clone, Copy)]
-pub struct SetupLimits {
+pub(crate) struct SetupLimits {
     /// A set-up is absurd where a joint's error is above this share of its torque. Half: machines of much friction are
     /// refused; twice: only turned signs are.
     pub unexplained: f64,
@@ -87,8 +71,7 @@ pub struct SetupLimits {
     pub short_list: usize,
 }
 
-/// The numbers of the check.
-pub const LIMITS: SetupLimits = SetupLimits {
+pub(crate) const LIMITS: SetupLimits = SetupLimits {
     unexplained: 0.5,
     sound: 0.25,
     doubtful: 0.05,

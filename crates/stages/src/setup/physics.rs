@@ -73,8 +73,7 @@ fn inertias(problem: &Problem, trial: &Trial) -> Vec<DVector<f64>> {
     out
 }
 
-/// The mean power of a joint's friction, as weights of the unknowns: the products of its columns with the speed; none of
-/// a joint that goes one way only, where friction and a constant torque are the same.
+/// Mean power of a joint's friction, as weights of the unknowns; none of a joint that goes one way only.
 fn friction_power(problem: &Problem, trial: &Trial, joint: usize) -> Option<DVector<f64>> {
     let own = &problem.columns.own[joint];
     let first = problem.first_own(&trial.robot, joint);

@@ -39,7 +39,7 @@ pub struct Problem<'a> {
     pub known: KnownBeforehand,
     pub(super) blocks: Blocks,
     /// Joints that move, and whose torques are not all zero.
-    moving: Vec<bool>,
+    pub(super) moving: Vec<bool>,
 }
 
 /// Rows of each joint, and their sums of products: the joint's inertial parameters, its own terms, the torque of each channel.
@@ -50,7 +50,6 @@ pub(super) struct Rows {
     /// Over all rows.
     pub total: Vec<DMatrix<f64>>,
     joints: Vec<JointRows>,
-    /// Rows of each block.
     of_blocks: Vec<Range<usize>>,
     /// Sums of each block, once they are asked for: most hypotheses are seen to be no better before.
     blocks: OnceLock<Vec<Vec<DMatrix<f64>>>>,
@@ -64,12 +63,9 @@ struct JointRows {
 
 impl JointRows {
     fn products(&self, rows: Range<usize>) -> DMatrix<f64> {
-        let stride = stride(self.columns);
-        let within = |k: usize| (k * stride).min(self.data.len());
-        gram(
-            &self.data[within(rows.start)..within(rows.end)],
-            self.columns,
-        )
+        let within = |k: usize| (k * stride(self.columns)).min(self.data.len());
+        let data = &self.data[within(rows.start)..within(rows.end)];
+        gram(data, self.columns)
     }
 }
 
@@ -100,39 +96,18 @@ impl<'a> Problem<'a> {
         sample: Sample,
         known: KnownBeforehand,
     ) -> Self {
-        let blocks = divide(&sample.logs(), 1.0, &NUMBERS);
-        let mut out = Self {
+        // a motor behind a linkage is no joint
+        let linked = channels.drive == Drive::Motors;
+        Self {
+            blocks: divide(&sample.logs(), 1.0, &NUMBERS),
+            moving: joints_that_move(&sample, linked),
             robot,
             in_gravity,
             channels,
             columns,
             sample,
             known,
-            blocks,
-            moving: Vec::new(),
-        };
-        out.moving = out.joints_that_move();
-        out
-    }
-
-    /// Joints that move, and whose torques are not all zero.
-    pub(super) fn moving(&self) -> &[bool] {
-        &self.moving
-    }
-
-    /// In a log that moves one joint the others stand still; where several move, one that seems not to may be in
-    /// thousandths of its unit.
-    fn joints_that_move(&self) -> Vec<bool> {
-        let n = self.sample.joints;
-        let moved = |j: &usize| self.sample.travel(*j) > LIMITS.still;
-        let alone = n > 1 && (0..n).filter(moved).count() == 1;
-        // a motor behind a linkage is no joint
-        let linked = self.channels.drive == Drive::Motors;
-        let torques = self.sample.rms(|row| row.tau);
-        let speeds = self.sample.rms(|row| row.v);
-        let moving =
-            |j: usize| linked || torques[j] > 0.0 && speeds[j] > 0.0 && (moved(&j) || !alone);
-        (0..n).map(moving).collect()
+        }
     }
 
     /// Every how many rows make few of them.
@@ -227,11 +202,8 @@ impl<'a> Problem<'a> {
                     continue;
                 }
                 good += 1;
-                for (j, rows) in joints
-                    .iter_mut()
-                    .enumerate()
-                    .filter(|(j, _)| self.moving[*j])
-                {
+                let all = joints.iter_mut().enumerate();
+                for (j, rows) in all.filter(|(j, _)| self.moving[*j]) {
                     let shared = places[j].len() - self.columns.own[j].len();
                     let data = &mut rows.data;
                     data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));
@@ -261,8 +233,18 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// In a log that moves one joint the others stand still; where several move, one that seems not to may be in thousandths.
+fn joints_that_move(sample: &Sample, linked: bool) -> Vec<bool> {
+    let n = sample.joints;
+    let moved = |j: &usize| sample.travel(*j) > LIMITS.still;
+    let alone = n > 1 && (0..n).filter(moved).count() == 1;
+    let (torques, speeds) = (sample.rms(|row| row.tau), sample.rms(|row| row.v));
+    let moving = |j: usize| linked || torques[j] > 0.0 && speeds[j] > 0.0 && (moved(&j) || !alone);
+    (0..n).map(moving).collect()
+}
+
 /// The column of a joint's own term in a row.
-pub(super) fn own_column(own: Own, carried: &Carried, j: usize) -> f64 {
+fn own_column(own: Own, carried: &Carried, j: usize) -> f64 {
     match own {
         Own::Coulomb => carried.sign[j],
         own => own.column(carried.v[j]),

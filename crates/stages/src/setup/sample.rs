@@ -6,8 +6,7 @@ use cft_ident_core::judge::LogRows;
 /// Numbers of a joint in a row.
 const OF_JOINT: usize = 6;
 
-/// Rows of smoothed motion and torque. Of motors behind a linkage they are what the channels have: it is to be reported
-/// which of them belong to no pose.
+/// Rows of smoothed motion and torque; of motors behind a linkage as logged, whatever pose they belong to.
 #[derive(Debug, Clone, Default)]
 pub struct Sample {
     pub joints: usize,
@@ -35,11 +34,6 @@ impl Sample {
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.log.len()
-    }
-
-    /// Whether there is no row.
-    pub fn is_empty(&self) -> bool {
-        self.log.is_empty()
     }
 
     /// Row k.
@@ -103,10 +97,8 @@ impl Sample {
     fn without_rests(&mut self) {
         let speeds = self.rms(|row| row.v);
         let moves = |k: &usize| {
-            let pairs = self.row(*k).v.iter().zip(&speeds);
-            pairs
-                .into_iter()
-                .any(|(v, rms)| v.abs() > LIMITS.still * rms)
+            let mut pairs = self.row(*k).v.iter().zip(&speeds);
+            pairs.any(|(v, rms)| v.abs() > LIMITS.still * rms)
         };
         let kept: Vec<usize> = (0..self.len()).filter(moves).collect();
         if kept.len() >= self.len() / 4 {
@@ -114,7 +106,6 @@ impl Sample {
         }
     }
 
-    /// Keeps these rows, in order.
     fn keep(&mut self, kept: &[usize]) {
         let width = OF_JOINT * self.joints;
         for (to, from) in kept.iter().enumerate() {
@@ -127,8 +118,7 @@ impl Sample {
     }
 }
 
-/// Takes rows as they come and keeps at most [`LIMITS`]`.rows`, every so many: twice as rarely each time that
-/// there are too many.
+/// Takes rows as they come and keeps at most [`LIMITS`]`.rows`: twice as rarely each time that there are too many.
 #[derive(Debug, Clone)]
 pub struct Thinner {
     sample: Sample,
@@ -152,8 +142,7 @@ impl Thinner {
         }
     }
 
-    /// Adds a row of a log at time t \[s\]: positions, velocities, accelerations, signs of the velocities and torques,
-    /// one after the other.
+    /// Adds a row at time t \[s\]: positions, velocities, accelerations, signs of the velocities, torques.
     pub fn add(&mut self, log: usize, t: f64, channels: &[f64]) {
         let n = self.sample.joints;
         if channels.len() != (OF_JOINT - 1) * n || channels.iter().any(|x| !x.is_finite()) {

@@ -23,8 +23,7 @@ struct Judged {
     broken: Broken,
 }
 
-/// Looks for what is wrong with the set-up: one mistake, and a second one when the first is put right. `stopped` ends it
-/// early with what is found so far.
+/// Looks for one mistake, and for a second one when the first is put right; `stopped` ends it early.
 pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searched {
     let n = problem.robot.joints();
     let mut out = Searched::default();
@@ -80,8 +79,8 @@ impl Look<'_> {
         change: Option<&Change>,
         same: Option<&Trial>,
     ) -> Option<Judged> {
-        let same: Vec<&Trial> = same.into_iter().collect();
-        let trial = Trial::new(self.problem, (base, change), (1, f64::INFINITY), &same)?;
+        let rows = (1, f64::INFINITY);
+        let trial = Trial::new(self.problem, (base, change), rows, same.as_slice())?;
         let broken = Broken::of(self.problem, &trial);
         Some(Judged { trial, broken })
     }
@@ -113,14 +112,13 @@ impl Look<'_> {
         }
         let few = self.quick(base, None, &[], f64::INFINITY);
         let all = hypotheses::all(self.problem);
-        let mut list = self.judged(base, all, (&few.iter().collect::<Vec<_>>(), declared));
+        let own: Vec<&Trial> = few.iter().collect();
+        let mut list = self.judged(base, all, (&own, declared));
         let mut fitted: Option<(SetupEstimate, Trial)> = None;
         if let (Some(few), Some(whole), true) = (&few, declared, moving.len() > 1) {
             let both = (few, &whole.trial);
-            let best = list
-                .iter()
-                .min_by(|a, b| a.trial.whole().total_cmp(&b.trial.whole()));
-            let change = best.and_then(|j| j.trial.change.as_ref());
+            let best = list.iter().map(|j| &j.trial).min_by(|a, b| a.order(b));
+            let change = best.and_then(|best| best.change.as_ref());
             // neighbours of a listed value may fit better, and what is beyond its limits has some other factor
             let mut asked = self.problem.beyond_limits(base);
             asked.extend(change.and_then(Change::joint_of_value));
@@ -135,12 +133,11 @@ impl Look<'_> {
                 };
                 list.retain(|j| !better(j));
                 list.extend(new.iter().filter_map(of));
-                if let Some(judged) = of(&estimate.change)
-                    && fitted
-                        .as_ref()
-                        .is_none_or(|f| judged.trial.whole() < f.1.whole())
+                let least = fitted.as_ref().map(|f| f.1.whole());
+                if let Some(Judged { trial, .. }) = of(&estimate.change)
+                    && least.is_none_or(|least| trial.whole() < least)
                 {
-                    fitted = Some((estimate, judged.trial));
+                    fitted = Some((estimate, trial));
                 }
             }
         }
@@ -154,7 +151,6 @@ impl Look<'_> {
         });
         if absurd && found.as_ref().is_none_or(|f| !f.sure) {
             let (firsts, pairs) = self.pairs(&list);
-            let own: Vec<&Trial> = few.iter().collect();
             let first = |c: &Change| self.quick(base, Some(c), &own, f64::INFINITY);
             let firsts: Vec<Trial> = firsts.iter().filter_map(first).collect();
             // a second mistake in the torques has the columns of the first
@@ -191,10 +187,9 @@ impl Look<'_> {
         let best = Mutex::new(Vec::new());
         let score = |i: usize| {
             // what is surely above the best so far is none of them
-            let most = if turns(&i) {
-                f64::INFINITY
-            } else {
-                last_of(&best)
+            let most = match turns(&i) {
+                true => f64::INFINITY,
+                false => last_of(&best),
             };
             let trial = self.quick(base, Some(&list[i]), few, most);
             let score = trial.map_or(f64::INFINITY, |trial| trial.whole());
@@ -225,7 +220,7 @@ impl Look<'_> {
             all.partition(|judged| self.has_a_factor(base, judged, declared));
         *list = known;
         let trials = free.into_iter().map(|judged| judged.trial);
-        trials.min_by(|a, b| a.whole().total_cmp(&b.whole()))
+        trials.min_by(|a, b| a.order(b))
     }
 
     /// Whether the data determine the factor of a hypothesis: any that is far off frees a joint from all others.
@@ -235,12 +230,12 @@ impl Look<'_> {
             Some(d) => Compared::of(self.problem, &d.trial, trial).better,
             None => self.problem.channels_that_move(),
         };
-        let same: Vec<&Trial> = declared.iter().map(|d| &d.trial).collect();
+        let same = declared.map(|d| &d.trial);
+        let rows = (1, f64::INFINITY);
         let far = |by: f64| {
             let other = trial.change.as_ref().and_then(|c| c.times(by));
-            let other = other.and_then(|c| {
-                Trial::new(self.problem, (base, Some(&c)), (1, f64::INFINITY), &same)
-            });
+            let fit = |c| Trial::new(self.problem, (base, Some(&c)), rows, same.as_slice());
+            let other = other.and_then(fit);
             other.is_none_or(|other| other.square(&seen) > LIMITS.far * trial.square(&seen))
         };
         far(LIMITS.yardstick) && far(LIMITS.yardstick.recip())
@@ -249,7 +244,7 @@ impl Look<'_> {
     /// The best of a list, and each with every other hypothesis.
     fn pairs(&self, list: &[Judged]) -> (Vec<Change>, Vec<Change>) {
         let mut best: Vec<&Trial> = list.iter().map(|j| &j.trial).collect();
-        best.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
+        best.sort_by(|a, b| a.order(b));
         let firsts = best.iter().take(LIMITS.short_list / 4);
         let all = hypotheses::all(self.problem);
         let with = |first: &Change| -> Vec<Change> {
@@ -265,8 +260,7 @@ impl Look<'_> {
         (firsts, pairs)
     }
 
-    /// The reading of the list that is reported, if any. `fitted` is the best value that is on no list, `free` the best
-    /// reading whose factor the data do not determine.
+    /// The reading that is reported, beside the best value on no list and the best whose factor is not determined.
     fn decide(
         &self,
         declared: Option<&Judged>,
@@ -277,10 +271,7 @@ impl Look<'_> {
         // what physics breaks counts first, then the error; the simplest of equals is first in the list
         let turned = |j: &Judged| j.broken.turned.len();
         let mut order: Vec<&Judged> = list.iter().collect();
-        order.sort_by(|a, b| {
-            let errors = a.trial.whole().total_cmp(&b.trial.whole());
-            turned(a).cmp(&turned(b)).then(errors)
-        });
+        order.sort_by(|a, b| turned(a).cmp(&turned(b)).then(a.trial.order(&b.trial)));
         let best = self.plainer(&order)?;
         let change = best.trial.change.clone()?;
         let after = best.trial.errors();
@@ -295,13 +286,11 @@ impl Look<'_> {
             confirmed = compared.agreed >= NUMBERS.confirmed;
             // what is not absurd is a factor, or most of what is missed, and sound machines leave as little
             let left = best.trial.square(better) / d.trial.square(better);
+            let sound = || after.iter().all(|e| *e <= LIMITS.sound);
+            let plain = || change.times(1.0).is_some() || left < LIMITS.same && sound();
             let likely = match absurd {
                 true => compared.agreed > 0.0,
-                false => {
-                    let sound = after.iter().all(|e| *e <= LIMITS.sound);
-                    let plain = change.times(1.0).is_some() || sound && left < LIMITS.same;
-                    confirmed && plain
-                }
+                false => confirmed && plain(),
             };
             // behind gears and linkages a motor is of several joints
             let own = self.problem.channels.drive != Drive::Joints || own_gain(&change, better);
@@ -321,12 +310,9 @@ impl Look<'_> {
         let contradicts = |f: &Trial| {
             let value = f.change.as_ref().filter(|_| change.times(1.0).is_some());
             let same = value.is_some_and(|c| c.is_value_of(&change));
-            let less = f.whole() * (1.0 + LIMITS.same) < best.trial.whole();
-            same && less
-                && best
-                    .trial
-                    .gain(f, &everyone)
-                    .is_beyond(NUMBERS.screen, None)
+            let closer = f.whole() * (1.0 + LIMITS.same) < best.trial.whole();
+            let gain = || best.trial.gain(f, &everyone);
+            same && closer && gain().is_beyond(NUMBERS.screen, None)
         };
         if fitted.is_some_and(contradicts) {
             return None;
@@ -355,11 +341,8 @@ impl Look<'_> {
         };
         let open = others.iter().filter(elsewhere).any(|j| untold(j));
         let beside = fitted.is_some_and(|f| {
-            let own = f
-                .change
-                .as_ref()
-                .is_some_and(|c| c.joints() == change.joints());
-            !own && near(f)
+            let own = f.change.as_ref().map(Change::joints);
+            own != Some(change.joints()) && near(f)
         });
         let absurd: Vec<usize> = (seen.iter().copied())
             .filter(|j| before[*j].is_nan() || before[*j] > LIMITS.unexplained)
@@ -389,8 +372,7 @@ impl Look<'_> {
         })
     }
 
-    /// A mistake that the errors do not show, and the limits of the file do: as declared joints are beyond them, with it
-    /// none is, and no joint fits worse. A factor is for the fit to estimate.
+    /// A mistake that the limits of the file show and the errors do not; a factor is for the fit to estimate.
     fn within_limits(&self, declared: &Judged) -> Option<Found> {
         let beyond_limits = self.problem.beyond_limits(&declared.trial.by);
         if beyond_limits.is_empty() {
@@ -402,24 +384,21 @@ impl Look<'_> {
             if change.times(1.0).is_some() || !self.problem.beyond_limits(&by).is_empty() {
                 return None;
             }
-            let trial = self
-                .whole(&declared.trial.by, Some(change), Some(&declared.trial))?
-                .trial;
+            let same = Some(&declared.trial);
+            let trial = self.whole(&declared.trial.by, Some(change), same)?.trial;
             let worse = |(b, a): (&f64, &f64)| *a > b * (1.0 + LIMITS.same);
             let after = trial.errors();
             (!before.iter().zip(&after).any(worse)).then_some(trial)
         };
-        let mut all: Vec<Trial> = (hypotheses::all(self.problem).iter())
-            .filter_map(mends)
-            .collect();
-        all.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
+        let all = hypotheses::all(self.problem);
+        let mut all: Vec<Trial> = all.iter().filter_map(mends).collect();
+        all.sort_by(|a, b| a.order(b));
         let (best, others) = all.split_first()?;
         let change = best.change.clone()?;
         let everyone = self.problem.channels_that_move();
-        let tied = others
-            .iter()
-            .filter(|j| !j.gain(best, &everyone).is_beyond(NUMBERS.screen, None));
-        let tied: Vec<Change> = tied.filter_map(|j| j.change.clone()).collect();
+        let tied = |j: &&Trial| !j.gain(best, &everyone).is_beyond(NUMBERS.screen, None);
+        let tied = others.iter().filter(tied).filter_map(|j| j.change.clone());
+        let tied: Vec<Change> = tied.collect();
         Some(Found {
             errors: [before, best.errors()],
             sure: false,
@@ -439,8 +418,7 @@ impl Look<'_> {
         }
     }
 
-    /// The first reading, or another factor of its channel that the blocks do not distinguish from it and that people write
-    /// more often.
+    /// The first reading, or another factor of its channel that blocks do not distinguish and people write more often.
     fn plainer<'j>(&self, order: &[&'j Judged]) -> Option<&'j Judged> {
         let best = *order.first()?;
         let odd = |j: &Judged| j.trial.change.as_ref().map_or(0, |c| self.oddity(c));

@@ -1,5 +1,6 @@
 //! The fit of one hypothesis, and the errors of every joint in blocks that were left out of it.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -62,7 +63,7 @@ impl Mixed {
             let torques = sums.nrows() - mix.len();
             let of_torques = sums.view((torques, torques), (mix.len(), mix.len()));
             let power = mix.dot(&(of_torques * mix));
-            let counts = problem.moving()[j] && power > 0.0;
+            let counts = problem.moving[j] && power > 0.0;
             if counts { power.recip() } else { 0.0 }
         };
         let joints = rows.total.iter().zip(&mix).enumerate();
@@ -161,15 +162,19 @@ impl Trial {
         self.left_out.iter().flatten().sum()
     }
 
+    /// The order of trials by that error.
+    pub fn order(&self, other: &Trial) -> Ordering {
+        self.whole().total_cmp(&other.whole())
+    }
+
     /// What another trial takes off the errors of some joints.
     pub fn gain(&self, other: &Trial, joints: &[usize]) -> ErrorGain {
         compare(&self.left_out, &other.left_out, &self.only(joints))
     }
 
     fn only(&self, joints: &[usize]) -> Vec<f64> {
-        let all = 0..self.terms.weights.len();
-        all.map(|j| f64::from(u8::from(joints.contains(&j))))
-            .collect()
+        let of = |j: usize| f64::from(u8::from(joints.contains(&j)));
+        (0..self.terms.weights.len()).map(of).collect()
     }
 }
 
@@ -192,11 +197,8 @@ impl Compared {
             let [value, se] = gain.joints[*j];
             value * by > NUMBERS.screen * se && a[*j] * by < b[*j] * (by - LIMITS.same)
         };
-        let better: Vec<usize> = everyone
-            .iter()
-            .copied()
-            .filter(|j| changed(j, 1.0))
-            .collect();
+        let mut better = everyone.clone();
+        better.retain(|j| changed(j, 1.0));
         let only = before.only(&better);
         let errors = (&before.left_out[..], &after.left_out[..]);
         let parts = agreement_on_share(errors, &only, &problem.blocks, &NUMBERS);

@@ -44,17 +44,15 @@ pub(super) fn undecided(problem: &Problem, declared: &Trial) -> Vec<Undecided> {
             Cause::Other
         }
     };
-    let missed = moving
-        .iter()
-        .copied()
-        .filter(|j| errors[*j] > LIMITS.unexplained && problem.sample.travel(*j) > LIMITS.still);
-    missed
-        .map(|joint| Undecided {
-            joint,
-            error: errors[joint],
-            cause: cause(joint),
-        })
-        .collect()
+    let missed =
+        |j: &usize| errors[*j] > LIMITS.unexplained && problem.sample.travel(*j) > LIMITS.still;
+    let undecided = |joint: usize| Undecided {
+        joint,
+        error: errors[joint],
+        cause: cause(joint),
+    };
+    let missed = moving.iter().copied().filter(missed);
+    missed.map(undecided).collect()
 }
 
 /// Another joint whose speed is that of this one times a factor.
@@ -77,12 +75,9 @@ fn friction(problem: &Problem, trial: &Trial, j: usize) -> f64 {
     let sums = &trial.total[j];
     let column = sums.nrows() - 1 - own.len();
     let terms = || (0..own.len()).filter(|i| own[*i] != Own::Offset);
-    let product = |a: usize, b: usize| {
-        trial.theta[first + a] * trial.theta[first + b] * sums[(column + a, column + b)]
-    };
-    let square: f64 = terms()
-        .flat_map(|a| terms().map(move |b| (a, b)))
-        .map(|(a, b)| product(a, b))
-        .sum();
+    let pairs = terms().flat_map(|a| terms().map(move |b| (a, b)));
+    let product =
+        |(a, b)| trial.theta[first + a] * trial.theta[first + b] * sums[(column + a, column + b)];
+    let square: f64 = pairs.map(product).sum();
     (square.max(0.0) * trial.terms.weights[j]).sqrt()
 }

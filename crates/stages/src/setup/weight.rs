@@ -101,7 +101,7 @@ pub(super) fn weights(problem: &Problem) -> Vec<Weight> {
     let of = |joint: usize| {
         let sums = &total[joint];
         let by_masses = sums[(0, 0)] + sums[(1, 1)] + 2.0 * sums[(0, 1)];
-        let holds = sums[(0, 0)] > LIMITS.same * by_masses && problem.moving()[joint];
+        let holds = sums[(0, 0)] > LIMITS.same * by_masses && problem.moving[joint];
         holds.then(|| Weight {
             joint,
             weight: gain(joint * COLUMNS),

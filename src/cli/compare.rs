@@ -1,13 +1,18 @@
 //! `cft-ident compare`: two models of one robot beside each other, and on the same logs; or two runs.
 
-mod documents;
-
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
-use cft_ident_logs::log::{LogSpec, escape};
+use serde_json::Value;
+
+use super::{
+    CliError, Context, Outcome, arguments, file_name, files, logs_of, names_of, outputs, paths_of,
+    pictures,
+};
+use cft_ident_files::config::{self, Wanted};
+use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
+use cft_ident_stages::compare::runs;
 use cft_ident_stages::identify;
 use cft_ident_stages::replay::ReplayedPair;
 
@@ -44,15 +49,13 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let logs = args.logs.iter().map(|l| l.path.as_path());
-    let inputs: Vec<&Path> = logs.chain([args.a.as_path(), args.b.as_path()]).collect();
+    let both: [&Path; 2] = [&args.a, &args.b];
+    let drawn = args.report.is_some() || !args.plot.is_empty();
     let outputs = outputs::listed(None, &args.plot, args.report.as_deref());
-    context.check_outputs(&inputs, &outputs)?;
-    let is_document = |path: &&PathBuf| path.extension().is_some_and(|end| end == "json");
-    let both = [&args.a, &args.b];
-    let documents: Vec<&&PathBuf> = both.iter().filter(|path| is_document(path)).collect();
+    context.check_outputs(paths_of(&args.logs).chain(both), outputs)?;
+    let is_document = |path: &&Path| path.extension().is_some_and(|end| end == "json");
+    let documents: Vec<&Path> = both.into_iter().filter(is_document).collect();
     match documents[..] {
         [] => {}
         [one] => {
@@ -63,20 +66,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             return Err(CliError::usage(what)
                 .hint("give two model files (.toml), or two documents that --json wrote (.json)"));
         }
-        _ if !args.logs.is_empty() || !outputs.is_empty() => {
+        _ if !args.logs.is_empty() || drawn => {
             return Err(CliError::usage(
                 "documents are compared without logs, --plot and --report",
             )
             .hint("give the model files (.toml) to compare models on logs"));
         }
-        _ => return documents::run([&args.a, &args.b], context),
+        _ => return of_runs(both, context),
     }
-    let (a, b) = (
-        files::model(&args.a, context)?,
-        files::model(&args.b, context)?,
-    );
+    let a = files::model(&args.a, context)?;
+    let b = files::model(&args.b, context)?;
     let models = [a.value, b.value];
-    let of = identify::compare(models, &logs_of(&args.logs), context.control())?;
+    let of = identify::compare(models, &logs_of(&args.logs), &context.control)?;
     if of.curves.is_empty() && !args.plot.is_empty() {
         return Err(
             CliError::input("neither model has a friction law: there is nothing to draw")
@@ -91,14 +92,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let names = names_of(&args.logs);
     let shown: Vec<String> = names.iter().map(|name| escape(name)).collect();
     let mut report = stages::compare::compare(&of, &shown.join(", "));
-    let drawn = args.report.is_some() || !args.plot.is_empty();
     let in_memory = of.tried.as_ref().filter(|_| drawn).map(|t| &t.in_memory);
     let replay = pictures::replay(&of.machine, in_memory, &names)?;
     let replayed = replay.map(|replay| ReplayedPair::new(&replay, &of));
     let replayed = replayed.transpose().map_err(CliError::input)?;
     if args.report.is_some() {
         let quality = pictures::inspected(&args.logs, &of.machine, context)?;
-        let (mut page, command) = (report.page(), context.command());
+        let (mut page, command) = (report.page(), &context.command);
         let replayed = replayed.as_ref();
         stages::compare::pictures(&mut page, &of, &read, replayed, &quality, command);
     }
@@ -110,9 +110,28 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let figure = stages::compare::figure(&of, replayed.as_ref());
         context.write_picture(path, &figure.svg())?;
     }
-    Ok(Outcome {
-        text: report.text_for(context.detail()),
-        document,
-        missed: Vec::new(),
-    })
+    Ok(Outcome::new(report.text_for(context.detail), document))
+}
+
+/// Lists what differs between two documents.
+fn of_runs([a, b]: [&Path; 2], context: &Context) -> Result<Outcome, CliError> {
+    let (a, b) = (read(a)?, read(b)?);
+    let names = [&a, &b].map(|(name, ..)| name.clone());
+    let found = runs((&names[0], &a.1), (&names[1], &b.1)).map_err(CliError::input)?;
+    let report = stages::diff::diff(&found, &names);
+    Ok(Outcome::new(
+        report.text_for(context.detail),
+        Document::new("diff", &[a.2, b.2], &[], &found)?,
+    ))
+}
+
+fn read(path: &Path) -> Result<(String, Value, Provenance), CliError> {
+    let name = escape(&path.to_string_lossy());
+    let text = config::text_of_kind(path, Wanted::Own)?;
+    let value = serde_json::from_str(&text).map_err(|error| {
+        CliError::input(format!("{name}:{}: no JSON: {error}", error.line()))
+            .hint("give documents that a command wrote with --json FILE")
+    })?;
+    let provenance = Provenance::of_text(&file_name(path), &text);
+    Ok((name, value, provenance))
 }
