@@ -59,12 +59,9 @@ impl From<&str> for ErrorText {
 impl fmt::Display for ErrorText {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.what)?;
-        self.places
-            .iter()
-            .try_for_each(|place| write!(f, " ({place})"))?;
-        self.remedies
-            .iter()
-            .try_for_each(|remedy| write!(f, "; {remedy}"))
+        let (mut places, mut remedies) = (self.places.iter(), self.remedies.iter());
+        places.try_for_each(|place| write!(f, " ({place})"))?;
+        remedies.try_for_each(|remedy| write!(f, "; {remedy}"))
     }
 }
 

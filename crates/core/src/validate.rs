@@ -119,33 +119,23 @@ pub struct Reconstructed<'a> {
 pub type HalfWidths<'a> = &'a (dyn Fn([&[f64]; 3], &[f64], &mut [f64]) + Sync);
 
 /// Where the thinning of a log's rows stands.
-struct Taken<'a> {
-    settings: &'a FilterSettings,
+#[derive(Default)]
+struct Taken {
     stretch: Option<usize>,
     count: usize,
     began: f64,
     every: usize,
 }
 
-impl<'a> Taken<'a> {
-    fn new(settings: &'a FilterSettings) -> Self {
-        Taken {
-            settings,
-            stretch: None,
-            count: 0,
-            began: 0.0,
-            every: 1,
-        }
-    }
-
+impl Taken {
     /// Whether the next row, at `t` of `stretch`, is kept; and whether a stretch begins with it.
-    fn keeps(&mut self, stretch: usize, t: f64) -> (bool, bool) {
+    fn keeps(&mut self, settings: &FilterSettings, stretch: usize, t: f64) -> (bool, bool) {
         let begins = self.stretch != Some(stretch);
         if begins {
             (self.stretch, self.count, self.began) = (Some(stretch), 0, t);
         } else if self.count == 1 {
             // rows come at full rate: two of them give the step
-            self.every = self.settings.decimation_at(t - self.began);
+            self.every = settings.decimation_at(t - self.began);
         }
         let keeps = self.count.is_multiple_of(self.every) || begins;
         self.count += 1;
@@ -231,7 +221,7 @@ impl<'a> Reconstruction<'a> {
         full.rest_speed.clone_from(&self.rest_speed);
         // every raw sample counts, so rows are thinned here and not by the pipeline
         full.decimation = Some(1);
-        let mut taken = Taken::new(settings);
+        let mut taken = Taken::default();
         let summary = motion::run(
             source,
             n,
@@ -253,7 +243,8 @@ impl<'a> Reconstruction<'a> {
             },
             &mut |r| {
                 let channels = [r.raw, r.filtered];
-                self.take(&mut taken, (r.segment, r.t), [r.q, r.v], channels, row);
+                let (taken, at) = ((settings, &mut taken), (r.segment, r.t));
+                self.take(taken, at, [r.q, r.v], channels, row);
             },
         )?;
         Ok(Summary {
@@ -311,7 +302,7 @@ impl<'a> Reconstruction<'a> {
         let channels = torques.chain(&moving).chain(&widths).chain(&by_weight);
         let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
-        let mut taken = Taken::new(settings);
+        let mut taken = Taken::default();
         let (mut raw, mut filtered) = (vec![0.0; 6 * n], vec![0.0; 6 * n]);
         let count = parallel.rows(stretch.len());
         let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
@@ -322,7 +313,8 @@ impl<'a> Reconstruction<'a> {
                 filtered[c] = rows[c][i];
             }
             let at = (segment, stretch.t[k]);
-            self.take(&mut taken, at, [&q, &v], [&raw, &filtered], row);
+            let taken = (settings, &mut taken);
+            self.take(taken, at, [&q, &v], [&raw, &filtered], row);
         }
         Ok(())
     }
@@ -345,14 +337,14 @@ impl<'a> Reconstruction<'a> {
     /// Takes one row at full rate.
     fn take(
         &mut self,
-        taken: &mut Taken,
+        (settings, taken): (&FilterSettings, &mut Taken),
         (segment, t): (usize, f64),
         [q, v]: [&[f64]; 2],
         [raw, filtered]: [&[f64]; 2],
         row: &mut dyn FnMut(&Reconstructed),
     ) {
         let n = self.sums.len();
-        let (keep, begins) = taken.keeps(segment, t);
+        let (keep, begins) = taken.keeps(settings, segment, t);
         if begins {
             self.traces.breaks.push(self.traces.t.len());
         }

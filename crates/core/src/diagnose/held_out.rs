@@ -25,13 +25,7 @@ pub fn split_errors(
     (case, split, together): (&Case, &DataSplit, usize),
     model: &AugmentedModel,
 ) -> Result<SplitErrors, DiagnoseError> {
-    let of = |role| HeldOutRows {
-        case,
-        split,
-        role,
-        moving: false,
-        together,
-    };
+    let of = |role| HeldOutRows::of((case, split, together), role);
     let train = of(LogRole::Train).errors(model)?;
     Ok(SplitErrors {
         train: train.ok_or_else(|| DiagnoseError::TooFewRows {
@@ -64,7 +58,17 @@ impl EffectChange {
     }
 }
 
-impl HeldOutRows<'_> {
+impl<'a> HeldOutRows<'a> {
+    pub fn of((case, split, together): (&'a Case, &'a DataSplit, usize), role: LogRole) -> Self {
+        HeldOutRows {
+            case,
+            split,
+            role,
+            moving: false,
+            together,
+        }
+    }
+
     fn pieces(&self, model: &AugmentedModel) -> Result<Pieces, MotionError> {
         errors::pieces(model, self.case, self.split, (self.role, self.moving))
     }

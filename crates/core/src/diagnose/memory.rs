@@ -14,10 +14,8 @@ pub fn memory_s(residual: &[Vec<Vec<f64>>], logs: &[LogRows], split: &DataSplit)
         let step = moving.clone().map(|log| log.step_s).fold(0.0, f64::max);
         let pieces = moving.flat_map(|log| log.pieces.iter().map(|(s, rows)| (*s, rows.clone())));
         let pieces = pieces.filter(|(s, _)| !split.is_stationary(*s, j));
-        let own: Vec<Vec<f64>> = pieces
-            .map(|(s, rows)| centred(&residual[s][j][rows]))
-            .collect();
-        step * lag(&own) as f64
+        let own = pieces.map(|(s, rows)| centred(&residual[s][j][rows]));
+        step * lag(&own.collect::<Vec<_>>()) as f64
     };
     let mut times: Vec<f64> = (0..joints).map(of_joint).filter(|t| *t > 0.0).collect();
     // on a joint that lacks an effect the residual remembers as long as the motion does

@@ -218,10 +218,8 @@ impl Diagnosis {
 
     /// Joints whose residual still holds structure.
     pub fn structured_joints(&self) -> impl Iterator<Item = usize> {
-        let joints = self.left.unexplained.iter().enumerate();
-        joints
-            .filter(|(_, left)| left.is_structure())
-            .map(|(j, _)| j)
+        let left = &self.left.unexplained;
+        (0..left.len()).filter(|j| left[*j].is_structure())
     }
 
     /// Effects of the written model, with what is known of them.

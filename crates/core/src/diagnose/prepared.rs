@@ -171,13 +171,7 @@ impl<'a> PreparedCase<'a> {
     }
 
     pub fn held_out(&self, role: LogRole) -> HeldOutRows<'_> {
-        HeldOutRows {
-            case: self.case,
-            split: self.data.split,
-            role,
-            moving: false,
-            together: self.together,
-        }
+        HeldOutRows::of((self.case, self.data.split, self.together), role)
     }
 
     pub fn split_errors(&self, model: &AugmentedModel) -> Result<SplitErrors, DiagnoseError> {

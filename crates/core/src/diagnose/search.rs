@@ -99,9 +99,8 @@ impl<'a> Field<'a> {
     /// Declared terms and those of candidates that were chosen, one behind the other.
     pub fn terms(&self, chosen: &[Chosen]) -> Terms {
         let own = chosen.iter().flat_map(|c| self.terms_of(c.candidate));
-        self.summed
-            .declared
-            .with(&own.cloned().collect::<Vec<Term>>())
+        let own: Vec<Term> = own.cloned().collect();
+        self.summed.declared.with(&own)
     }
 
     /// Fits of terms with each block left out.

@@ -48,8 +48,7 @@ fn places(field: &Field, effects: &[Chosen]) -> Vec<Vec<usize>> {
     effects.iter().map(place).collect()
 }
 
-/// Asks the parts of the data for every effect that was chosen; one that gains nothing beside all the others is not
-/// confirmed. What sums with `noisier` positions change in an amplitude, the positions' own noise has done too.
+/// Asks the parts of the data for every effect that was chosen; what sums with `noisier` positions change is in doubt.
 pub fn verified(field: &Field, chosen: &[Chosen], noisier: Option<&BlockSums>) -> Vec<Verified> {
     let (prepared, numbers) = (field.prepared, field.numbers());
     let terms = field.terms(chosen);
@@ -66,7 +65,7 @@ pub fn verified(field: &Field, chosen: &[Chosen], noisier: Option<&BlockSums>) -
             let measured = effect.law.entry.measurable;
             agreement.doubt(if measured { part } else { part.max(0.0) }, numbers);
         }
-        // beside all the others, those that came after it too
+        // one that gains nothing beside all the others, those after it too, is not confirmed
         let gain = beside_the_others(field, chosen, at);
         let joint = own_joint(effect.place);
         if !gain.is_ok_and(|(gain, _)| gain.is_beyond(numbers.screen, joint)) {

@@ -31,17 +31,17 @@ pub fn floor(
     floor_of(residuals, stretches, &case.filters, band, &stationary)
 }
 
-/// The same with each part by itself; `averaged` where each torque is the mean of two rows.
+/// The same with each part by itself; `band`: the cut-off \[Hz\], and whether each torque is the mean of two rows.
 fn floor_of(
     residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
     filters: &ParallelFilters,
-    (cutoff_hz, averaged): (f64, bool),
+    band: (f64, bool),
     stationary: &[Vec<bool>],
 ) -> Result<Vec<f64>, MotionError> {
     // logs of one rate together
     let bands = filters.designs().iter();
-    let bands = bands.map(|(dt, filter)| Bands::design(filter, cutoff_hz, 1.0 / dt, averaged));
+    let bands = bands.map(|(dt, filter)| Bands::design(filter, 1.0 / dt, band));
     let bands = bands.collect::<Result<Vec<_>, _>>()?;
     let rate_of: Vec<usize> = stretches.iter().map(|s| filters.rate_of(s)).collect();
     let periods: Vec<Option<usize>> = stretches.iter().map(|s| period(&s.q)).collect();
@@ -97,12 +97,8 @@ struct Bands<'a> {
 }
 
 impl<'a> Bands<'a> {
-    fn design(
-        parallel: &'a Parallel,
-        cutoff_hz: f64,
-        rate: f64,
-        averaged: bool,
-    ) -> Result<Self, MotionError> {
+    fn design(parallel: &'a Parallel, rate: f64, band: (f64, bool)) -> Result<Self, MotionError> {
+        let (cutoff_hz, averaged) = band;
         let top = (0.45 * rate / (BORDERS[2] * cutoff_hz)).min(1.0);
         let low_pass = |times: f64| -> Result<ZeroPhase, MotionError> {
             let cutoff = times * top * cutoff_hz;
