@@ -43,22 +43,15 @@ pub fn replacement(
             ArmJoint::Own(joint) => {
                 let called = names.get(&joint.name).map_or(&joint.name, |name| name);
                 let at = moved_by(&joint.name).or_else(|| moved_by(called));
-                at.ok_or_else(|| {
-                    other(
-                        format!("has no joint `{}`; it has {}", called, joints.join(", ")),
-                        "give the URDF of this robot, or name its joints by `name` in [log.joint] of the robot file",
-                    )
-                })?
+                let problem = || format!("has no joint `{called}`; it has {}", joints.join(", "));
+                let remedy = "give the URDF of this robot, or name its joints by `name` in [log.joint] of the robot file";
+                at.ok_or_else(|| other(problem(), remedy))?
             }
-            _ => links
-                .iter()
-                .position(|l| l.name == link.name)
-                .ok_or_else(|| {
-                    other(
-                        format!("has no link `{}`, which follows a joint", link.name),
-                        "give the URDF of this robot",
-                    )
-                })?,
+            _ => {
+                let at = links.iter().position(|l| l.name == link.name);
+                let problem = || format!("has no link `{}`, which follows a joint", link.name);
+                at.ok_or_else(|| other(problem(), "give the URDF of this robot"))?
+            }
         };
         let parent = link.parent.map(|parent| found[parent]);
         if let Some(differs) = difference(link, &links[at], parent) {

@@ -102,8 +102,8 @@ pub(super) fn smooth(signal: &[f64], variances: &Variances) -> (Vec<f64>, Vec<f6
     let (mut level, mut variance) = (vec![0.0; n], vec![0.0; n]);
     for k in 0..n {
         // the estimate at k is in the forward filter alone
-        let [x, p] = forward[k].after;
-        let [y, s] = backward[n - 1 - k].before;
+        let [_, [x, p]] = forward[k];
+        let [[y, s], _] = backward[n - 1 - k];
         let (a, b) = (1.0 / p, 1.0 / s);
         variance[k] = 1.0 / (a + b);
         level[k] = match (a > 0.0, b > 0.0) {
@@ -115,13 +115,8 @@ pub(super) fn smooth(signal: &[f64], variances: &Variances) -> (Vec<f64>, Vec<f6
     (level, variance)
 }
 
-/// Level and its variance, without and with the estimate at this place; infinite variance where nothing is known.
-struct Filtered {
-    before: [f64; 2],
-    after: [f64; 2],
-}
-
-fn filtered(signal: &[f64], estimate: &[f64], walk: &[f64]) -> Vec<Filtered> {
+/// Level and its variance, without and with each estimate; infinite variance where nothing is known.
+fn filtered(signal: &[f64], estimate: &[f64], walk: &[f64]) -> Vec<[[f64; 2]; 2]> {
     let mut state = [0.0, f64::INFINITY];
     let mut out = Vec::with_capacity(signal.len());
     for ((y, r), q) in signal.iter().zip(estimate).zip(walk) {
@@ -135,10 +130,7 @@ fn filtered(signal: &[f64], estimate: &[f64], walk: &[f64]) -> Vec<Filtered> {
                 [level, before[1] * r / f]
             }
         };
-        out.push(Filtered {
-            before,
-            after: state,
-        });
+        out.push([before, state]);
     }
     out
 }

@@ -18,20 +18,14 @@ const MAX_READINGS: usize = 4;
 /// What the first look at a log found.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gate {
-    /// The first fault for which a fit refuses the log.
-    refusal: Option<LogFault>,
-    /// Faults whose rows are left out or mended.
+    /// What the last reading found.
+    found: Findings,
+    /// What every reading found that a fit leaves out or mends, and torques that are exactly 0 in motion.
     marked: Vec<LogFault>,
-    /// How many rows each cause costs, the most first.
-    costs: Vec<RowCost>,
-    /// First and last time of the rows to leave out [s], in order and apart.
-    cuts: Vec<[f64; 2]>,
-    /// Torques that are exactly 0 in motion, by their places: from, to [s].
-    off: Vec<(usize, [f64; 2])>,
-    /// What is reported of them, and whether the robot moves as without its motors there, once known.
-    faults_of_off: Vec<LogFault>,
+    /// Whether the robot moves as without its motors where they are, once known.
     freely: Option<bool>,
-    dt: f64,
+    /// Positions among the channels.
+    positions: usize,
     /// The instant from which the log's times are counted.
     origin: Instant,
     /// What is mended as the log is read.
@@ -110,27 +104,24 @@ impl Gate {
                 None => found.costs.push(cost),
             }
         }
-        let of_off = found.of(Severity::Info);
-        let of_off = of_off.filter(|fault| fault.kind == FaultKind::MotorOff);
-        let faults_of_off = of_off.cloned().collect();
         let cut = found.of(Severity::Warning).filter(|fault| fault.cut);
         marked.extend(cut.cloned());
-        let refusal = found.of(Severity::Error).next().cloned();
-        let off = found.off.iter();
+        let off = found.of(Severity::Info);
+        let off = off.filter(|fault| fault.kind == FaultKind::MotorOff);
+        marked.extend(off.cloned());
         Ok(Some(Self {
-            refusal,
+            found,
             marked,
-            dt: found.rate_hz.map_or(0.0, |rate| 1.0 / rate),
-            off: off
-                .map(|(place, span)| (place.saturating_sub(positions), *span))
-                .collect(),
-            faults_of_off,
-            costs: found.costs,
-            cuts: found.cuts,
             freely: None,
+            positions,
             origin,
             mending,
         }))
+    }
+
+    /// Median step of the log [s].
+    fn dt(&self) -> f64 {
+        self.found.rate_hz.map_or(0.0, |rate| 1.0 / rate)
     }
 
     /// The instant from which the log's times are counted.
@@ -140,7 +131,7 @@ impl Gate {
 
     /// The fault for which a fit refuses the log.
     pub fn refusal(&self) -> Option<&LogFault> {
-        self.refusal.as_ref()
+        self.found.of(Severity::Error).next()
     }
 
     /// What a reader of the log is to mend.
@@ -151,7 +142,9 @@ impl Gate {
     /// Stretches in which a torque is exactly 0 while its joint moves, by the torque's place: from,
     /// to [s].
     pub fn off(&self) -> Vec<(usize, [f64; 2])> {
-        self.off.clone()
+        let place = |place: usize| place.saturating_sub(self.positions);
+        let off = self.found.off.iter();
+        off.map(|(at, span)| (place(*at), *span)).collect()
     }
 
     /// Says whether the robot moves in them as it does without its motors: if not, they are left out.
@@ -160,41 +153,43 @@ impl Gate {
         if freely {
             return;
         }
-        let spans = joined(self.off.iter().map(|(_, span)| *span).collect());
-        let rows = |[from, to]: &[f64; 2]| ((to - from) / self.dt).round() as u64 + 1;
-        self.costs.push(RowCost {
+        let dt = self.dt();
+        let found = &mut self.found;
+        let spans = joined(found.off.iter().map(|(_, span)| *span).collect());
+        let rows = |[from, to]: &[f64; 2]| ((to - from) / dt).round() as u64 + 1;
+        found.costs.push(RowCost {
             kind: FaultKind::MotorOff,
             rows: spans.iter().map(rows).sum(),
             fate: RowFate::LeftOut,
         });
-        RowCost::sort(&mut self.costs);
-        self.cuts = joined(self.cuts.drain(..).chain(spans).collect());
+        RowCost::sort(&mut found.costs);
+        found.cuts = joined(found.cuts.drain(..).chain(spans).collect());
     }
 
     /// Takes rows out of the log so that a step is left that parts it: one longer than `longest` has it for the
     /// median step \[s\].
     pub fn cutter(&self, longest: &dyn Fn(f64) -> f64) -> Cutter {
-        let gap = CUT_GAP_FACTOR * longest(self.dt);
-        let widened = self.cuts.iter().map(|[from, to]| {
-            let more = (0.5 * (gap - (to - from))).max(0.6 * self.dt);
+        let dt = self.dt();
+        let gap = CUT_GAP_FACTOR * longest(dt);
+        let widened = self.found.cuts.iter().map(|[from, to]| {
+            let more = (0.5 * (gap - (to - from))).max(0.6 * dt);
             [from - more, to + more]
         });
         Cutter {
             spans: widened.collect(),
-            next: 0,
-            removed: 0,
+            ..Cutter::default()
         }
     }
 
     /// How many rows each cause costs, the most first.
     pub fn costs(&self) -> &[RowCost] {
-        &self.costs
+        &self.found.costs
     }
 
     /// What is left out or mended and where, one sentence for each kind of fault.
     pub fn warnings(&self) -> Vec<String> {
         let mut kinds: Vec<(FaultKind, u64)> = Vec::new();
-        for fault in self.marked.iter().chain(&self.faults_of_off) {
+        for fault in &self.marked {
             match kinds.iter_mut().find(|(kind, _)| *kind == fault.kind) {
                 Some((_, rows)) => *rows += fault.rows,
                 None => kinds.push((fault.kind, fault.rows)),
@@ -208,8 +203,7 @@ impl Gate {
     /// All that is marked as of one kind, channel by channel.
     fn sentence(&self, kind: FaultKind) -> String {
         let mut channels: Vec<(Option<&str>, u64, Vec<String>)> = Vec::new();
-        let all = self.marked.iter().chain(&self.faults_of_off);
-        for fault in all.filter(|fault| fault.kind == kind) {
+        for fault in self.marked.iter().filter(|fault| fault.kind == kind) {
             let name = fault.channel.as_deref();
             match channels.iter_mut().find(|(known, ..)| *known == name) {
                 Some((_, rows, spans)) => {
@@ -375,11 +369,9 @@ mod tests {
 
     #[test]
     fn what_is_cut_out_leaves_a_step_that_is_a_gap_across_blocks_too() {
-        let gate = Gate {
-            cuts: vec![[0.5, 0.5], [1.0, 1.4], [9.0, 9.0]],
-            dt: 0.1,
-            ..Gate::default()
-        };
+        let mut gate = Gate::default();
+        gate.found.cuts = vec![[0.5, 0.5], [1.0, 1.4], [9.0, 9.0]];
+        gate.found.rate_hz = Some(10.0);
         let mut cutter = gate.cutter(&|dt| 2.5 * dt);
         let mut kept = Vec::new();
         for (from, to) in [(0, 11), (11, 14), (14, 30)] {

@@ -10,7 +10,7 @@ use crate::log::{DelayEstimate, DelayEstimator};
 /// Stretches of the log that are looked at.
 const MAX_STRETCHES: usize = 8;
 /// A delay of fewer rows is none: the time of a torque is not known better than its row.
-const MIN_DELAY_ROWS: f64 = 2.0;
+pub(super) const MIN_DELAY_ROWS: f64 = 2.0;
 /// A shorter one is not reported without a model: what other joints do to a joint looks like one [s].
 const MIN_DELAY_S: f64 = 0.01;
 /// Deviations from 0 at which a delay is believed.

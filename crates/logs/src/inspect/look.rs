@@ -22,7 +22,7 @@ pub struct ChannelColumn {
 }
 
 /// Which columns of a table are what.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColumnPlan {
     /// Place of the time, and seconds per unit of it; absent where rows carry their own.
     pub time: Option<(usize, f64)>,

@@ -6,7 +6,7 @@
 
 use super::draft::seconds;
 use super::fault::{FaultKind, LogFault, Severity};
-use super::lag;
+use super::lag::{MIN_DELAY_ROWS, REMEDY};
 use crate::log::escape;
 
 /// A model that is off by less, as a share of the torque's power, is not doubted.
@@ -15,9 +15,7 @@ const MIN_MODEL_ERROR_SHARE: f64 = 0.04;
 const MAX_SHARE_LEFT: f64 = 0.25;
 /// ... and explain more than half of the torque's power.
 const MIN_EXPLAINED_SHARE: f64 = 0.5;
-/// A delay of fewer rows of the log is none...
-const MIN_DELAY_ROWS: f64 = 2.0;
-/// ... nor is one that explains a smaller share of what the model leaves.
+/// A delay that explains a smaller share of what the model leaves is none.
 const MIN_SHARE_BY_DELAY: f64 = 0.5;
 
 /// What may be wrong with the order and signs of joints.
@@ -165,7 +163,7 @@ impl OrderComparison {
             seconds(delay.abs())
         );
         let kind = FaultKind::Delay;
-        let fault = LogFault::whole(Severity::Warning, kind, duration_s, effect, lag::REMEDY);
+        let fault = LogFault::whole(Severity::Warning, kind, duration_s, effect, REMEDY);
         Some(LogFault { rows, ..fault })
     }
 

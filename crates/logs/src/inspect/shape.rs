@@ -4,6 +4,7 @@
 use super::detectors::clock::ClockFacts;
 use super::detectors::flat::FlatRun;
 use super::detectors::grain;
+use super::detectors::repeats::{ABRUPT_BENDS, MIN_STEPS_IN_MOTION};
 use super::detectors::spike::{SPIKE, SPIKE_SHARE};
 use super::draft::FaultList;
 use super::fault::Severity::{Error, Info, Warning};
@@ -15,12 +16,8 @@ use crate::log::Bridge;
 
 /// Rows of one value from which a channel may be stuck.
 const STUCK_ROWS: u64 = 10;
-/// An edge is abrupt where its step is so many times the usual bends of the channel...
-const ABRUPT_BENDS: f64 = 6.0;
-/// ... and so many times its smallest usual step.
+/// An edge is abrupt where its step is so many times the smallest usual one of the channel, too.
 const ABRUPT_STEPS: f64 = 4.0;
-/// Smallest usual steps that a joint goes from row to row where it moves.
-const MIN_STEPS_IN_MOTION: f64 = 3.0;
 /// Levels over its range from which a channel's grain is not worth a word.
 const FINE_LEVELS: f64 = 4096.0;
 /// Acceleration noise by the grain of a position, over the acceleration, that spoils a fit.
@@ -88,7 +85,6 @@ fn heat(track: &Track, draft: &mut FaultList) {
 }
 
 fn constant(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
-    let value = track.low;
     let joint_moves = track.position.is_some_and(|index| {
         let position = &judge.tracks[index];
         let step = position.flat.steps.quantile_not_zero(0.05);
@@ -96,37 +92,30 @@ fn constant(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     });
     let mut positions = judge.positions.iter();
     let all_rest = positions.all(|index| judge.tracks[*index].travel() == 0.0);
-    match track.channel.role {
-        ChannelRole::Torque | ChannelRole::Velocity if joint_moves => {
-            let severity = match track.channel.role {
-                ChannelRole::Torque => Error,
-                _ => Warning,
-            };
-            let effect = format!(
-                "{value} in all {} rows although the joint moves: nothing can be fitted to it",
-                track.rows
-            );
-            let remedy = "check the sensor and the recorder, or name the right column in the [log] section of the robot file";
-            draft.whole(severity, FaultKind::StuckChannel, track, effect, remedy);
-        }
-        ChannelRole::Position if all_rest => {
-            let effect = format!(
-                "{value} in all {} rows, and no other joint moves: a log at rest determines nothing",
-                track.rows
-            );
-            let remedy = "check the encoder and the recorder; log a motion";
-            draft.whole(Warning, FaultKind::StuckChannel, track, effect, remedy);
-        }
-        ChannelRole::Position => {
-            let effect = format!(
-                "{value} in all {} rows: either the joint is held, or its channel is dead",
-                track.rows
-            );
-            let remedy = "nothing, if this joint is not to move in this log";
-            draft.whole(Info, FaultKind::StuckChannel, track, effect, remedy);
-        }
-        _ => {}
-    }
+    let (severity, then, remedy) = match track.channel.role {
+        role @ (ChannelRole::Torque | ChannelRole::Velocity) if joint_moves => (
+            if role == ChannelRole::Torque {
+                Error
+            } else {
+                Warning
+            },
+            " although the joint moves: nothing can be fitted to it",
+            "check the sensor and the recorder, or name the right column in the [log] section of the robot file",
+        ),
+        ChannelRole::Position if all_rest => (
+            Warning,
+            ", and no other joint moves: a log at rest determines nothing",
+            "check the encoder and the recorder; log a motion",
+        ),
+        ChannelRole::Position => (
+            Info,
+            ": either the joint is held, or its channel is dead",
+            "nothing, if this joint is not to move in this log",
+        ),
+        _ => return,
+    };
+    let effect = format!("{} in all {} rows{then}", track.low, track.rows);
+    draft.whole(severity, FaultKind::StuckChannel, track, effect, remedy);
 }
 
 /// What is flat in a channel.
@@ -375,36 +364,37 @@ fn coarse(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultL
     }
     let remedy =
         "use a finer sensor or more digits; lower the cut-off in [filter] of the robot file";
-    match (track.channel.role, &track.excitation) {
+    let spoils = match (track.channel.role, &track.excitation) {
         (ChannelRole::Position, Some(excitation)) => {
             // White noise of step^2/12, differentiated twice, up to the cut-off.
             let band = judge.band_hz;
             let w = std::f64::consts::TAU * band;
             let noise = step * (clock.dt * band / 30.0).sqrt() * w * w;
             let share = noise / excitation.rms(0);
-            if share > COARSE_ACCELERATION_SHARE {
-                let effect = format!(
+            (share > COARSE_ACCELERATION_SHARE).then(|| {
+                format!(
                     "steps of {step:.3e}: below {band} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",
                     100.0 * share
-                );
-                draft.whole(Warning, FaultKind::Quantisation, track, effect, remedy);
-                return;
-            }
+                )
+            })
         }
         (ChannelRole::Torque, _) if step > COARSE_TORQUE_SHARE * track.deviation() => {
-            let effect = format!(
+            Some(format!(
                 "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters cannot be identified from it",
                 100.0 * step / track.deviation()
-            );
-            draft.whole(Warning, FaultKind::Quantisation, track, effect, remedy);
-            return;
+            ))
         }
-        _ => {}
-    }
-    if levels < FINE_LEVELS {
-        let effect = format!(
-            "steps of {step:.3e}, {levels:.0} levels over the range: a fit averages them out"
-        );
-        draft.whole(Info, FaultKind::Quantisation, track, effect, remedy);
-    }
+        _ => None,
+    };
+    let (severity, effect) = match spoils {
+        Some(effect) => (Warning, effect),
+        None if levels >= FINE_LEVELS => return,
+        None => (
+            Info,
+            format!(
+                "steps of {step:.3e}, {levels:.0} levels over the range: a fit averages them out"
+            ),
+        ),
+    };
+    draft.whole(severity, FaultKind::Quantisation, track, effect, remedy);
 }

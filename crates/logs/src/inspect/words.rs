@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 /// What a channel holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChannelRole {
     /// Position of a joint or motor.
@@ -23,6 +23,7 @@ pub enum ChannelRole {
     /// What was commanded or wanted.
     Command,
     /// Anything else.
+    #[default]
     Other,
 }
 

@@ -4,7 +4,7 @@ use crate::inspect::words::{is_aside, is_command, joint, role, words};
 use crate::inspect::{ChannelRole, InspectedChannel};
 
 /// A column of a log.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LogColumn {
     /// Its name; `#3` where it has none.
     pub name: String,
@@ -39,15 +39,10 @@ impl LogColumn {
         };
         Self {
             name: name.to_owned(),
-            path: None,
             role,
             commanded: is_command(&spoken),
             joint,
-            unit: None,
-            range: [0.0; 2],
-            whole: false,
-            wrap: None,
-            by_content: false,
+            ..Self::default()
         }
     }
 

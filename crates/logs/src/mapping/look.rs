@@ -85,14 +85,15 @@ pub fn look(
     let mut log = RawReader::open_plain(spec, &section)?;
     let sample = sample(&mut log)?;
     let mut log = RawReader::open_plain(spec, &section)?;
-    let time = match (log.is_recording(), asked.rate_hz) {
-        (true, _) | (_, Some(_)) => None,
-        _ => Some(time_of(&mut log, &sample, &name)?),
+    let messages = log.is_recording();
+    let time = match messages || asked.rate_hz.is_some() {
+        true => None,
+        false => Some(time_of(&mut log, &sample, &name)?),
     };
     let headerless = log.names().first().is_some_and(|name| name == "#1");
     let at = time.as_ref().map(|(at, ..)| *at);
     // the time of a recording is its first column
-    let at = at.or_else(|| log.is_recording().then_some(0));
+    let at = at.or_else(|| messages.then_some(0));
     let numbers: Vec<usize> = (0..log.names().len()).filter(|k| Some(*k) != at).collect();
     let column = |k: &usize| LogColumn {
         unit: log.unit(*k).map(str::to_owned),
@@ -123,9 +124,7 @@ pub fn look(
     let plan = ColumnPlan {
         time: time.as_ref().map(|(at, seconds, _)| (*at, *seconds)),
         channels: channels.collect(),
-        keep: Vec::new(),
-        held: None,
-        band_hz: None,
+        ..ColumnPlan::default()
     };
     let findings = inspect::look(&mut log, &plan, stop)?.ok_or(MappingError::Interrupted)?;
     // by name: a log may have ten thousands of columns
@@ -144,7 +143,6 @@ pub fn look(
         let rate = 1.0 / step;
         Some(log::round_within(rate, rate / times.len() as f64))
     });
-    let messages = log.is_recording();
     let own_rate = messages.then(|| rate_of_positions(&columns, &numbers, &sample));
     let clock = match (time, even_rate_hz) {
         (Some((at, ..)), Some(hz)) => ClockSource::Rate {
@@ -157,7 +155,7 @@ pub fn look(
             guessed,
         },
         (None, _) => match asked.rate_hz {
-            Some(hz) if !log.is_recording() => ClockSource::Rate { hz, coarse: None },
+            Some(hz) if !messages => ClockSource::Rate { hz, coarse: None },
             _ => ClockSource::Messages,
         },
     };

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::mcap::{self, McapLog};
+use super::mcap::{McapLog, plain};
 #[cfg(feature = "parquet")]
 use super::parquet::ParquetLog;
 use super::{AtomicFile, OutputError, text};
@@ -172,7 +172,7 @@ impl LogWriter {
                     Sink::Text(Box::new(buffered))
                 }
                 Kind::Messages => {
-                    let recording = McapLog::new(packed, &columns, notes).map_err(mcap::plain)?;
+                    let recording = McapLog::new(packed, &columns, notes).map_err(plain)?;
                     Sink::Messages(Box::new(recording))
                 }
                 #[cfg(feature = "parquet")]
@@ -209,7 +209,7 @@ impl LogWriter {
                 Sink::Text(text) => text::row(text, self.origin, &self.row),
                 Sink::Messages(recording) => {
                     let written = recording.row(self.origin, &self.row);
-                    written.map_err(mcap::plain)
+                    written.map_err(plain)
                 }
                 #[cfg(feature = "parquet")]
                 Sink::Parquet(file) => file.row(self.origin, &self.row),
@@ -230,7 +230,7 @@ impl LogWriter {
     pub(super) fn finish(self) -> Result<AtomicFile, OutputError> {
         let packed = match self.sink {
             Sink::Text(text) => text.into_inner().map_err(io::IntoInnerError::into_error),
-            Sink::Messages(recording) => recording.finish().map_err(mcap::plain),
+            Sink::Messages(recording) => recording.finish().map_err(plain),
             #[cfg(feature = "parquet")]
             Sink::Parquet(file) => file.finish(),
         };

@@ -53,7 +53,7 @@ pub struct JointMotion {
     pub condition: Option<f64>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Excitation {
     /// Rows between the three positions that a speed and an acceleration are formed from.
     spacing: usize,
@@ -87,17 +87,8 @@ impl Excitation {
             spacing,
             times: vec![0.0; 2 * spacing + 1],
             values: vec![0.0; 2 * spacing + 1],
-            count: 0,
-            speeds: Histogram::default(),
-            accelerations: Histogram::default(),
-            gram: [[0.0; 4]; 4],
-            points: 0,
-            direction: 0.0,
-            reversals: 0,
             limit,
-            fast: 0,
-            too_fast: Episodes::default(),
-            highest: Vec::new(),
+            ..Self::default()
         }
     }
 

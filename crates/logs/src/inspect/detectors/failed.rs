@@ -5,7 +5,7 @@
 const USUAL_STEPS: f64 = 10.0;
 const MAX_ROWS: usize = 65_536;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct FailedReads {
     /// Positions of the last row that was read, and how far they went to it.
     before: Vec<f64>,
@@ -25,9 +25,7 @@ impl FailedReads {
             before: vec![f64::NAN; positions],
             steps: vec![0.0; positions],
             grains: vec![f64::INFINITY; positions],
-            failing: false,
-            times: Vec::new(),
-            value: 0.0,
+            ..Self::default()
         }
     }
 

@@ -15,9 +15,9 @@ const MAX_RUNS: usize = 1 << 18;
 /// Long runs that are kept.
 const LONG_RUNS: usize = 4096;
 /// Usual smallest steps that a joint goes from row to row where it moves.
-const MIN_STEPS_IN_MOTION: f64 = 3.0;
+pub(crate) const MIN_STEPS_IN_MOTION: f64 = 3.0;
 /// An edge is abrupt where its step is so many times the usual bends of the channel.
-const ABRUPT_BENDS: f64 = 6.0;
+pub(crate) const ABRUPT_BENDS: f64 = 6.0;
 
 /// Rows that repeat the positions of the row before them.
 #[derive(Debug, Clone)]
@@ -32,9 +32,8 @@ struct RepeatRun {
 }
 
 /// Watches the positions of all joints together.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Repeats {
-    joints: usize,
     previous: Vec<f64>,
     entry: Vec<f64>,
     /// Times of the run's first, second, last but one and last row; rows of it.
@@ -58,19 +57,10 @@ impl Repeats {
     /// For so many positions, and torques and velocities.
     pub(crate) fn new(joints: usize, others: usize) -> Self {
         Self {
-            joints,
             previous: vec![f64::NAN; joints],
             entry: vec![f64::NAN; joints],
-            times: [f64::NAN; 4],
-            rows: 0,
             others: vec![f64::NAN; others],
-            identical: true,
-            changed: 0,
-            coincidences: 0,
-            runs: Vec::new(),
-            frozen: Vec::new(),
-            seen: 0,
-            same: 0,
+            ..Self::default()
         }
     }
 
@@ -107,7 +97,7 @@ impl Repeats {
 
     pub(crate) fn part(&mut self) {
         if self.rows > MAX_RUN_ROWS {
-            self.end(&vec![f64::NAN; self.joints]);
+            self.end(&vec![f64::NAN; self.previous.len()]);
         }
         self.previous.fill(f64::NAN);
         self.entry.fill(f64::NAN);
@@ -181,7 +171,7 @@ impl Repeats {
 
     /// What was found; `channels` are the joints' own, in the same order.
     pub(crate) fn judge(&self, channels: &[&Flat]) -> RepeatedRows {
-        debug_assert_eq!(channels.len(), self.joints);
+        debug_assert_eq!(channels.len(), self.previous.len());
         let steps = channels.iter().map(|flat| &flat.steps);
         let least: Vec<f64> = steps.map(|steps| steps.quantile_not_zero(0.05)).collect();
         // Whether the robot goes on in the same direction, in steps of so many usual least ones.
