@@ -137,7 +137,6 @@ fn new_text(
 /// The error with which a fit refuses the logs.
 fn refused(robot: &Path, refusals: &[&Finding]) -> CliError {
     let first = refusals.first().map_or("", |f| &f.meaning);
-    let first = first.replace("; ", ", ");
     let text = format!("the torques contradict the robot file: {first}");
     let mut error = CliError::input(text).at(robot.display());
     for finding in refusals {

@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::bench::Bench;
 
 #[test]
-fn a_damaged_recording_is_told_as_damaged_without_a_robot_file_too() {
+fn a_damaged_recording_is_reported_as_damaged_without_a_robot_file_too() {
     let bench = Bench::new();
     let converted = bench.run("convert good.csv good.mcap -r slide.toml");
     assert_eq!(converted.status, Some(0), "{}", converted.stderr);

@@ -258,7 +258,7 @@ fn complaint(line: &str, name: &str, ended: &Ended) -> Option<String> {
         return Some("a control character".to_owned());
     }
     if status >= 2 && !said.contains("error: ") {
-        return Some("no error is told".to_owned());
+        return Some("no error is shown".to_owned());
     }
     let fault = said
         .lines()
@@ -272,7 +272,7 @@ fn complaint(line: &str, name: &str, ended: &Ended) -> Option<String> {
         return Some("the file is not named".to_owned());
     }
     if status == 3 && !fault.contains("hint: ") {
-        return Some("no way out is told".to_owned());
+        return Some("no way out is shown".to_owned());
     }
     None
 }

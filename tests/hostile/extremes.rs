@@ -1,4 +1,4 @@
-//! Settings that ask for more than a machine has are told before anything is allocated.
+//! Settings that ask for more than a machine has are refused before anything is allocated.
 
 use crate::bench::Bench;
 
@@ -23,7 +23,7 @@ fn a_simulation_that_does_not_fit_into_memory_is_refused_at_once() {
 }
 
 #[test]
-fn a_trajectory_of_extreme_frequency_or_duration_is_told_and_not_computed() {
+fn a_trajectory_of_extreme_frequency_or_duration_is_reported_and_not_computed() {
     let bench = Bench::new();
     let table3 = cft_ident::config::embedded("configs/table3.toml".as_ref())
         .unwrap()

@@ -198,8 +198,8 @@ fn complaint(file: &str, ended: &Ended, words: &[&str]) -> Option<String> {
         // whatever the cause: noise beyond the torque
         Some(4) if said.contains("these data determine nothing") => None,
         Some(3) if !said.contains(file) => Some("the log is not named".to_owned()),
-        Some(3) if !said.contains("hint: ") => Some("no way out is told".to_owned()),
-        Some(3) => (!named).then(|| "another cause is told".to_owned()),
+        Some(3) if !said.contains("hint: ") => Some("no way out is shown".to_owned()),
+        Some(3) => (!named).then(|| "another cause is named".to_owned()),
         other => Some(format!("status {other:?}")),
     }
 }

@@ -83,7 +83,7 @@ fn numbers_that_are_read_pass_through_every_stage_without_a_panic() {
 }
 
 #[test]
-fn a_joint_that_stands_still_all_the_time_is_told_and_ends_no_command_in_a_panic() {
+fn a_joint_that_stands_still_all_the_time_is_reported_and_ends_no_command_in_a_panic() {
     let bench = Bench::new();
     bench.file("still.csv", slide_log(2000, |_, q, _| *q = 0.1));
     for line in [
@@ -111,7 +111,7 @@ fn a_joint_that_stands_still_all_the_time_is_told_and_ends_no_command_in_a_panic
 }
 
 #[test]
-fn every_number_of_a_file_has_a_range_and_its_line_is_told() {
+fn every_number_of_a_file_has_a_range_and_its_line_is_reported() {
     let bench = Bench::new();
     let model = bench.text("model.toml");
     for (key, number) in [

@@ -1,4 +1,4 @@
-//! One log given twice: refused where it decides something, told where it is only looked at.
+//! One log given twice: refused where it decides something, named where it is only looked at.
 
 use std::fs;
 

@@ -341,7 +341,7 @@ fn files_that_are_not_there_are_refused_with_their_names() {
 }
 
 #[test]
-fn an_unwritable_output_is_told_before_the_log_is_read() {
+fn an_unwritable_output_is_reported_before_the_log_is_read() {
     let bench = Bench::with_model();
     bench.file("bad.csv", "");
     for (output, words) in [
@@ -364,7 +364,7 @@ fn an_unwritable_output_is_told_before_the_log_is_read() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_told_and_the_device_stays() {
+fn a_full_disk_is_reported_and_the_device_stays() {
     let bench = Bench::with_model();
     for line in [
         "lsq good.csv -r slide.toml -o /dev/full",

@@ -141,7 +141,7 @@ fn a_formula_that_is_in_the_logs_is_found_kept_in_the_model_and_predicts_unseen_
             .unwrap()
             .contains("cross-drag")
     );
-    // and not with another formula of the same name, which is told before the logs are looked at
+    // and not with another formula of the same name, which is refused before the logs are looked at
     let other = OWN.replace("q_shoulder + q_elbow", "q_shoulder - q_elbow");
     fs::write(at.join("own.toml"), other).unwrap();
     let words = [
@@ -305,7 +305,7 @@ fn formulas_in_the_plant_are_the_torque_that_the_tool_reckons_along_its_log() {
 }
 
 #[test]
-fn a_formula_that_is_none_on_this_robot_is_told_with_its_candidate() {
+fn a_formula_that_is_none_on_this_robot_is_reported_with_its_candidate() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     write(at, ASKEW, "");

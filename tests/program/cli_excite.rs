@@ -174,7 +174,7 @@ fn one_joint_experiments_are_designed_for_the_friction_law() {
 }
 
 #[test]
-fn lines_and_files_that_cannot_be_used_are_told() {
+fn lines_and_files_that_cannot_be_used_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let code = |line: &str, code: i32, message: &'static str| {
         excite(folder.path(), line)

@@ -214,7 +214,7 @@ fn a_urdf_elsewhere_is_named_from_where_the_robot_file_is() {
 }
 
 #[test]
-fn capsules_hold_the_collision_shapes_of_a_urdf_and_meshes_are_told() {
+fn capsules_hold_the_collision_shapes_of_a_urdf_and_meshes_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let link = |name: &str, shape: &str| {
         format!("<link name=\"{name}\"><collision>{shape}</collision></link>")

@@ -94,7 +94,7 @@ fn the_help_of_every_command_fits_80_columns_and_ends_in_an_example() {
 }
 
 #[test]
-fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() {
+fn a_json_file_that_cannot_be_written_is_reported_before_anything_else_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let lines = [
         "friction no.csv -r configs/cft.toml -o m.toml",

@@ -309,7 +309,7 @@ fn the_examples_of_every_help_work_where_the_campaign_was_run() {
 }
 
 #[test]
-fn what_is_not_known_is_told_with_its_nearest_spelling() {
+fn what_is_not_known_is_reported_with_its_nearest_spelling() {
     let folder = copy();
     let change = |from: &str, to: &str, pattern: &str, with: &str| {
         let text = std::fs::read_to_string(folder.path().join(from)).unwrap();

@@ -109,7 +109,7 @@ fn the_document_has_its_schema_with_logs_and_without() {
 }
 
 #[test]
-fn a_difference_is_told_in_root_summed_variances_and_is_null_where_one_is_unknown() {
+fn a_difference_is_reported_in_root_summed_variances_and_is_null_where_one_is_unknown() {
     let folder = bench();
     let shown = json(folder.path(), "compare a.toml b.toml");
     assert_eq!(shown["schema"], "cft-ident/compare/1");
@@ -274,7 +274,7 @@ fn one_model_is_too_few_and_a_missing_file_is_named() {
 }
 
 #[test]
-fn models_of_the_same_log_are_told_to_be_not_independent() {
+fn models_of_the_same_log_are_said_to_be_not_independent() {
     let folder = bench();
     let at = folder.path();
     let made = format!(

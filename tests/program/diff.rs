@@ -7,7 +7,7 @@ use measured_support::run;
 use predicates::str::contains;
 
 #[test]
-fn a_fit_on_half_of_a_log_is_told_from_the_fit_on_all_of_it() {
+fn a_fit_on_half_of_a_log_is_distinguished_from_the_fit_on_all_of_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     run(at, &["example", "ur10"]);

@@ -185,7 +185,7 @@ fn a_ladder_for_a_law_that_bends_at_once_stays_within_the_travel() {
     let robot = format!("{SLIDE}acceleration = 4.0\n\n[friction]\nlaw = \"double-tanh\"\n");
     let mut sharp = robot.clone();
     parameter(&mut sharp, "inertia", "", 95.0);
-    // such slopes are told best by slow reversals, which fast strokes have no room for
+    // such slopes show best in slow reversals, which fast strokes have no room for
     for (name, value) in LAW.iter().zip([200.0, 14.0, 6.0, 2400.0, 800.0]) {
         parameter(&mut sharp, name, "slide", value);
     }
@@ -278,7 +278,7 @@ fn points_are_checked_against_the_limits_of_a_serial_arm_and_run_within_them() {
 }
 
 #[test]
-fn what_an_arm_does_not_have_is_told_by_every_command() {
+fn what_an_arm_does_not_have_is_shown_by_every_command() {
     let folder = robots();
     let path = folder.path();
     let wrist = "kind = \"single-joint\"\njoint = \"wrist\"\nspeeds = [0.1, 0.2]\n";

@@ -443,7 +443,7 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
                     .and(predicates::str::contains("--unconstrained")),
             );
     }
-    command(&["--c", "told.h", "--without-effects"]).success();
-    let text = std::fs::read_to_string(folder.path().join("told.h")).unwrap();
+    command(&["--c", "model.h", "--without-effects"]).success();
+    let text = std::fs::read_to_string(folder.path().join("model.h")).unwrap();
     assert!(text.contains("NOT in here, though the model has it: ripple of elbow."));
 }

@@ -319,7 +319,7 @@ fn along_measured_logs_c_and_rust_give_the_tools_torques() {
 }
 
 #[test]
-fn the_lead_of_a_delay_is_told_and_not_applied() {
+fn the_lead_of_a_delay_is_reported_and_not_applied() {
     let robot = robots()[1].clone();
     let effects = vec![named(&robot, "delay", Some("q3"), &[("d", 0.004)])];
     let refined = AugmentedModel {

@@ -194,7 +194,7 @@ fn a_fit_of_the_logs_that_refined_the_friction_begins_at_the_prior_and_counts_no
 
 #[test]
 fn a_prior_made_from_the_logs_that_are_fitted_is_left_out() {
-    // sure and wrong, as it would be where the same rows told it before
+    // sure and wrong, as it would be where the same rows made it before
     let small = covariance().map(|row| row.map(|x| 1e-8 * x));
     let mut model = known(drawn(10), small);
     let inputs = fitted(&model, 11, EstimatorKind::Wls).inputs;
@@ -225,7 +225,7 @@ fn robust_and_instrumental_fits_take_the_refined_friction_too() {
 }
 
 #[test]
-fn speeds_beyond_those_of_the_one_joint_logs_are_told_with_the_torque_that_is_open() {
+fn speeds_beyond_those_of_the_one_joint_logs_are_reported_with_the_torque_that_is_open() {
     let mut model = known(drawn(14), covariance());
     let speeds = |covered| FrictionPrior {
         joint: "q1".to_owned(),

@@ -249,7 +249,7 @@ fn planned_torques_are_the_same_from_a_trajectory_and_from_its_samples() {
 }
 
 #[test]
-fn another_robots_log_is_refused_by_its_positions_and_told_by_its_torques() {
+fn another_robots_log_is_refused_by_its_positions_and_shown_by_its_torques() {
     let folder = fitted(0.8);
     let path = folder.path();
     let truth = truth(0.8);
@@ -294,7 +294,7 @@ fn a_motion_whose_torques_nobody_foresees_says_so_in_every_file() {
     );
     assert!(
         !out.contains("shoulder torque"),
-        "no limit of torque is told: {out}"
+        "no limit of torque is named: {out}"
     );
     // with a model the limits of torque hold, and hold for its band
     let out = good(path, &format!("excite -r arm.toml -m model.toml {quick}"));
@@ -387,7 +387,7 @@ fn a_payload_is_found_with_intervals_that_hold_it_and_stands_in_the_loaded_model
 }
 
 #[test]
-fn gains_that_are_off_are_told_apart_from_the_payload() {
+fn gains_that_are_off_are_distinguished_from_the_payload() {
     let folder = fitted(0.8);
     let path = folder.path();
     fs::write(path.join("loaded.csv"), loaded(3, 1.5, [1.1; 2])).unwrap();

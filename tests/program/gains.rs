@@ -115,7 +115,7 @@ fn ratios_of_gains_show_without_a_payload_and_leave_the_model_in_amperes() {
 }
 
 #[test]
-fn a_log_that_carries_no_load_and_exchanged_logs_are_told() {
+fn a_log_that_carries_no_load_and_exchanged_logs_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let (_, payload) = logs(folder.path(), 9, 0.02);
     let tried = |empty: &str, loaded: &str| {

@@ -44,7 +44,7 @@ fn deviation(column: &[f64]) -> f64 {
 }
 
 #[test]
-fn clean_logs_have_no_fault_and_their_channels_rate_and_motion_are_told() {
+fn clean_logs_have_no_fault_and_their_channels_rate_and_motion_are_reported() {
     for (log, moving) in both().iter().zip([&["q1", "q2", "q4", "q5"][..], &["q4"]]) {
         let found = log.inspected(CFT);
         assert_faults(&found, &[]);
@@ -183,7 +183,7 @@ fn lost_rows_are_a_gap() {
 }
 
 #[test]
-fn a_clock_with_jitter_is_a_warning_and_its_jitter_is_told() {
+fn a_clock_with_jitter_is_a_warning_and_its_jitter_is_reported() {
     let mut log = all_move();
     for (k, t) in log.column("t").iter_mut().enumerate() {
         *t += [0.0, 0.2e-3, -0.1e-3, 0.3e-3, -0.2e-3][k * 7 % 5];
@@ -332,7 +332,7 @@ fn a_copy_of_another_channel_is_an_error() {
 }
 
 #[test]
-fn a_position_that_equals_the_command_or_has_no_noise_is_told() {
+fn a_position_that_equals_the_command_or_has_no_noise_is_reported() {
     for mut log in both() {
         let measured = log.column("q_q4").clone();
         log.add("q_ref_q4", measured);
@@ -355,7 +355,7 @@ fn a_position_that_equals_the_command_or_has_no_noise_is_told() {
 }
 
 #[test]
-fn a_velocity_that_is_filtered_is_told_with_its_lag_and_a_true_one_is_not() {
+fn a_velocity_that_is_filtered_is_reported_with_its_lag_and_a_true_one_is_not() {
     for mut log in both() {
         let q = log.column("q_q4").clone();
         let mut speed: Vec<f64> = (0..q.len())
@@ -397,7 +397,7 @@ fn samples_that_are_logged_twice_are_found_and_slow_encoders_are_not_blamed() {
 }
 
 #[test]
-fn spans_and_several_logs_are_told_apart_and_names_are_escaped() {
+fn spans_and_several_logs_are_distinguished_and_names_are_escaped() {
     let folder = tempfile::tempdir().unwrap();
     let mut log = one_moves();
     log.column("q_q4")[15_000] += 0.01;

@@ -92,7 +92,7 @@ fn the_motor_s_velocity_channel_lags_and_its_recorder_lost_and_repeated_samples(
 }
 
 #[test]
-fn positions_without_noise_are_told_as_what_may_be_a_command() {
+fn positions_without_noise_are_reported_as_what_may_be_a_command() {
     let Some(path) = shared("ur10/ur10_exciting.csv") else {
         return;
     };

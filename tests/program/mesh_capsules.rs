@@ -212,7 +212,7 @@ fn capsules_of_an_arm_hold_every_vertex_of_its_meshes_and_a_check_keeps_them_apa
 }
 
 #[test]
-fn pieces_of_a_link_in_all_formats_are_held_and_those_that_are_not_there_are_told() {
+fn pieces_of_a_link_in_all_formats_are_held_and_those_that_are_not_there_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     // an angle: two bars that one capsule would hold with much room

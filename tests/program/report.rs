@@ -188,7 +188,7 @@ fn a_figure_is_written_as_png_by_its_ending() {
 }
 
 #[test]
-fn a_motion_is_told_before_the_robot_moves() {
+fn a_motion_is_reported_before_the_robot_moves() {
     let at = campaign();
     run(
         at,

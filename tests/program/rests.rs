@@ -71,7 +71,7 @@ fn robot() -> LoggedRobot {
 }
 
 #[test]
-fn rests_do_not_move_the_friction_and_are_told_apart_in_the_errors() {
+fn rests_do_not_move_the_friction_and_are_distinguished_in_the_errors() {
     let robot = robot();
     let control = Control::default();
     let log = [slide("resting", 1.0, 3)];

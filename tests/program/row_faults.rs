@@ -218,7 +218,7 @@ fn a_position_that_steps_is_named_with_its_joint_and_its_time_and_the_log_is_par
 }
 
 #[test]
-fn what_the_robot_file_keeps_is_told_but_not_acted_upon() {
+fn what_the_robot_file_keeps_is_reported_but_not_acted_upon() {
     let mut log = Rows::simulated(Experiment::Usual);
     let row = log.middle();
     log.q[2][row..].iter_mut().for_each(|q| *q += 0.01);

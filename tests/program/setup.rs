@@ -225,7 +225,7 @@ fn a_turned_torque_is_refused_mended_and_kept_where_the_user_says_so() {
 }
 
 #[test]
-fn one_axis_with_a_turned_torque_is_told_by_physics_with_both_readings() {
+fn one_axis_with_a_turned_torque_is_shown_by_physics_with_both_readings() {
     let Some(log) = shared("emps/emps_id.csv") else {
         return;
     };
@@ -244,7 +244,7 @@ fn one_axis_with_a_turned_torque_is_told_by_physics_with_both_readings() {
 }
 
 #[test]
-fn all_torques_turned_leave_the_same_residual_and_are_told_by_physics() {
+fn all_torques_turned_leave_the_same_residual_and_are_shown_by_physics() {
     let Some(log) = shared("ur10/ur10_exciting.csv") else {
         return;
     };
@@ -287,7 +287,7 @@ fn exchanged_channels_and_wrong_units_are_named_with_their_joint() {
 }
 
 #[test]
-fn an_arm_whose_gravity_is_declared_along_the_wrong_axis_is_told_the_right_one() {
+fn an_arm_whose_gravity_is_declared_along_the_wrong_axis_gets_the_right_one() {
     let Some(log) = shared("panda/panda_exciting.csv") else {
         return;
     };

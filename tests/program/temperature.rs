@@ -1,5 +1,5 @@
 //! Temperatures of drives, from the column that the robot file names to the effect that they make: what is left of a
-//! residual, formulas, models, exports; and what is told where a temperature is missing or is no number.
+//! residual, formulas, models, exports; and the error where a temperature is missing or is no number.
 
 mod missing;
 

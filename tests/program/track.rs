@@ -113,7 +113,7 @@ fn the_order_of_files_does_not_count_where_clocks_tell_it() {
 }
 
 #[test]
-fn clocks_that_overlap_or_jump_and_single_logs_are_told() {
+fn clocks_that_overlap_or_jump_and_single_logs_are_reported() {
     let overlap: Vec<Log> = (0..3).map(|k| log(k, 0.0, 8.0)).collect();
     let found = tracked(&[sources("slide", &overlap)]);
     assert!(
@@ -152,7 +152,7 @@ fn clocks_that_overlap_or_jump_and_single_logs_are_told() {
 }
 
 #[test]
-fn spans_of_one_log_that_meet_and_a_log_under_two_names_are_told() {
+fn spans_of_one_log_that_meet_and_a_log_under_two_names_are_reported() {
     let Some(emps) = shared("emps/emps_id.csv") else {
         return;
     };

@@ -152,7 +152,7 @@ fn a_push_is_an_alarm_with_its_joint_size_begin_and_end() {
 }
 
 #[test]
-fn a_mass_and_a_change_of_friction_are_told_from_each_other() {
+fn a_mass_and_a_change_of_friction_are_distinguished_from_each_other() {
     let folder = fitted();
     let path = folder.path();
     let mass = |t: f64, _: f64, _: f64, a: f64| if t > 5.0 { 0.3 * a } else { 0.0 };

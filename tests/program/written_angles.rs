@@ -35,7 +35,7 @@ fn rows_with_rounded_angles_have_the_parameters_of_exact_ones() {
     // the fault that this is about: one false parameter
     let kept = panda("1.5708").replace("[robot]", "[robot]\nangles_as_written = true");
     assert_eq!(base_parameters(&kept), exact + 1);
-    // told in one sentence, and only where something moved
+    // named in one sentence, and only where something moved
     let file = RobotFile::parse("panda.toml", &panda("1.5708")).unwrap();
     assert_eq!(file.notes.0.len(), 1, "{:?}", file.notes.0);
     assert!(
@@ -124,7 +124,7 @@ fn a_calibrated_arm_and_its_axes_stay_to_the_last_bit() {
     let axis = chain.links[1].axis.unwrap();
     assert!((axis[0] - root).abs() < 1e-15 && (axis[2] - root).abs() < 1e-15);
     assert!(chain.notes.is_empty(), "{:?}", chain.notes);
-    // an axis whose direction changes is told
+    // an axis whose direction changes is named
     let text = text.replace("0.7071 0 0.7071", "0.866 0 0.5");
     let chain = UrdfChain::parse("r.urdf", &text, None).unwrap();
     assert!(

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn torques_that_are_late_are_told_and_with_a_model_precisely() {
+fn torques_that_are_late_are_reported_and_with_a_model_precisely() {
     let late = |rows: usize| {
         let mut log = all_move();
         for name in ["tau_q1", "tau_q2", "tau_q4", "tau_q5"] {
@@ -33,7 +33,7 @@ fn torques_that_are_late_are_told_and_with_a_model_precisely() {
 }
 
 #[test]
-fn joints_that_are_turned_or_exchanged_are_told_by_a_model() {
+fn joints_that_are_turned_or_exchanged_are_shown_by_a_model() {
     let model = identified();
     let shown = |alter: &dyn Fn(&mut Log)| -> Option<String> {
         let mut log = all_move();

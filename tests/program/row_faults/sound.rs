@@ -20,7 +20,7 @@ fn logs_as_they_were_measured_have_none_of_these_faults() {
     }
 }
 
-/// Errors of a model's joints on a log [%], and what was told.
+/// Errors of a model's joints on a log [%], and the warnings.
 fn unseen(
     folder: &Path,
     robot: &str,

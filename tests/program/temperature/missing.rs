@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_temperature_that_is_missing_or_is_no_number_is_told_with_log_and_column() {
+fn a_temperature_that_is_missing_or_is_no_number_is_reported_with_log_and_column() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     axis(at);

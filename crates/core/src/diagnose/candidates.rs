@@ -48,9 +48,7 @@ pub fn candidates(
     let laws = LAWS.iter().copied().chain(case.own.iter().copied());
     let wanted = |law: &&Law| {
         let role = law.entry.role;
-        role != Role::StandIn
-            && (case.keep || role != Role::Kept)
-            && !case.without.iter().any(|name| name == law.entry.name)
+        role != Role::StandIn && (case.keep || role != Role::Kept)
     };
     let (mut out, mut not_tried) = (Vec::new(), Vec::new());
     for law in laws.filter(wanted) {

@@ -59,7 +59,7 @@ mod tests {
     use std::sync::Mutex;
 
     #[test]
-    fn a_part_is_told_from_its_begin_to_its_end() {
+    fn a_part_is_distinguished_from_its_begin_to_its_end() {
         let heard = Mutex::new(Vec::new());
         let tell = |h: Heard| heard.lock().unwrap().push(format!("{h:?}"));
         let watch = Watch {

@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_formula_is_told() {
+    fn what_is_no_formula_is_reported() {
         for text in ["", "cos(", "2 q", "cos", "((a)"] {
             assert!(Formula::parse(text).is_err(), "{text}");
         }

@@ -182,7 +182,7 @@ mod tests {
         formulas = { c = \"cos(q_q2 + q_q3) * tanh(w * v)\" }\nshapes = { w = { from = 1.0, to = 9.0 } }\n";
 
     #[test]
-    fn a_candidate_is_read_and_what_it_has_wrong_is_told_with_its_line() {
+    fn a_candidate_is_read_and_what_it_has_wrong_is_reported_with_its_line() {
         let found = parse("own.toml", GOOD).unwrap();
         assert_eq!(found[0].name, "drag");
         assert_eq!(found[0].shapes["w"].unit, "1");

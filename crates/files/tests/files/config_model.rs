@@ -246,7 +246,7 @@ fn a_model_of_another_robot_is_refused_with_the_difference() {
 }
 
 #[test]
-fn a_robot_file_given_as_a_model_is_told_so() {
+fn a_robot_file_given_as_a_model_is_named_so() {
     let text =
         std::fs::read_to_string(format!("{}/configs/cft.toml", cft_ident_support::ROOT)).unwrap();
     refused(

@@ -70,7 +70,7 @@ fn a_urdf_that_cannot_be_read_is_refused_with_line_and_remedy() {
 }
 
 #[test]
-fn a_circle_without_any_root_is_told() {
+fn a_circle_without_any_root_is_reported() {
     let text = "<robot><link name=\"a\"/><link name=\"b\"/>\
         <joint name=\"j1\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/></joint>\
         <joint name=\"j2\" type=\"revolute\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";

@@ -77,7 +77,7 @@ fn a_missing_column_is_named_with_its_nearest_name_and_the_key_that_maps_it() {
 }
 
 #[test]
-fn an_empty_file_a_lone_header_and_one_row_are_told_apart() {
+fn an_empty_file_a_lone_header_and_one_row_are_distinguished() {
     says("", &["is empty"]);
     says("\n\n \n", &["is empty"]);
     says("# nothing but a comment\n", &["0 row(s)"]);
@@ -86,7 +86,7 @@ fn an_empty_file_a_lone_header_and_one_row_are_told_apart() {
 }
 
 #[test]
-fn a_file_without_a_header_is_told_to_get_one() {
+fn a_file_without_a_header_is_asked_to_get_one() {
     says(
         "0,1,2\n1,2,3\n",
         &["log.csv:1", "no header", "t,q_q1,tau_q1"],
@@ -94,7 +94,7 @@ fn a_file_without_a_header_is_told_to_get_one() {
 }
 
 #[test]
-fn nan_infinity_and_text_in_a_number_are_told_with_line_and_column() {
+fn nan_infinity_and_text_in_a_number_are_reported_with_line_and_column() {
     says(
         "t,q_q1,tau_q1\n0,1,2\n1,NaN,3\n",
         &["log.csv:3", "`q_q1`", "NaN", "delete the rows"],
@@ -142,7 +142,7 @@ fn lines_are_counted_through_comments_blank_lines_and_carriage_returns() {
 }
 
 #[test]
-fn time_that_stands_still_runs_backwards_or_repeats_a_row_is_told_apart() {
+fn time_that_stands_still_runs_backwards_or_repeats_a_row_is_distinguished() {
     says(
         "t,q_q1,tau_q1\n0,1,2\n1,2,3\n1,2,4\n",
         &["log.csv:4", "stands still", "1 s"],
@@ -292,7 +292,7 @@ fn a_long_path_is_shown_whole_and_a_long_name_is_cut() {
 }
 
 #[test]
-fn raw_channels_that_belong_to_no_pose_are_told_with_their_line() {
+fn raw_channels_that_belong_to_no_pose_are_reported_with_their_line() {
     let robot = RobotFile::load("configs/cft.toml".as_ref()).unwrap();
     let folder = Folder::new();
     let path = folder.file("t,x_c1,x_c2,x_c3,x_c4,u_1,u_2,u_3,u_4\n0,-0.1343,0.2766,2.4,0.0869,1,1,1,1\n1,-0.1343,27.66,2.4,0.0869,1,1,1,1\n");

@@ -269,7 +269,7 @@ fn a_chunk_with_a_wrong_checksum_is_refused() {
 }
 
 #[test]
-fn a_robot_whose_joints_are_not_there_is_told_what_is() {
+fn a_robot_whose_joints_are_not_there_hears_what_is() {
     let robot = "[robot]\nmodel = \"single-joint\"\njoint = \"q3\"\nkind = \"revolute\"\n";
     let layout = RobotFile::parse("r.toml", robot).unwrap().layout();
     for (name, words) in [

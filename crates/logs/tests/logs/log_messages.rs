@@ -134,7 +134,7 @@ fn two_clocks(folder: &TempDir, delay: f64) -> PathBuf {
 
 /// The delay [ms] that a reader says.
 #[track_caller]
-fn told_delay(reader: &Reader) -> f64 {
+fn reported_delay(reader: &Reader) -> f64 {
     let warnings = reader.warnings();
     let described = warnings.iter().find(|text| text.contains("/drives lags"));
     let described = described.unwrap_or_else(|| panic!("{warnings:?}"));
@@ -143,13 +143,13 @@ fn told_delay(reader: &Reader) -> f64 {
 }
 
 #[test]
-fn the_delay_between_two_topics_is_told_and_taken_off_only_where_the_robot_file_says_so() {
+fn the_delay_between_two_topics_is_reported_and_taken_off_only_where_the_robot_file_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = two_clocks(&folder, 0.0131);
     let (late, reader) = read(&shown(&path), &one_joint(""));
     assert_eq!(late.len(), 4999);
     assert!(
-        (told_delay(&reader) - 13.1).abs() <= 0.2,
+        (reported_delay(&reader) - 13.1).abs() <= 0.2,
         "{:?}",
         reader.warnings()
     );
@@ -166,7 +166,11 @@ fn the_delay_between_two_topics_is_told_and_taken_off_only_where_the_robot_file_
             "[log]\ntorque_is = \"joint\"\ntorque_topic = \"/drives\"\ntorque_delay_s = 0.0131\n",
         ),
     );
-    assert!(told_delay(&reader).abs() <= 0.2, "{:?}", reader.warnings());
+    assert!(
+        reported_delay(&reader).abs() <= 0.2,
+        "{:?}",
+        reader.warnings()
+    );
     says(
         &reader.warnings().join("\n"),
         &["13.1 ms are taken off already"],
@@ -224,7 +228,8 @@ fn a_clock_that_runs_backwards_names_the_message_and_the_other_clock() {
 }
 
 #[test]
-fn a_message_whose_number_is_none_is_left_out_and_told_and_a_recording_of_none_else_is_refused() {
+fn a_message_whose_number_is_none_is_left_out_and_reported_and_a_recording_of_none_else_is_refused()
+{
     let folder = tempfile::tempdir().unwrap();
     let recorded = |name: &str, none: &dyn Fn(u64) -> bool| {
         let path = folder.path().join(name);

@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_checks_is_told_by_what_is_declared() {
+    fn what_nobody_checks_is_shown_by_what_is_declared() {
         let shown = |text: &str, way| {
             let file = file(text);
             DesignSpace::of(&file, &file.robot()).0.not_checked(way)

@@ -58,7 +58,7 @@ impl Directions {
         let covariance = DMatrix::from_row_slice(u, u, &file.model_covariance(model));
         let n = model.robot.joints();
         let each = match seen.len() == n {
-            true => least_told(model, &covariance, seen),
+            true => least_reported(model, &covariance, seen),
             false => Vec::new(),
         };
         Self {
@@ -134,7 +134,7 @@ fn within_reach(model: &Model, seen: &[HeldOut]) -> Vec<DMatrix<f64>> {
 }
 
 /// Directions by the share of the torques' variance within reach that they make, each joint's by its own.
-fn least_told(model: &Model, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec<Direction> {
+fn least_reported(model: &Model, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec<Direction> {
     let u = model.parameters();
     let mut reach = DMatrix::zeros(u, u);
     for of in within_reach(model, seen) {
@@ -216,7 +216,7 @@ mod tests {
         let covariance = vector(1) * vector(1).transpose() * 4.0
             + vector(2) * vector(2).transpose() * 9.0
             + DMatrix::identity(u, u) * 1e-4;
-        let each = least_told(&model, &covariance, &seen());
+        let each = least_reported(&model, &covariance, &seen());
         assert!((2..=MAX_DIRECTIONS).contains(&each.len()), "{}", each.len());
         let mut few = Directions {
             robot: model.robot,
@@ -253,6 +253,6 @@ mod tests {
     fn parameters_without_a_covariance_have_no_directions() {
         let model = pendulum();
         let u = model.parameters();
-        assert!(least_told(&model, &DMatrix::zeros(u, u), &seen()).is_empty());
+        assert!(least_reported(&model, &DMatrix::zeros(u, u), &seen()).is_empty());
     }
 }

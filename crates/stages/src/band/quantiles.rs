@@ -48,7 +48,7 @@ fn level(effective: f64) -> f64 {
 }
 
 /// The band's widths and what was seen, alarms left open; `independent` is the share of samples that are.
-pub fn held_out(joint: &str, errors: &[Error], samples: u64, independent: f64) -> HeldOut {
+pub fn held_out(joint: &str, errors: &[Error], independent: f64) -> HeldOut {
     let speed_edges = edges(errors.iter().map(|e| e.speed), &SPEEDS);
     let torque_edges = edges(errors.iter().map(|e| e.torque), &TORQUES);
     let excess = |e: &Error| {
@@ -83,8 +83,8 @@ pub fn held_out(joint: &str, errors: &[Error], samples: u64, independent: f64) -
     let positions = errors.iter().map(|e| e.position);
     HeldOut {
         joint: joint.to_owned(),
-        samples,
-        effective_samples: samples as f64 * independent,
+        samples: errors.len() as u64,
+        effective_samples: errors.len() as f64 * independent,
         position_cutoff_hz: f64::NAN,
         half_width_95,
         positions_seen: [
@@ -121,7 +121,7 @@ mod tests {
             }
         };
         let all: Vec<Error> = (0..40_000).map(error).collect();
-        let held = held_out("q1", &all, 40_000, 0.1);
+        let held = held_out("q1", &all, 0.1);
         assert_eq!(held.speed_edges.len(), 4);
         for row in &held.half_width_95 {
             let inside = |e: &&Error| held.half_width(e.speed, e.torque) == row[0];

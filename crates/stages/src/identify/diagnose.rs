@@ -228,13 +228,10 @@ pub fn diagnose(
     let holdout_chooses = data.veto.is_empty();
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
-        if aside.role == LogRole::Holdout {
-            let text = format!(
-                "{}: {:.2}..{:.2} s set aside as the holdout",
-                logs[aside.log], aside.from_s, aside.to_s
-            );
-            control.note(&text);
-        }
+        control.note(&format!(
+            "{}: {:.2}..{:.2} s set aside as the holdout",
+            logs[aside.log], aside.from_s, aside.to_s
+        ));
     }
     let mut found = Diagnosed {
         diagnosis,
@@ -348,7 +345,6 @@ fn case(
             .collect(),
         averaged: in_memory.averaged,
         keep: settings.keep,
-        without: Vec::new(),
         own: own_laws(&settings.candidates, &machine.robot)?,
         wishes: settings.wishes.clone(),
         numbers: NUMBERS,

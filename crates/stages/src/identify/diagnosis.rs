@@ -15,8 +15,8 @@ use super::next_motion::separating_command;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
-    Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, LogRole, Signal,
-    SplitErrors, StepStatus,
+    Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, Signal, SplitErrors,
+    StepStatus,
 };
 use cft_ident_core::motion::Summary;
 
@@ -249,10 +249,7 @@ impl Diagnosed {
             });
         let aside = d.set_aside.iter().map(|a| BlockAside {
             log: self.logs[a.log].clone(),
-            role: match a.role {
-                LogRole::Veto => "veto",
-                _ => "holdout",
-            },
+            role: "holdout",
             from_s: a.from_s,
             to_s: a.to_s,
         });

@@ -261,7 +261,7 @@ impl<'a> Trial<'a> {
         let plain = self.settings.plain_q_cutoff_hz(1.0 / dt);
         let all = names.zip(&errors).enumerate();
         all.map(|(j, (joint, errors))| {
-            let mut held = held_out(joint, errors, errors.len() as u64, independent);
+            let mut held = held_out(joint, errors, independent);
             held.samples = samples as u64;
             let own = self.settings.joint_q_cutoffs_hz.get(j);
             held.position_cutoff_hz = own.copied().unwrap_or(plain);

@@ -8,7 +8,7 @@ use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
 use crate::open_loop::{FreeRun, RunSpan, free_run};
-use cft_ident_core::diagnose::{Case, LogRole, SplitErrors, Unknown, errors_of};
+use cft_ident_core::diagnose::{Case, SplitErrors, Unknown, errors_of};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -69,9 +69,7 @@ impl Diagnosed {
         let of_log = |s: &Stretch| inputs[s.log].role == Some(DataRole::HeldOut);
         let aside = |s: &Stretch, t: f64| {
             let mut blocks = self.diagnosis.set_aside.iter();
-            blocks.any(|a| {
-                a.role == LogRole::Holdout && a.log == s.log && (a.from_s..=a.to_s).contains(&t)
-            })
+            blocks.any(|a| a.log == s.log && (a.from_s..=a.to_s).contains(&t))
         };
         let mut spans = Vec::new();
         for (number, s) in stretches.iter().enumerate() {

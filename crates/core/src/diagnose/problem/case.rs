@@ -30,8 +30,6 @@ pub struct Case {
     pub averaged: bool,
     /// The inertial parameters of the given model are kept.
     pub keep: bool,
-    /// Names of effects that are not tried.
-    pub without: Vec<String>,
     /// Effects of the user's own, tried beside those that are known.
     pub own: Vec<&'static Law>,
     /// What the user asks for.

@@ -31,7 +31,6 @@ pub struct Piece {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetAside {
     pub log: usize,
-    pub role: LogRole,
     pub from_s: f64,
     pub to_s: f64,
 }
@@ -95,7 +94,6 @@ impl DataSplit {
                 let time = |row: usize| stretch.own_time(parallel.sample_of(row));
                 split.set_aside.push(SetAside {
                     log: stretch.log,
-                    role: LogRole::Holdout,
                     from_s: time(aside.start),
                     to_s: time(aside.end),
                 });

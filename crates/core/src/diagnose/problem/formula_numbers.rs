@@ -18,7 +18,7 @@ pub struct FormulaNumbers {
     pub rows: usize,
     /// Searches where whole parts have another sign. Half: no chance as small as `chance` can be shown.
     pub draws: usize,
-    /// Chance above which a formula is not told.
+    /// Chance above which a formula is not reported.
     pub chance: f64,
     /// Seed of the signs.
     pub seed: u64,

@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_that_is_surely_above_zero_and_far_too_small_to_matter_is_told_apart() {
+    fn a_change_that_is_surely_above_zero_and_far_too_small_to_matter_is_distinguished() {
         let joints = ["q4".to_owned()];
         let of = |after: f64| changes(&joints, (&pieces(0.00146), &pieces(after)), 1).remove(0);
         let tiny = of(0.001461);

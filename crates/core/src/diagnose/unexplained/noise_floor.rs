@@ -302,7 +302,8 @@ mod tests {
     }
 
     #[test]
-    fn noise_that_rises_is_told_from_white_noise_and_what_it_hides_is_its_standard_error() {
+    fn noise_that_rises_is_distinguished_from_white_noise_and_what_it_hides_is_its_standard_error()
+    {
         let (seen, kept) = ([[1.0, 3.0], [2.0, 20.0]], [5.0, 0.5]);
         let known = |value: f64| Middle { value, error: 0.0 };
         let of = |white: f64, rising: f64| {

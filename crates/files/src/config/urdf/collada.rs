@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_or_has_no_end_is_told() {
+    fn what_is_not_known_or_has_no_end_is_reported() {
         let shown = "<node><instance_geometry url=\"#g\"/></node>";
         let circle = "<node id=\"c\"><instance_node url=\"#c\"/><instance_node url=\"#c\"/></node>";
         for (text, described) in [

@@ -231,7 +231,7 @@ impl Fault {
     }
 
     /// Whether an entry of `setup`, or of what it is tied with, says the truth.
-    pub fn is_told_by(&self, machine: &Machine, entry: &Value) -> bool {
+    pub fn is_shown_by(&self, machine: &Machine, entry: &Value) -> bool {
         let joint = |j: usize| machine.joints[j].name.as_str();
         let text = |key: &str| entry[key].as_str();
         let about = |kind: &str, side: Option<Side>, of: &[usize]| {

@@ -280,7 +280,7 @@ impl Heard {
                 right_joint: named,
             };
         }
-        let first = |entry: &Value| fault.is_told_by(machine, entry);
+        let first = |entry: &Value| fault.is_shown_by(machine, entry);
         // a hint at something else is no word on the fault
         let entries: Vec<Value> = (entries.iter())
             .filter(|entry| entry["severity"] != "hint" || first(entry))

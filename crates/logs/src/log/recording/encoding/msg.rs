@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_defaults_bounds_and_arrays_are_told_apart() {
+    fn constants_defaults_bounds_and_arrays_are_distinguished() {
         let text = "uint8 A=1\nstring B = \"x # y\"\nint32 count 7\nstring<=5 label\nfloat32[3] v\nfloat64[<=4] w\nInner[] list\nwstring wide\n===\nMSG: p/Inner\nbyte b\n";
         let outer = &parse("p/msg/Outer", text).unwrap()[0];
         let kinds: Vec<_> = (outer.iter().map(|f| (&*f.name, f.kind, f.count))).collect();
