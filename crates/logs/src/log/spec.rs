@@ -1,6 +1,7 @@
 //! Which part of which file: `FILE`, `FILE@0..70%`, `FILE@15.2..23s`.
 
 use std::fmt;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
@@ -8,7 +9,7 @@ use std::sync::Arc;
 use super::LogError;
 use super::names::escape_whole;
 use super::recording::FORMATS;
-use super::source::{failed, file_name, shown};
+use super::source::{self, failed, file_name, shown};
 use super::table::dataset;
 use super::tape::Kept;
 
@@ -180,6 +181,14 @@ impl LogSpec {
         let parts = self.joined().unwrap_or_else(|| vec![self.path.clone()]);
         let names: Vec<String> = parts.iter().map(|part| file_name(part)).collect();
         names.join("+")
+    }
+
+    /// The bytes of its one file, which is opened once for all who read the log while somebody holds it.
+    ///
+    /// # Errors
+    /// A file that cannot be opened.
+    pub fn bytes(&self) -> Result<Box<dyn Read + Send>, LogError> {
+        Ok(Box::new(source::open(&self.path)?))
     }
 
     /// The files of the log, in order: one file; the recordings in a folder; or `A+B`, joined.

@@ -28,12 +28,7 @@ use cft_ident_files::config::model_file::EffectSection;
 /// Windows for each number below which deviations are not trusted.
 const MIN_WINDOWS_PER_NUMBER: f64 = 4.0;
 
-/// Refines what `lsq` found on these logs by the motion that the torques make, in windows of so many seconds; without a
-/// length, blocks of the logs that are set aside choose it.
-///
-/// # Errors
-/// [`IdentifyError::NotByMotion`] for robots of several axes and friction of another law, logs that are too short, and
-/// a motion that goes astray.
+/// Refines what `lsq` found by the motion that the torques make; without a window, blocks set aside choose it.
 pub(super) fn by_motion(
     machine: &LoggedRobot,
     found: &mut IdentifiedDynamics,

@@ -14,8 +14,7 @@ use cft_ident_core::number;
 use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::{RowFault, escape};
 
-/// A parameter moves with rows when it does so by so many standard deviations; twice as many leave out a
-/// doubtful fit, half as many report what is chance.
+/// Deviations by which rows move a parameter: twice as many miss doubtful fits, half as many report chance.
 const MOVED_DEVIATIONS: f64 = 4.0;
 /// Room on both sides of a stretch that is to be left out \[s\]: the filters carry it so far.
 const ROOM_S: f64 = 0.1;

@@ -307,8 +307,7 @@ fn refused(
 /// How many times as firm as its covariance a friction that is held stands against the data.
 const HELD_FIRMNESS: f64 = 1e6;
 
-/// What the search is about; it takes the stretches of the logs. `before` is the model `file` with the friction
-/// that is known without these logs.
+/// What the search is about; `before` is the model with the friction that is known without these logs.
 fn case(
     machine: &LoggedRobot,
     (name, file, before): (&str, &ModelFile, &ModelFile),

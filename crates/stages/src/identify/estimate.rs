@@ -141,8 +141,7 @@ impl Solver {
     }
 }
 
-/// What an estimator ends with, before its uncertainty is widened: the fit, the rows that it is about,
-/// and what turns other readings into a fit of the same kind.
+/// A fit before its uncertainty is widened, its rows, and what makes fits of the same kind of other readings.
 type Found = (Fit, BlockFactors, Solver);
 
 /// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
@@ -194,8 +193,7 @@ pub fn estimate(
     })
 }
 
-/// Refines the friction that is known with the inertias, from it and drawn to it by its covariance. What is left is
-/// the fit of the inertias with the friction as it was refined; their covariance is that of both.
+/// Refines the known friction with the inertias, drawn to it by its covariance; the fit left is of the inertias.
 fn with_known_friction(
     passes: &mut Passes,
     mut columns: RegressorColumns,

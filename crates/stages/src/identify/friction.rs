@@ -364,8 +364,7 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
     out
 }
 
-/// The speeds at which the curve is not to be used, for the mean torque at constant speed, which took
-/// no part in the fit, says otherwise.
+/// The speeds at which the mean torque at constant speed, which took no part in the fit, contradicts the curve.
 fn missed_plateaus(found: &FrictionOfJoint) -> Option<String> {
     const NAMED: usize = 4;
     let missed = found.estimate.missed_plateaus();
@@ -393,8 +392,7 @@ fn missed_plateaus(found: &FrictionOfJoint) -> Option<String> {
     })
 }
 
-/// The parameters of one joint as a model file holds them. A slope with a bound keeps the value of
-/// highest likelihood, which the torque is computed with; its meaning names the bound.
+/// The parameters of a joint as a model file holds them; a slope with a bound keeps its likeliest value.
 fn file_parameters(found: &FrictionOfJoint) -> Vec<Parameter> {
     let e = &found.estimate;
     let law = e.law.parameters();

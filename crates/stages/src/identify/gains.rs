@@ -203,8 +203,7 @@ fn usable(machine: &LoggedRobot, payload: Option<&PayloadLog>) -> Result<(), Gai
     }
 }
 
-/// Covariance of the logarithms of the gains: of the noise, of what a narrower position filter moves, and
-/// of the mass, in which all have the same share.
+/// Covariance of the gains' logarithms: noise, what a narrower position filter moves, and the mass in common.
 fn covariance(fit: &GainFit, narrow: &GainFit, payload: Option<&PayloadLog>) -> DMatrix<f64> {
     let of = |fit: &GainFit, j: usize| match fit.reference {
         Some(reference) => (fit.channel[j] / fit.channel[reference]).abs().ln(),
@@ -223,8 +222,7 @@ fn covariance(fit: &GainFit, narrow: &GainFit, payload: Option<&PayloadLog>) -> 
     })
 }
 
-/// Factor that the channel of joint j lacks, as it is read now: to a torque, or to be in one unit with
-/// the reference's channel as that was logged.
+/// Factor that the channel of joint j lacks: to a torque, or to the unit of the reference's channel.
 fn factor(machine: &LoggedRobot, fit: &GainFit, payload: Option<&PayloadLog>, j: usize) -> f64 {
     match (payload, fit.reference) {
         (Some(payload), _) => payload.mass / fit.channel[j],

@@ -69,8 +69,7 @@ impl Pieces {
     }
 }
 
-/// Sets blocks of the logs that a model was fitted to aside, one after the other. `inputs` are those logs, and `machine`
-/// has the position cut-offs of the fit: the model without a block is then fitted as the model was.
+/// Sets blocks of the fitted logs aside, one after the other; `machine` has the position cut-offs of the fit.
 pub(super) fn hold_out(
     machine: &LoggedRobot,
     (file, model): (&ModelFile, &AugmentedModel),

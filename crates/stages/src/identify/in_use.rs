@@ -41,8 +41,7 @@ pub struct JointInUse {
     pub speed_seen: f64,
 }
 
-/// The point that forces are reported at, and what it is called: the first frame of the robot file, or the end of the
-/// last link.
+/// The point that forces are reported at and its name: the first frame of the file, or the end of the last link.
 fn tool(file: &RobotFile, machine: &LoggedRobot, q: &[f64]) -> (Vector, String) {
     let tree = machine.robot.tree();
     let frames = frames(tree, q);

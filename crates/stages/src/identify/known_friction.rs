@@ -218,8 +218,7 @@ pub(super) fn of_joint(all: &DMatrix<f64>, at: usize) -> [[f64; GRADIENT]; GRADI
     std::array::from_fn(|a| std::array::from_fn(|b| all[(at + a, at + b)]))
 }
 
-/// What is known of a joint's friction without the logs `given`: the values of the model `file`, called `name`, or where
-/// these logs refined them those of before.
+/// A joint's friction without the logs `given`: the file's own, or where these logs refined it that of before.
 fn prior_of(
     (name, file): (&str, &ModelFile),
     joint: &str,
@@ -255,8 +254,7 @@ fn refined_by(mut priors: Vec<FrictionPrior>, inputs: &[Provenance]) -> Vec<Fric
     priors
 }
 
-/// The model as it was before a diagnosis of the logs `given`: with the friction that is known without them. With it what
-/// a refined model keeps of that.
+/// The model with the friction that is known without the logs `given`, and what a refined model keeps of it.
 pub(super) fn before_these(
     (name, file): (&str, &ModelFile),
     given: &[Provenance],
@@ -289,8 +287,7 @@ pub(super) fn before_these(
 /// A speed over the greatest of the one-joint logs up to which their law is not continued.
 const MAX_SPEED_RATIO: f64 = 1.1;
 
-/// Covariance of the unknowns of a linear fit and of the friction that it took as known: cov(theta, theta_f) = S
-/// Sigma_f, with S = d theta / d theta_f.
+/// Covariance of unknowns and known friction: cov(theta, theta_f) = S Sigma_f, with S = d theta / d theta_f.
 pub(super) fn with_friction(columns: &RegressorColumns, fit: &Fit) -> DMatrix<f64> {
     let u = fit.theta.len();
     let known = columns.known.iter().flatten().count();
@@ -312,9 +309,7 @@ pub(super) fn with_friction(columns: &RegressorColumns, fit: &Fit) -> DMatrix<f6
     all
 }
 
-/// The same where a refinement has moved the friction: `whole` is the covariance of its unknowns, `free` its columns and
-/// `columns` those of the linear fit with the friction as it was refined. What was held keeps the variance
-/// that it had.
+/// The same from `whole`, the covariance of a refinement with columns `free`; held friction keeps its variance.
 pub(super) fn of_refinement(
     columns: &RegressorColumns,
     free: &RegressorColumns,

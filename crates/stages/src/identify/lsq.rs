@@ -268,8 +268,7 @@ fn share_uncertainty(estimated: &mut Estimated, gains: &CurrentGains) -> Result<
     Ok(())
 }
 
-/// Share of the torque that a fit leaves of every joint where noise is as large as the torque: noise alone leaves 0.7 of
-/// the sum of two that are equal.
+/// Share that a fit leaves of every joint where noise is as large as the torque: noise leaves 0.7 of their sum.
 const NOISE_ONLY_SHARE: f64 = 0.7;
 /// The essential unknowns, and the relative residual of each joint with those alone.
 fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyError> {

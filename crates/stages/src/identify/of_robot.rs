@@ -92,8 +92,7 @@ impl Beyond {
         }
     }
 
-    /// The joint whose torque the model makes impossibly large: single rows are noise of the acceleration, but an rms
-    /// error above all that was measured is not.
+    /// The joint whose torque the model makes impossibly large: by its rms too, for single rows may be noise.
     pub(super) fn impossible(
         &self,
         errors: &TorqueErrors,

@@ -9,14 +9,10 @@ use cft_ident_core::friction::prepare::SmoothedMotion;
 use cft_ident_core::motion::{Differences, FilterSettings};
 use cft_ident_logs::log::{Block, Provenance};
 
-/// Cut-off of the position filter for the friction filter's known inputs [Hz], where the robot
-/// file names none and the sampling rate allows it. Wide, because the acceleration of stationary joints
-/// answers to reversals within milliseconds; wider would let in more of the encoders' steps.
+/// Position cut-off where none is declared \[Hz\]: stationary joints answer to reversals within milliseconds.
 const FRICTION_POSITION_CUTOFF_HZ: f64 = 100.0;
 
-/// Most rows of a one-joint log: half an hour at 1 kHz. A row takes 80 bytes per joint for its
-/// motion, smoothed twice, and 16 bytes per nuisance direction for each of at most three problems
-/// at a time: about 1 kB for a robot of four joints.
+/// Most rows of a one-joint log, half an hour at 1 kHz: about 1 kB a row for a robot of four joints.
 const MOST_ROWS: usize = 2_000_000;
 
 /// A one-joint log, read and smoothed.

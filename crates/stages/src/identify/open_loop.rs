@@ -16,8 +16,7 @@ use cft_ident_logs::log::Provenance;
 /// Length of the windows of robots that have more than one axis \[s\].
 const WINDOW_S: f64 = 0.25;
 
-/// Simulates the motion of logs from their torques, in windows that begin at measured states; without a length
-/// single axes run from the begin of each stretch to its end, and other robots in windows of 0.25 s.
+/// Simulates the motion of logs from their torques, in windows that begin at measured states.
 pub(super) fn open_loop(
     machine: &LoggedRobot,
     refined: &AugmentedModel,
@@ -42,8 +41,7 @@ pub(super) fn open_loop(
     Ok(along(refined, &whole.stretches, length))
 }
 
-/// The free run of a model on logs that were read as `inputs`; nothing where torques are in no SI unit, where a log is
-/// reduced, or where the logs are too short.
+/// The free run of a model on logs that were read as `inputs`, where units and length allow one.
 pub(super) fn free_run(
     machine: &LoggedRobot,
     refined: &AugmentedModel,

@@ -62,8 +62,7 @@ pub struct Passes<'a> {
     own: Vec<OwnSettings>,
     /// Joints whose samples at standstill count.
     counted: Vec<usize>,
-    /// Logs in the order of their checksums, by the first reading: sums do not depend on the order in which
-    /// logs are given.
+    /// Logs by their checksums: sums do not depend on the order in which logs are given.
     order: Vec<usize>,
 }
 
@@ -86,8 +85,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// The same with what each log calls for by itself: its joints rest, and its positions are smoothed, as that log
-    /// alone shows.
+    /// The same with the rests and the smoothing that each log calls for by itself.
     pub(super) fn each_by_itself(self, own: Vec<OwnSettings>) -> Self {
         Passes { own, ..self }
     }

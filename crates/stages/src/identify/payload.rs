@@ -206,8 +206,7 @@ impl Point {
         each.map(|(y, x)| y * x).sum()
     }
 
-    /// The columns of a row of joint `j`, the gain's where it is free, and what they are to give: the torque
-    /// (1 + gain) (body + model) less the model, linear about this point.
+    /// Columns of a row and their target: the torque (1 + gain) (body + model) less the model, linear about this point.
     fn linear(&self, j: usize, row: &[f64; OWN + 3], gains: bool) -> (Vec<f64>, f64) {
         let (gain, carried) = (self.gains[j], self.carried(row));
         let of_body = row[..STANDARD].iter().map(|y| (1.0 + gain) * y);

@@ -72,9 +72,7 @@ impl CutoffCosts {
         .collect()
     }
 
-    /// The cut-offs of a fit of logs with these costs, whose friction scales those of joints without a known law, and
-    /// what is wrong with them, as warnings. Where logs call for several cut-offs the lowest is reported, and of the costs
-    /// the root of the mean square.
+    /// Cut-offs of a fit of these logs, of several the lowest with the rms of the costs, and what is wrong with them.
     pub(super) fn described(
         logs: &[&CutoffCosts],
         machine: &LoggedRobot,
@@ -118,8 +116,7 @@ impl CutoffCosts {
 }
 
 impl PositionCutoff {
-    /// What is wrong with a declared cut-off where the best one costs `best` and the rows have a residual of
-    /// `residual` \[unit\].
+    /// What is wrong with a declared cut-off where the best one costs `best` and rows leave `residual` \[unit\].
     fn wrong(&self, best: f64, residual: f64) -> Option<String> {
         let total = self.smear.hypot(self.noise);
         if !self.declared
@@ -172,8 +169,7 @@ pub(super) fn known(model: &Model) -> Vec<Option<JointFriction>> {
 type Open<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
 
 impl LoggedRobot {
-    /// The same robot with the position cut-offs that its logs call for. `laws` is the friction of each joint, none
-    /// where it is not known.
+    /// The same robot with the position cut-offs that its logs call for; a law is none where it is not known.
     pub(super) fn with_position_cutoffs(
         &self,
         logs: &[Log],
@@ -184,9 +180,7 @@ impl LoggedRobot {
         self.with_cutoffs_along(logs, laws, &speeds, &|log| self.open(log, control))
     }
 
-    /// The processing of each log by the position cut-offs that it calls for itself: a slow log must not narrow those
-    /// of a quick one. A joint that rests in it gets the cut-off of all logs, which are those of `together`: the
-    /// widest would let the rounding of its encoder through.
+    /// The processing of each log by its own cut-offs, and by those of `together` for a joint that rests in it.
     pub(super) fn settings_of_each(
         &self,
         logs: &[Log],
@@ -209,8 +203,7 @@ impl LoggedRobot {
         logs.iter().map(of_log).collect()
     }
 
-    /// The same for logs that `open` opens, in which each joint rests up to its `rest_speed`; nothing is read where
-    /// cut-offs are declared.
+    /// The same for logs that `open` opens; nothing is read where cut-offs are declared.
     pub(super) fn with_cutoffs_along(
         &self,
         logs: &[Log],
@@ -297,8 +290,7 @@ impl LoggedRobot {
         machine
     }
 
-    /// The same robot with the position cut-offs by which a model's band was found: through others comes another noise
-    /// than the band holds. None where they are its own.
+    /// The same robot with the position cut-offs by which a model's band was found; none where they are its own.
     pub(super) fn as_held(&self, held: &[HeldOut]) -> Option<LoggedRobot> {
         if held.len() != self.position_cutoffs_hz.len() {
             return None;

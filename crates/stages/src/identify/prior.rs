@@ -11,8 +11,7 @@ use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::ModelFile;
 
-/// Which parameters the fit may move: all but those that the friction stage left open. Friction that is held is an
-/// unknown where its deviation is known, which the prior then keeps in its place.
+/// Which parameters the fit may move: all but those that the friction stage left open; held friction by its prior.
 pub(super) fn open(
     machine: &LoggedRobot,
     file: &ModelFile,
@@ -70,8 +69,7 @@ fn names_of(law: &JointFriction) -> &'static [&'static str] {
     }
 }
 
-/// Puts the deviations of friction parameters that a file has no covariance of into it, row-major in the order of
-/// [`Model::gradient`].
+/// Puts deviations of friction parameters without a covariance into it, row-major, by [`Model::gradient`].
 fn with_deviations(file: &ModelFile, model: &Model, covariance: &mut [f64]) {
     let size = model.parameters();
     let joints = model.robot.joint_names().iter();
@@ -105,12 +103,10 @@ pub(super) fn moved_alone(
     alone
 }
 
-/// Standard deviations of the friction stage are taken this many times as large: its model lacked
-/// what is looked for here, too.
+/// Factor on deviations of the friction stage: its model lacked what is looked for here, too.
 const FRICTION_DOUBT: f64 = 3.0;
 
-/// Inverse covariance of what is known before: the friction stage's. The friction of a joint that is `alone` in a log of its own, the others stationary, is fitted from that log:
-/// what the friction stage made of it would count twice, and without the effect that is looked for.
+/// Inverse covariance of the friction stage; a joint that moves alone in these logs is fitted from them.
 pub(super) fn information(
     file: &ModelFile,
     given: &AugmentedModel,

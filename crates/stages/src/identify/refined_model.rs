@@ -266,8 +266,7 @@ fn fitted(model: &AugmentedModel, unknown: Unknown) -> Option<(String, Option<St
     Some((name, joint.map(|j| robot.joint_names()[j].clone()), value))
 }
 
-/// Gives a parameter the value and the standard deviation that were found, and says by how much the
-/// latter is widened; none where other parameters explain the same torque in these logs.
+/// Gives a parameter what was found; how much wider its deviation is, where nothing else explains the same torque.
 fn put(p: &mut Parameter, value: f64, found: f64) -> Option<f64> {
     if !found.is_finite() {
         p.value = value;

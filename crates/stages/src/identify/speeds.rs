@@ -160,8 +160,7 @@ impl SpeedMeter {
         }
     }
 
-    /// How many times the derivative of its position each joint's velocity column is; none where it does not
-    /// follow that.
+    /// Velocity column over the derivative of the position, joint by joint; none where it does not follow that.
     pub(super) fn velocities(&self) -> Vec<Option<f64>> {
         let factor = |p: &Pair| {
             let follows =

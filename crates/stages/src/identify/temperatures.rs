@@ -73,8 +73,7 @@ impl LoggedRobot {
         }
     }
 
-    /// Puts the temperatures of a log beside its stretches. A column that it lacks is reported alone: whether anything
-    /// takes it is for [`Self::check_temperatures`].
+    /// Puts the temperatures of a log beside its stretches; a column that it lacks is a warning.
     pub(super) fn put_temperatures(
         &self,
         log: &Log,

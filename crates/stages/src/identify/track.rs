@@ -17,9 +17,7 @@ use cft_ident_fleet::track::{
 };
 use cft_ident_logs::log::Provenance;
 
-/// Probability at which changes are reported of a robot that has none, all its parameters together, at one look. A robot is
-/// looked at after each of its logs, and payloads follow no normal law: over fifty logs there are more
-/// (`examples/study_track`).
+/// Probability of a false change at one look at a robot; over fifty logs there are more (`study_track`).
 const FALSE_ALARM_PROBABILITY: f64 = 0.0002;
 /// The same of robots of a fleet that are alike.
 const FALSE_DIFFERENCE_PROBABILITY: f64 = 0.01;
@@ -365,8 +363,7 @@ fn correlation(found: &[Source], keys: &[&OneEstimate]) -> Option<Vec<f64>> {
     pairs.collect()
 }
 
-/// Sizes of a joint's friction that are less than so many deviations from none are not named in a change that others
-/// show.
+/// Deviations from none below which a size of friction is not named in a change that others show.
 const MIN_SHOWN_DEVIATIONS: f64 = 2.0;
 
 /// Changes of one parameter of those that are followed together.

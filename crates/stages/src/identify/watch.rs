@@ -1,7 +1,6 @@
 //! External torques along a log or a stream, row by row, with alarms.
 
 use std::io::Read;
-use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -20,7 +19,7 @@ use cft_ident_core::motion::{FilterSettings, ZeroOrderHold};
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::held_out::{Excesses, HeldOut};
-use cft_ident_logs::log::{Block, Instant, LogSpec, Provenance, Reader};
+use cft_ident_logs::log::{Block, Instant, Provenance, Reader};
 
 /// Name of a stream in messages and results.
 pub const STREAM: &str = "-";
@@ -70,8 +69,7 @@ pub struct WatchedJoint {
     pub blind: bool,
 }
 
-/// Share of the greatest torque of a joint from which on a threshold hardly shows anything: a push that needs half of
-/// what the drive gives is a crash.
+/// Share of a joint's greatest torque from which on a threshold shows only crashes.
 const BLIND_SHARE: f64 = 0.5;
 
 /// What was seen along a log or a stream.
@@ -184,8 +182,8 @@ pub fn watch(
             STREAM.to_owned(),
         ),
         Watchable::Log(log) => {
-            let reader = match is_json(&log) {
-                Some(file) => Reader::of_stream(&log.name(), Box::new(file), &layout)?,
+            let reader = match json_lines(&log) {
+                Some(file) => Reader::of_stream(&log.name(), file, &layout)?,
                 None => log.reader(&layout, machine.robot.joint_names())?,
             };
             warm = takes.then(|| log.clone());
@@ -294,20 +292,15 @@ pub fn watch(
     })
 }
 
-/// A file of JSON lines, opened.
-fn is_json(log: &Log) -> Option<std::fs::File> {
-    let Log::File(LogSpec { path, .. }) = log else {
+/// The bytes of a file of JSON lines.
+fn json_lines(log: &Log) -> Option<Box<dyn Read + Send>> {
+    let Log::File(spec) = log else {
         return None;
     };
-    let first = |path: &Path| -> std::io::Result<bool> {
-        let mut head = [0; 64];
-        let count = std::fs::File::open(path)?.read(&mut head)?;
-        Ok(head[..count].trim_ascii_start().first() == Some(&b'{'))
-    };
-    match first(path) {
-        Ok(true) => std::fs::File::open(path).ok(),
-        _ => None,
-    }
+    let mut head = [0; 64];
+    let count = spec.bytes().ok()?.read(&mut head).ok()?;
+    let is_json = head[..count].trim_ascii_start().first() == Some(&b'{');
+    spec.bytes().ok().filter(|_| is_json)
 }
 
 /// The word about joints that cannot be watched.
