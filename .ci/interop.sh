@@ -1,10 +1,11 @@
 #!/bin/bash
 # The official Python packages of MCAP, ROS 2 and protobuf against this tool, both ways.
-#   .ci/interop.sh
+#   .ci/interop.sh TOOL
 # Installs the packages into a folder of its own, has them write a log that no fixture holds in every
 # format and runs the tests of the fixtures on it; then has them read what this tool writes. Says so,
 # and passes, where the packages cannot be had.
 set -u
+tool=$(realpath "${1:?the built cft-ident}") || exit 1
 cd "$(dirname "$0")/.." || exit 1
 
 skip() {
@@ -25,10 +26,11 @@ timeout 300 "$work/venv/bin/pip" install --quiet --disable-pip-version-check \
 export PYTHONDONTWRITEBYTECODE=1
 
 # Theirs, read by this tool: another motion and another seed than those of the fixtures.
-tool() { cargo run --locked --quiet -- "$@" < /dev/null; }
+tool() { "$tool" "$@" < /dev/null; }
 tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/sim.csv" > /dev/null || exit 1
 "$work/venv/bin/python" fixtures/logs/make.py "$work/sim.csv" "$work/logs" || exit 1
-CFT_IDENT_LOGS="$work/logs" cargo test --locked -p cft-ident-logs --test logs log_fixtures || exit 1
+# the whole workspace's build, which the tests have made already: one package alone has other features
+CFT_IDENT_LOGS="$work/logs" cargo test --locked --test logs log_fixtures || exit 1
 
 # This tool's, read by them.
 if ! tool help convert > /dev/null 2>&1; then
