@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::ExciteError;
 use super::information::{Information, normalised};
-use super::judgement::GivenTogether;
 use super::machine::ForeseenRobot;
 use super::motion::Motion;
 use cft_ident_core::inertia::columns::Own;
@@ -23,6 +22,13 @@ const NOTHING: f64 = 1e-8;
 const NOTHING_OF_SQUARES: f64 = 1e-13;
 /// Share of an unknown in a direction that is not excited from which on it counts as open.
 const OPEN_SHARE: f64 = 1e-3;
+
+/// Expected deviations together with what is given besides.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct GivenTogether {
+    pub parameters: Vec<Expected>,
+    pub confounded: Option<Pair>,
+}
 
 /// Condition numbers of the unweighted stacked regressor; null where its rank is short.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]

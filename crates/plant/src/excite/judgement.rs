@@ -4,7 +4,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::foresee::{Condition, Expected, Pair, UnknownShare, expected, foresee, information};
+use super::foresee::{
+    Condition, Expected, GivenTogether, Pair, UnknownShare, expected, foresee, information,
+};
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::motion::{spectrum, torque_band};
@@ -109,13 +111,6 @@ pub struct LimitUse {
     /// Time at which it comes nearest \[s\]; a share of the way on one.
     pub t: f64,
     pub broken: bool,
-}
-
-/// Expected deviations together with what is given besides.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct GivenTogether {
-    pub parameters: Vec<Expected>,
-    pub confounded: Option<Pair>,
 }
 
 /// Expected deviations of a friction law.

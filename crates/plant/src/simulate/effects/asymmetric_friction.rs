@@ -10,8 +10,6 @@ pub static LAW: PlantLaw = PlantLaw {
     defaults: |site| vec![0.1 * site.scale, 0.1 * site.scale / site.speed],
     build: |site, _, values| {
         let (coulomb, viscous, slope) = (values[0], values[1], site.slope());
-        Built::torque(site, move |m| {
-            (coulomb + viscous * m.v) * step(slope, m.v)
-        })
+        Built::torque(site, move |m| (coulomb + viscous * m.v) * step(slope, m.v))
     },
 };

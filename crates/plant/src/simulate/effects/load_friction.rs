@@ -14,7 +14,10 @@ pub static LAW: PlantLaw = PlantLaw {
     build: |site, _, values| {
         let most = values[0].abs() + values[1].abs() * 4.0 * site.speed;
         if most >= MAX_LOAD_SHARE {
-            let (key, beyond) = ("mu_c + mu_v |v|", "beyond it the joint locks itself under load");
+            let (key, beyond) = (
+                "mu_c + mu_v |v|",
+                "beyond it the joint locks itself under load",
+            );
             let rule = format!("must stay below {MAX_LOAD_SHARE}: {beyond}");
             return Err(SimulateError::number(ENTRY.name, key, most, rule));
         }

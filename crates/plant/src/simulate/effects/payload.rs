@@ -36,15 +36,16 @@ fn build(_: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Simula
     if robot.tool_stays_level() {
         return carried(mass, [mx / mass, mz / mass], inertia);
     }
-    on_last_link(robot.tree().clone(), mass, Vector3::new(mx, my, mz) / mass, inertia)
+    on_last_link(
+        robot.tree().clone(),
+        mass,
+        Vector3::new(mx, my, mz) / mass,
+        inertia,
+    )
 }
 
 /// At a place in the frame of link 8 \[m\], whose height does not matter, for the tool stays level.
-fn carried(
-    carried: f64,
-    [outward, side]: [f64; 2],
-    inertia: f64,
-) -> Result<Built, SimulateError> {
+fn carried(carried: f64, [outward, side]: [f64; 2], inertia: f64) -> Result<Built, SimulateError> {
     Built::inertia(move |motion, mass, torque| {
         let (Some(&[_, q2, q4, q5]), Some(&[v1, v2, v4, v5])) =
             (motion.q.first_chunk(), motion.v.first_chunk())
