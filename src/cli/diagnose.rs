@@ -104,7 +104,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         },
     };
     // before the logs are looked at
-    settings.check_candidates()?;
+    settings.check_candidates(&machine)?;
     let report = setup::report(&data, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
     if let Some(fault) = fault.as_ref().filter(|_| !args.as_declared) {

@@ -44,7 +44,11 @@ pub fn robot(path: &Path) -> Result<ReadFile<RobotFile>, CliError> {
 pub fn model(path: &Path, context: &Context) -> Result<ReadFile<GivenModel>, CliError> {
     let model = read(path, Wanted::Own, |name, text| {
         let file = ModelFile::parse_in(name, text, path.parent())?;
-        Ok(GivenModel::new(name, file))
+        // the name for messages may be cut
+        Ok(GivenModel {
+            file_name: file_name(path),
+            ..GivenModel::new(name, file)
+        })
     })?;
     let notes = model.value.file.robot.notes.0.iter();
     notes.for_each(|shown| context.warn(shown));

@@ -85,7 +85,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         Some(payload) => {
             let payload = payload.as_ref().map(KnownPayload::known);
             let fitted = identify::fit_gains(&data, payload.as_ref(), &context.control)?;
-            let data = Dataset::new(&fitted.machine, &data.logs);
+            let data = Dataset {
+                machine: fitted.machine,
+                ..data
+            };
             (data, Some(fitted.gains), fitted.edits)
         }
     };

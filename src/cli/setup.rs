@@ -47,7 +47,10 @@ pub fn checked(
     context: &Context,
 ) -> Result<Checked, CliError> {
     let data = match args.as_declared {
-        true => Dataset::new(&data.machine.as_declared(), &data.logs),
+        true => Dataset {
+            machine: data.machine.as_declared(),
+            ..data
+        },
         false => data,
     };
     let machine = &data.machine;
@@ -91,7 +94,7 @@ pub fn checked(
     warnings.extend(refusals.iter().map(right));
     let machine = LoggedRobot::new(&path.to_string_lossy(), corrected);
     Ok(Checked {
-        data: Dataset::new(&machine, &data.logs),
+        data: Dataset { machine, ..data },
         report,
         warnings,
         new_file: Some((path.clone(), text)),

@@ -78,12 +78,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs([&*args.log.path, &*args.model], [&*args.output])?;
     let given = files::model(&args.model, context)?;
     let (name, file) = (&given.value.name, &given.value.file);
-    let machine = given.value.machine();
-    let joints = machine.robot.joint_names();
+    let joints = given.value.file.robot.joint_names();
     let n = joints.len();
     let kinds = ["tau", "tau_std", "band_lower", "band_upper"];
     let kinds = &kinds[..if file.held_out.is_empty() { 2 } else { 4 }];
-    let columns = columns_of(kinds, joints);
+    let columns = columns_of(kinds, &joints);
     let (log, trajectory) = match args.log.path.extension().is_some_and(|end| end == "toml") {
         true => planned(&args.log.path, (name, file), context)?,
         false => (Log::from(&args.log), None),

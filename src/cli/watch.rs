@@ -140,11 +140,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs = paths_of(&args.unloaded).chain([&*args.model]).chain(log);
     context.check_outputs(inputs, args.output.as_deref())?;
     let given = files::model(&args.model, context)?;
-    let machine = given.value.machine();
-    let joints = machine.robot.joint_names();
+    let robot = &given.value.file.robot;
+    let joints = robot.joint_names();
     let mut sink = match &args.output {
         Some(path) => {
-            let mut columns = columns_of(&["external", "external_std"], joints);
+            let mut columns = columns_of(&["external", "external_std"], &joints);
             columns.push("alarm".to_owned());
             Sink::File(Box::new(LogWriter::create(path, &columns)?))
         }
@@ -155,7 +155,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             rows: 0,
             status: context.progress("watching", None),
             units: (joints.iter().enumerate())
-                .map(|(j, joint)| (joint.clone(), machine.file.torque_unit(j)))
+                .map(|(j, joint)| (joint.clone(), robot.torque_unit(j)))
                 .collect(),
         }),
         None => Sink::Lines(Lines {

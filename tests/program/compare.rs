@@ -236,6 +236,19 @@ fn the_tables_fit_80_columns_and_the_pictures_are_written() {
 }
 
 #[test]
+fn models_in_deep_folders_have_their_whole_names() {
+    let folder = bench();
+    let deep = ["of-one-robot-of-many"; 8].join("/");
+    fs::create_dir_all(folder.path().join(&deep)).unwrap();
+    let long = format!("{}.toml", "a".repeat(60));
+    let moved = folder.path().join(&deep).join(&long);
+    fs::copy(folder.path().join("a.toml"), moved).unwrap();
+    let found = json(folder.path(), &format!("compare {deep}/{long} b.toml"));
+    assert_eq!(found["models"][0]["name"], long);
+    assert_eq!(found["models"][1]["name"], "b.toml");
+}
+
+#[test]
 fn models_of_different_robots_are_refused_with_their_joints() {
     let folder = bench();
     let at = folder.path();

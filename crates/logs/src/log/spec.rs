@@ -187,7 +187,7 @@ impl LogSpec {
     ///
     /// # Errors
     /// A file that cannot be opened.
-    pub fn bytes(&self) -> Result<Box<dyn Read + Send>, LogError> {
+    pub fn stream(&self) -> Result<Box<dyn Read + Send>, LogError> {
         Ok(Box::new(source::open(&self.path)?))
     }
 

@@ -335,7 +335,7 @@ impl Compared {
         let model = |side: &Side| {
             let from = &side.given.file.provenance;
             ComparedModel {
-                name: side.given.file_name().to_owned(),
+                name: side.given.file_name.clone(),
                 version: from.version.clone(),
                 command: from.command.clone(),
                 inputs: from.inputs.clone(),
@@ -390,7 +390,7 @@ impl Compared {
 
     /// Name of a model's file.
     pub fn name(&self, side: usize) -> String {
-        self.sides[side].given.file_name().to_owned()
+        escape(&self.sides[side].given.file_name)
     }
 
     /// Parameters that differ by more than chance explains, the largest deviation first.

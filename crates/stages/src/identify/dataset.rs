@@ -57,13 +57,17 @@ impl Dataset {
 pub struct GivenModel {
     /// The file as the user named it, for messages.
     pub name: String,
+    /// Its name without folders, as it is.
+    pub file_name: String,
     pub file: ModelFile,
 }
 
 impl GivenModel {
     pub fn new(name: &str, file: ModelFile) -> Self {
+        let path = Path::new(name).file_name();
         GivenModel {
             name: name.to_owned(),
+            file_name: path.map_or(name.to_owned(), |last| last.to_string_lossy().into_owned()),
             file,
         }
     }
@@ -79,11 +83,5 @@ impl GivenModel {
     /// A file that lacks a parameter, or an effect that cannot be.
     pub fn numbers(&self) -> Result<AugmentedModel, IdentifyError> {
         refined(&self.file, &self.name)
-    }
-
-    /// Name of the file, without folders.
-    pub fn file_name(&self) -> &str {
-        let name = Path::new(&self.name).file_name();
-        name.and_then(|name| name.to_str()).unwrap_or(&self.name)
     }
 }

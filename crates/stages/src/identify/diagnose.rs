@@ -109,8 +109,8 @@ impl<'a> DiagnoseSettings<'a> {
     ///
     /// # Errors
     /// Formulas that are none on this robot, and a name that the model has for another effect.
-    pub fn check_candidates(&self) -> Result<(), IdentifyError> {
-        own_laws(&self.candidates, &self.model.file.robot.robot())?;
+    pub fn check_candidates(&self, machine: &LoggedRobot) -> Result<(), IdentifyError> {
+        own_laws(&self.candidates, &machine.robot)?;
         let other = |own: &&CandidateSection| {
             let mut known = self.model.file.candidates.iter();
             known.any(|known| known.name == own.name && known != *own)
@@ -140,7 +140,7 @@ pub fn diagnose(
     let plain = as_given.as_fitted();
     let file = &plain;
     let given = refined(file, name)?;
-    settings.check_candidates()?;
+    settings.check_candidates(machine)?;
     let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
     let mut judged = file.parameters.iter().filter(judged).peekable();
     let determined = |p: &Parameter| matches!(p.verdict, Some(Verdict::Identified | Verdict::Weak));

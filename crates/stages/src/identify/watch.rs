@@ -298,9 +298,9 @@ fn json_lines(log: &Log) -> Option<Box<dyn Read + Send>> {
         return None;
     };
     let mut head = [0; 64];
-    let count = spec.bytes().ok()?.read(&mut head).ok()?;
+    let count = spec.stream().ok()?.read(&mut head).ok()?;
     let is_json = head[..count].trim_ascii_start().first() == Some(&b'{');
-    spec.bytes().ok().filter(|_| is_json)
+    spec.stream().ok().filter(|_| is_json)
 }
 
 /// The word about joints that cannot be watched.
