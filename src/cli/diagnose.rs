@@ -50,9 +50,6 @@ pub struct Args {
     /// Leave the friction of the model file as it is; its covariance stays in the deviations
     #[arg(hide_short_help = true, long, conflicts_with = "keep")]
     pub hold_friction: bool,
-    /// Write the midpoint between the given model and the refined one
-    #[arg(hide_short_help = true, long)]
-    pub cautious: bool,
     /// Search a formula for what is left of each joint; --accept formula:JOINT writes it
     #[arg(long)]
     pub search: bool,
@@ -98,7 +95,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         candidates: own.map_or(Vec::new(), |given| given.value),
         hold_friction: args.hold_friction,
         wishes: Wishes {
-            cautious: args.cautious,
             search: args.search,
             accepted: args.accept.iter().map(|text| accepted(text)).collect(),
         },

@@ -27,6 +27,9 @@ pub enum DiagnoseError {
     Formula(Box<FormulaError>),
     #[explain("interrupted")]
     Interrupted,
+    /// The fit beside the effects failed; who made it knows why.
+    #[explain("the model cannot be fitted beside the effects that were found")]
+    Refit,
 }
 
 impl From<FormulaError> for DiagnoseError {

@@ -44,20 +44,6 @@ pub struct EffectChange {
     pub joints: Vec<JointChange>,
 }
 
-impl EffectChange {
-    /// The joint that it makes worse by the most, beyond its interval.
-    pub fn worst(&self) -> Option<f64> {
-        let worse = self.joints.iter().filter(|j| j.noticeably_worse());
-        let by = worse.map(|j| (j.after - j.before) / j.before);
-        by.max_by(f64::total_cmp)
-    }
-
-    /// Whether a joint gains beyond its interval.
-    pub fn confirms(&self) -> bool {
-        self.joints.iter().any(JointChange::improved)
-    }
-}
-
 impl<'a> HeldOutRows<'a> {
     pub fn of((case, split, together): (&'a Case, &'a DataSplit, usize), role: LogRole) -> Self {
         HeldOutRows {
@@ -77,11 +63,6 @@ impl<'a> HeldOutRows<'a> {
     pub fn errors(&self, model: &AugmentedModel) -> Result<Option<Errors>, MotionError> {
         let pieces = self.pieces(model)?;
         Ok(errors::summed(self.case, (&pieces, self.together)))
-    }
-
-    /// Mean relative error of a model over the joints; none where there are no such rows.
-    pub fn mean_error(&self, model: &AugmentedModel) -> Result<Option<f64>, MotionError> {
-        Ok(errors::mean_relative_error(&self.pieces(model)?))
     }
 
     /// What the second model changes; none where there are no such rows.

@@ -1,14 +1,14 @@
 //! From a residual to the effect that the model lacks.
 //!
 //! ```text
-//! logs -> stretches -> data split -> fit of what is declared -> blocks and parts
+//! logs -> stretches -> data split -> fit of what is declared -> blocks
 //!      -> one pass over the rows: sums of products of every candidate per block and joint
-//!      -> search (friction laws, then all else) -> parts -> two tables -> held-out data
+//!      -> search (friction laws, then all else) -> the set settles -> the model is fitted beside it -> held-out data
 //! ```
 //!
-//! What decides is the [judge](crate::judge): blocks of time left out screen, the agreement of an amplitude between
-//! parts of the data tests and shrinks it. What fits best and is not confirmed is reported, and nothing weaker is put in
-//! its place. Held-out data are looked at once, at the end.
+//! What decides is the [judge](crate::judge): blocks of time left out screen, and an amplitude over its deviation when
+//! each block is left out tests and shrinks it. What is not sure is reported, and nothing weaker is put in its place.
+//! Held-out data are looked at in the end.
 
 mod candidates;
 mod change;
@@ -38,8 +38,9 @@ pub use problem::case::{Case, Wishes};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::formula_numbers::{FORMULA_NUMBERS, FormulaNumbers};
 pub use problem::prior::ParameterPrior;
-pub use problem::unknowns::{FreeParameters, Unknown};
-pub use run::{diagnose, errors_of};
+pub use problem::unknowns::{FreeParameters, Unknown, value_of};
+pub use run::diagnose;
+pub use steps::{NotWritten, Proposal, Refit};
 pub use unexplained::Unexplained;
 pub use unexplained::dependence::Dependence;
 pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};

@@ -1,11 +1,12 @@
 //! What a diagnosis finds.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::problem::data_split::SetAside;
 use super::problem::unknowns::Unknown;
+use super::steps::NotWritten;
 use super::unexplained::Unexplained;
 use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::{Errors, JointChange};
@@ -19,33 +20,37 @@ use crate::robot::FormulaSignal;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepStatus {
-    /// All parts of the data ask for it, and held-out data gain by it where there are any.
+    /// Its amplitude is eleven of its deviations or more off zero, and it is written.
     Confirmed,
-    /// The parts agree, with doubt.
+    /// Five deviations or more: it is written in part.
     Indicated,
-    /// It fits best and the parts do not agree: it is not written.
+    /// It gains on blocks left out, and is not written.
     Seen,
 }
 
 /// One effect that gained on blocks left out.
 #[derive(Debug, Clone)]
 pub struct FoundEffect {
-    /// With the amplitude of the joint fit of all effects whose parts agree; of one that is seen alone, of the fit with
-    /// all that was found.
+    /// With the amplitude of the joint fit of all effects that stand; of one that does not, of the fit of these and it.
     pub estimate: Added,
-    /// Covariance of its (shape, linear), row-major; a shape that is not refined has none.
+    /// Covariance of its (shape, linear), row-major; a shape that is not free has none.
     pub covariance: Vec<f64>,
-    /// Its place in the effects of the judge's model; none where the parts do not agree.
-    pub judged: Option<usize>,
     /// Its place in the effects of the model that is written.
     pub written: Option<usize>,
     pub status: StepStatus,
-    /// Factor of its amplitude that the parts' agreement gives, 0..1.
+    /// Why it is not written, where it is not.
+    pub left: Option<NotWritten>,
+    /// Factor of its amplitude in predictions, 0..1.
     pub shrinkage: f64,
-    pub agreement: f64,
-    /// Amplitudes of its coefficients by part of the data.
+    /// How many deviations one number would have to be off zero to be as sure.
+    pub deviations: f64,
+    /// Root mean square of its torque at the joint where it is strongest, and the standard deviation [N or Nm].
+    pub torque: [f64; 2],
+    /// Number of blocks that hold the information on it.
+    pub blocks: f64,
+    /// Amplitudes of its coefficients by block of the data.
     pub parts: Vec<Vec<f64>>,
-    /// Gain on blocks left out, beside the effects before it.
+    /// Gain on blocks left out, beside all that stand.
     pub gain: ErrorGain,
     /// Part of the squared error of these blocks that it takes off.
     pub share: f64,
@@ -62,7 +67,7 @@ pub struct FoundEffect {
 impl FoundEffect {
     /// Whether held-out data took it out.
     pub fn vetoed(&self) -> bool {
-        self.judged.is_some() && self.written.is_none()
+        self.left == Some(NotWritten::HeldOut)
     }
 }
 
@@ -102,12 +107,12 @@ pub struct FrictionChange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FormulaEnd {
-    /// It gains on blocks left out, all parts agree, no joint gets worse, and chance makes none as good.
+    /// It gains on blocks left out, its amplitude is sure, no joint gets worse, and chance makes none as good.
     Found,
     /// Searches where whole parts have another sign find as much.
     Chance,
-    /// The parts of the data do not agree on it, or it gains too little beside the rest.
-    Parts,
+    /// Its amplitude is too uncertain, or it gains too little beside the rest.
+    Unsure,
     /// A joint gets worse by it on data set aside.
     Worse,
 }
@@ -128,7 +133,7 @@ pub struct FoundFormula {
     pub symmetry: Symmetry,
     /// What its terms are functions of.
     pub signals: Vec<(FormulaSignal, usize)>,
-    /// None where the parts do not agree, or nothing is held out.
+    /// None where it is not sure enough, or nothing is held out.
     pub picture: Option<FormulaPicture>,
     /// Root mean square of the residual without and with it within 0.1 s of a reversal, on the same data.
     pub at_reversals: Option<[f64; 2]>,
@@ -169,21 +174,25 @@ pub struct WhatIsLeft {
 
 /// The outcome.
 pub struct Diagnosis {
-    /// The model that is written: the given one where nothing is.
+    /// The model that is written, with the declared numbers by the judge's sums: the given one where nothing is.
     pub model: AugmentedModel,
+    /// What torques are computed with.
+    pub in_use: AugmentedModel,
     /// Unknowns of the declared model, and their covariance with every effect of the estimates, by the block jackknife.
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
-    /// Information matrix of those unknowns beside fixed effects, in independent rows.
-    pub information: DMatrix<f64>,
-    /// The declared parameters of the joint fit with every effect whose parts agree, unshrunk.
+    /// What the uncertainty of the effects' amplitudes adds to the covariance of the unknowns beside them.
+    pub by_effects: DMatrix<f64>,
+    /// How far the unknowns beside the whole effects are from those beside the parts that predict.
+    pub to_estimate: DVector<f64>,
+    /// The declared parameters of the joint fit with every effect that stands, unshrunk.
     pub estimates: AugmentedModel,
     pub steps: Vec<FoundEffect>,
     pub candidates: Vec<LeftCandidate>,
     pub before: SplitErrors,
     /// The declared model refitted to these logs, with nothing added.
     pub refitted: Errors,
-    /// By the judge's model, before held-out data had a say.
+    /// With every effect that stood before held-out data had a say.
     pub after: SplitErrors,
     /// By the model that is written, where held-out data took something out of it.
     pub selected: Option<SplitErrors>,
@@ -199,11 +208,11 @@ pub struct Diagnosis {
     pub fitted_logs: usize,
     /// Neighbouring pieces of the rows that intervals of errors draw together.
     pub together: usize,
-    /// Parts of the data that are asked, and the least length of a block \[s\].
-    pub parts: usize,
+    /// Blocks of the data, and the least length of one \[s\].
+    pub blocks: usize,
     pub block_s: f64,
-    /// Parts that would be enough.
-    pub parts_needed: usize,
+    /// With fewer blocks nothing is written.
+    pub least_blocks: usize,
     /// Whether the declared model explains more of blocks left out than no torque does.
     pub determined: bool,
     /// Formulas of what is left, where they were looked for.
@@ -232,44 +241,13 @@ impl Diagnosis {
         self.steps.iter().any(FoundEffect::vetoed)
     }
 
-    /// Errors of the judge's model; of the given one where all that was found was taken out again.
+    /// Errors of the model that is written.
     pub fn errors_now(&self) -> &SplitErrors {
-        match self.selected.is_some() && self.written().next().is_none() {
-            true => &self.before,
-            false => &self.after,
-        }
+        self.selected.as_ref().unwrap_or(&self.after)
     }
 
-    /// Leaves the model as it was `given`, for with what was found it is worse on held-out data, or on all data where
-    /// none are held out: whether it was so.
-    pub fn withdraw_worse(&mut self, given: &AugmentedModel) -> bool {
-        let after = self.selected.as_ref().unwrap_or(&self.after);
-        let sides = [&self.before, after];
-        let errors = match sides.map(|s| s.holdout.as_ref()) {
-            [Some(before), Some(after)] => [before, after],
-            _ => sides.map(|s| &s.train),
-        };
-        let [before, after] = errors.map(|e| e.overall.mean_relative_error);
-        let wanted = self.written().any(|step| step.accepted_by_user);
-        if wanted || self.written().next().is_none() || after <= before {
-            return false;
-        }
-        for step in &mut self.steps {
-            step.written = None;
-            if step.status == StepStatus::Confirmed {
-                step.status = StepStatus::Indicated;
-            }
-        }
-        self.selected = Some(self.before.clone());
-        if let Some(alone) = self.left_alone.take() {
-            self.left = alone;
-        }
-        self.model = given.clone();
-        true
-    }
-
-    /// Whether there is data enough for the parts to confirm anything.
+    /// Whether there is data enough for anything to be written.
     pub fn long_enough(&self) -> bool {
-        self.parts >= self.parts_needed
+        self.blocks >= self.least_blocks
     }
 }

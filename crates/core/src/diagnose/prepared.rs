@@ -14,6 +14,7 @@ use super::problem::data_split::{DataSplit, LogRole, Piece};
 use super::problem::fit::{Fitted, fit};
 use super::problem::pass::{ColumnLayout, Data};
 use super::problem::unknowns::{Unknowns, step};
+use super::steps::Refit;
 use super::unexplained::errors::Errors;
 use crate::effect::{Added, AugmentedModel, Cover};
 use crate::judge::{
@@ -25,6 +26,7 @@ use crate::robot::model::JointFriction;
 /// The declared model fitted, and the data divided.
 pub struct PreparedCase<'a> {
     pub case: &'a Case,
+    pub refit: &'a Refit<'a>,
     pub data: Data<'a>,
     pub unknowns: Unknowns,
     pub fitted: Fitted,
@@ -49,7 +51,11 @@ pub struct Summed {
 }
 
 impl<'a> PreparedCase<'a> {
-    pub fn of(case: &'a Case, split: &'a DataSplit) -> Result<Self, DiagnoseError> {
+    pub fn of(
+        case: &'a Case,
+        split: &'a DataSplit,
+        refit: &'a Refit<'a>,
+    ) -> Result<Self, DiagnoseError> {
         let numbers = &case.numbers;
         let data = Data {
             stretches: &case.stretches,
@@ -58,7 +64,7 @@ impl<'a> PreparedCase<'a> {
             rest_speed: &case.rest_speed,
         };
         let logs = split.logs(&case.stretches, LogRole::Train);
-        let whole = divide(&logs, f64::INFINITY, numbers).list;
+        let whole = divide(&logs, f64::INFINITY, (1, 1)).list;
         let fitted = fit(case, &case.given, (&data, &whole), None)?;
         let train = case.stretches_of(LogRole::Train);
         let mut cover = Cover::of(&case.given.model.robot, &train, case.cutoff_hz);
@@ -70,6 +76,7 @@ impl<'a> PreparedCase<'a> {
         let prepared = PreparedCase {
             together: 1,
             case,
+            refit,
             data,
             unknowns: case.unknowns(),
             fitted,
@@ -78,12 +85,12 @@ impl<'a> PreparedCase<'a> {
             all_blocks: Vec::new(),
         };
         let prepared = prepared.divided(&logs, memory);
-        if prepared.blocks.parts >= numbers.parts {
+        if prepared.blocks.list.len() >= numbers.blocks {
             return Ok(prepared);
         }
         let rest = prepared.memory_of_rest(&logs)?;
         let finer = prepared.divided(&logs, rest.min(memory));
-        Ok(match finer.blocks.parts < numbers.parts {
+        Ok(match finer.blocks.list.len() < numbers.blocks {
             true => finer.divided(&logs, memory),
             false => finer,
         })
@@ -96,8 +103,9 @@ impl<'a> PreparedCase<'a> {
         let reach = |s: &Stretch| case.filters.of(s).trim as f64 * s.dt;
         let reach = case.stretches.iter().map(reach).fold(0.0, f64::max);
         let least = (numbers.memory_times * memory).max(reach);
-        self.blocks = divide(logs, least, numbers);
-        let judging = divide(&split.logs(&case.stretches, LogRole::Veto), least, numbers);
+        let count = (numbers.blocks, 1);
+        self.blocks = divide(logs, least, count);
+        let judging = divide(&split.logs(&case.stretches, LogRole::Veto), least, count);
         self.all_blocks = [self.blocks.list.as_slice(), &judging.list].concat();
         let rows = |p: &Piece| p.rows.len() as f64 * split.step_s[p.stretch];
         let lengths: Vec<f64> = split.pieces.iter().map(rows).collect();
@@ -146,7 +154,7 @@ impl<'a> PreparedCase<'a> {
     }
 
     /// The declared model fitted anew beside effects that are held.
-    pub fn refit(&self, start: &AugmentedModel) -> Result<AugmentedModel, MotionError> {
+    pub fn refitted(&self, start: &AugmentedModel) -> Result<AugmentedModel, MotionError> {
         let data = (&self.data, self.blocks.list.as_slice());
         Ok(fit(self.case, start, data, Some(&self.fitted.weights))?.model)
     }

@@ -5,13 +5,12 @@ use rayon::prelude::*;
 
 use super::change::friction_changes;
 use super::error::DiagnoseError;
-use super::held_out::split_errors;
-use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors, WhatIsLeft};
+use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, WhatIsLeft};
 use super::prepared::{PreparedCase, filtered, residuals};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
 use super::searched::SearchedCase;
-use super::steps::{Judged, judge};
+use super::steps::{Judged, NotWritten, Refit, judge};
 use super::unexplained::dependence::{Left, dependences};
 use super::unexplained::noise_floor::floor;
 use super::unexplained::{part_unexplained, unexplained};
@@ -20,14 +19,15 @@ use crate::effect::{AugmentedModel, Search};
 use crate::judge::Numbers;
 use crate::motion::Stretch;
 
-/// Diagnoses; `watch` hears of every step and is asked now and then whether to stop.
+/// Diagnoses; `refit` makes the models that would be written, `watch` hears of every step and is asked now and then
+/// whether to stop.
 ///
 /// # Errors
 /// [`DiagnoseError`].
-pub fn diagnose(case: &Case, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
+pub fn diagnose(case: &Case, refit: &Refit, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
     let split = case.split();
     check(case, &split)?;
-    let prepared = PreparedCase::of(case, &split)?;
+    let prepared = PreparedCase::of(case, &split, refit)?;
     watch.unless_stopped()?;
     let searched = prepared.search(watch)?;
     watch.unless_stopped()?;
@@ -42,18 +42,6 @@ pub fn diagnose(case: &Case, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
         found.formulas = formulas.formulas;
     }
     Ok(found)
-}
-
-/// Errors of another model on the rows of a diagnosis, pieces drawn together as it had them.
-///
-/// # Errors
-/// [`DiagnoseError`].
-pub fn errors_of(
-    case: &Case,
-    together: usize,
-    model: &AugmentedModel,
-) -> Result<SplitErrors, DiagnoseError> {
-    split_errors((case, &case.split(), together), model)
 }
 
 /// Refuses what cannot be fitted.
@@ -80,14 +68,14 @@ impl PreparedCase<'_> {
         judged: Judged,
     ) -> Result<Diagnosis, DiagnoseError> {
         let case = self.case;
-        let before = self.split_errors(&case.given)?;
+        let before = self.split_errors(&case.in_use)?;
         let refitted = self.split_errors(&self.fitted.model)?.train;
         let after = self.split_errors(&judged.judge)?;
         let had_a_say = judged.steps.iter().any(FoundEffect::vetoed);
         let selected = had_a_say.then(|| self.split_errors(&judged.written));
+        let added = judged.steps.iter().any(|step| step.written.is_some());
         // what is left is looked at with the numbers refitted: those that other logs gave are no missing physics
         let alone = &self.fitted.model;
-        let added = judged.written.effects.len() > case.given.effects.len();
         let last = if added { &judged.written } else { alone };
         let left = self.what_is_left(last)?;
         let residual_std = rms_of(&filtered(last, &self.data)?, self.data.split);
@@ -95,13 +83,15 @@ impl PreparedCase<'_> {
             left,
             left_alone: added.then(|| self.what_is_left(alone)).transpose()?,
             changes: friction_changes(self, searched),
-            candidates: left_candidates(searched, &case.numbers),
+            candidates: left_candidates(searched, &judged.steps, &case.numbers),
             determined: searched.determined,
-            model: judged.written,
+            model: judged.proposed,
+            in_use: judged.written,
             estimates: judged.estimates,
             covariance: judged.covariance,
-            information: judged.information,
-            steps: judged.steps,
+            by_effects: judged.by_effects,
+            to_estimate: judged.to_estimate,
+            steps: named(judged.steps),
             unknowns: self.unknowns.list.clone(),
             before,
             refitted,
@@ -111,9 +101,9 @@ impl PreparedCase<'_> {
             residual_std,
             fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
             together: self.together,
-            parts: self.blocks.parts,
+            blocks: self.blocks.list.len(),
             block_s: self.blocks.least_s,
-            parts_needed: case.numbers.parts,
+            least_blocks: case.numbers.least_blocks,
             formulas: Vec::new(),
         })
     }
@@ -169,9 +159,30 @@ fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
     (0..joints).map(of_joint).collect()
 }
 
-/// The best shape of every law and place that was not chosen, with why.
-fn left_candidates(searched: &SearchedCase, numbers: &Numbers) -> Vec<LeftCandidate> {
-    let mut out: Vec<LeftCandidate> = Vec::new();
+/// Effects that change what one would notice: the others are not named.
+fn named(mut steps: Vec<FoundEffect>) -> Vec<FoundEffect> {
+    steps.retain(|step| step.left != Some(NotWritten::Small));
+    steps
+}
+
+/// The best shape of every law and place that was not chosen or changes too little, with why.
+fn left_candidates(
+    searched: &SearchedCase,
+    steps: &[FoundEffect],
+    numbers: &Numbers,
+) -> Vec<LeftCandidate> {
+    let small = steps.iter().filter(|step| step.left == Some(NotWritten::Small));
+    let small = small.map(|step| LeftCandidate {
+        law: step.estimate.law,
+        place: step.estimate.place,
+        effect: Some(step.estimate.clone()),
+        score: Some(step.share),
+        reason: format!(
+            "takes less than {:.0} % off the error of any joint",
+            100.0 * numbers.noticeable
+        ),
+    });
+    let mut out: Vec<LeftCandidate> = small.collect();
     let effect = |i: usize| &searched.candidates[i].effect;
     for l in &searched.looked {
         let own = effect(l.candidate);

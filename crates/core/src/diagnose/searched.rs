@@ -4,17 +4,17 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, NotTried, candidates, is_friction_law};
+use super::candidates::{Candidate, NotTried, candidates, exclude, is_friction_law};
 use super::error::DiagnoseError;
 use super::prepared::{PreparedCase, Summed};
 use super::problem::fit::{declared_terms, determines_some};
 use super::problem::pass::{ColumnLayout, Data, pass};
 use super::search::{Chosen, Field, Looked};
-use super::tables::verified;
+use super::tables::Estimates;
 use super::watch::Watch;
 use crate::effect::{Added, AugmentedModel};
 use crate::explain::ErrorText;
-use crate::judge::{BlockSums, LEAST_PARTS, compare, weighted};
+use crate::judge::{BlockSums, compare, weighted};
 use crate::motion::{MotionError, Stretch};
 
 /// What the search came to.
@@ -120,7 +120,7 @@ impl PreparedCase<'_> {
         let error = weighted(&errors, weights);
         let (mut chosen, mut looked) = (Vec::new(), Vec::new());
         let mut directions = Vec::new();
-        if self.blocks.parts >= LEAST_PARTS {
+        if self.blocks.list.len() >= self.case.numbers.least_blocks {
             (chosen, looked) = field.search(Vec::new(), watch)?;
             let smooth = |c: &&Chosen| {
                 let effect = field.effect(c);
@@ -134,7 +134,8 @@ impl PreparedCase<'_> {
                 (chosen, looked) = field.search(laws, watch)?;
             }
         }
-        self.accept(&candidates, &looked, error, &mut chosen)?;
+        let field = self.field(&candidates, &summed);
+        self.accept(&field, &not_tried, &mut chosen)?;
         let mut noisier = None;
         if !chosen.is_empty() {
             summed = self.polished(&mut candidates, &summed, &chosen, &directions)?;
@@ -153,57 +154,90 @@ impl PreparedCase<'_> {
         })
     }
 
-    /// Friction laws in their best shape whose parts agree, with no amplitude.
+    /// Friction laws in their best shape that are sure, with no amplitude.
     fn agreed(
         &self,
         candidates: &mut [Candidate],
         summed: &Summed,
         laws: &[Chosen],
-    ) -> Result<Vec<Added>, MotionError> {
+    ) -> Result<Vec<Added>, DiagnoseError> {
         if laws.is_empty() {
             return Ok(Vec::new());
         }
         let polished = self.polished(candidates, summed, laws, &[])?;
         let field = self.field(candidates, &polished);
-        let found = verified(&field, laws, None);
-        let agreed = found.iter().filter(|v| v.agreement.s > 0.0);
-        let effects = agreed.map(|v| candidates[v.chosen.candidate].effect.clone());
+        let estimates = Estimates::of(&field, laws)?;
+        let numbers = field.numbers();
+        let sure = (laws.iter().zip(&estimates.places)).filter(|(_, place)| {
+            let found = estimates.fit.amplitude(&place.terms, (None, false), numbers);
+            found.s > 0.0
+        });
+        let effects = sure.map(|(c, _)| candidates[c.candidate].effect.clone());
         Ok(effects.collect())
     }
 
-    /// Adds the effects that the user wants.
+    /// Adds the effects that the user wants, each in the shape that gains most; what cannot stand beside one leaves.
     fn accept(
         &self,
-        candidates: &[Candidate],
-        looked: &[Looked],
-        error: f64,
+        field: &Field,
+        not_tried: &[NotTried],
         chosen: &mut Vec<Chosen>,
     ) -> Result<(), DiagnoseError> {
         let wishes = &self.case.wishes;
         for wanted in wishes.accepted.iter().filter(|w| !wishes.is_formula(w)) {
-            let is = |c: usize| self.case.is_named(&candidates[c].effect, wanted);
+            let is = |c: usize| self.case.is_named(&field.candidates[c].effect, wanted);
             if chosen.iter().any(|c| is(c.candidate)) {
                 continue;
             }
-            let own = looked.iter().filter(|l| is(l.candidate));
-            let best = own.max_by(|a, b| a.gain.value.total_cmp(&b.gain.value));
-            let best = best.ok_or_else(|| not_there(wanted))?;
+            let own: Vec<usize> = (0..field.candidates.len()).filter(|c| is(*c)).collect();
+            let Some(first) = own.first() else {
+                return Err(self.not_there(wanted, not_tried));
+            };
+            let effect = &field.candidates[*first].effect;
+            chosen.retain(|c| !exclude(field.effect(c), effect));
+            let terms = field.terms(chosen);
+            let left_out = field.left_out(&terms)?;
+            let with_gain = |candidate| (candidate, left_out.gain(field.terms_of(candidate)));
+            let gains = own.into_par_iter().map(with_gain).collect::<Vec<_>>();
+            let best = (gains.into_iter()).max_by(|a, b| a.1.value.total_cmp(&b.1.value));
+            let Some((candidate, gain)) = best else {
+                continue;
+            };
+            if left_out.share_of_its_own(field.terms_of(candidate)) <= self.case.numbers.ridge {
+                return Err(refused(
+                    (wanted.0.as_str(), wanted.1.as_deref()),
+                    ErrorText::new("these data do not show it: its torque is zero all along, or the same as that of other parameters").remedy("log a motion in which it differs from them"),
+                ));
+            }
             chosen.push(Chosen {
-                candidate: best.candidate,
-                gain: best.gain.clone(),
-                error,
+                candidate,
+                gain,
+                error: left_out.error(),
                 alternatives: Vec::new(),
             });
         }
         Ok(())
     }
+
+    /// Why an effect that the user wants is no candidate.
+    fn not_there(&self, wanted: &(String, Option<String>), not_tried: &[NotTried]) -> DiagnoseError {
+        let robot = &self.case.given.model.robot;
+        let own = not_tried.iter().find(|n| {
+            n.law.entry.name == wanted.0 && n.place.name(robot) == wanted.1
+        });
+        let why = match own {
+            Some(own) => ErrorText::new(&own.lacking),
+            None => ErrorText::new("there is no such effect at this place, or the model has it already: see `candidates` in the JSON document for those that there are").remedy("a formula is there with --search"),
+        };
+        refused((wanted.0.as_str(), wanted.1.as_deref()), why)
+    }
 }
 
-fn not_there((name, joint): &(String, Option<String>)) -> DiagnoseError {
-    let place = joint.as_ref().map_or(String::new(), |j| format!(" of {j}"));
+fn refused((name, joint): (&str, Option<&str>), why: ErrorText) -> DiagnoseError {
+    let place = joint.map_or(String::new(), |j| format!(" of {j}"));
     DiagnoseError::Accept {
         name: format!("{name}{place}"),
-        why: ErrorText::new("it was not among the candidates: see `candidates` in the JSON document for those that there are").remedy("a formula is there with --search"),
+        why,
     }
 }
 

@@ -1,67 +1,123 @@
-//! From what was chosen to what is written: the parts' verdict, held-out data, and the user's own word.
+//! From what was chosen to what is written: the set settles, the model is fitted beside it, held-out data look at both.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::error::DiagnoseError;
-use super::held_out::EffectChange;
+use super::held_out::{EffectChange, HeldOutRows};
 use super::outcome::{FoundEffect, StepStatus};
-use super::prepared::{PreparedCase, moved};
+use super::prepared::PreparedCase;
 use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
-use super::problem::unknowns::{Unknown, step, value};
+use super::problem::unknowns::{Unknown, step, value_of};
 use super::search::{Chosen, Field};
 use super::searched::SearchedCase;
-use super::tables::{self, Estimates, TermPlaces, Verified};
+use super::tables::{self, Estimates, Verified};
 use crate::effect::{Added, AugmentedModel};
+
+/// A model that would be written: effects with the amplitudes that predict, the declared numbers by the judge's sums.
+pub struct Proposal<'a> {
+    pub model: &'a AugmentedModel,
+    /// Information matrix of the unknowns beside fixed effects, in independent rows.
+    pub information: &'a DMatrix<f64>,
+}
+
+/// Fits the declared numbers beside the effects of a proposal, as the given model was fitted, and gives the model that
+/// torques would be computed with.
+pub type Refit<'a> = dyn Fn(&Proposal) -> Result<AugmentedModel, DiagnoseError> + Sync + 'a;
 
 /// What is made of the effects that were chosen.
 #[derive(Clone)]
 pub struct Judged {
     pub steps: Vec<FoundEffect>,
-    /// With every effect whose parts agree.
+    /// With the declared numbers by the judge's sums; the given model where nothing is written.
+    pub proposed: AugmentedModel,
+    /// As torques are computed, before held-out data took anything out.
     pub judge: AugmentedModel,
-    /// Without those that held-out data took out; the given model where nothing is left.
+    /// As torques are computed; the given model where nothing is left.
     pub written: AugmentedModel,
+    /// The joint fit with every effect that stands.
     pub estimates: AugmentedModel,
     pub covariance: DMatrix<f64>,
-    pub information: DMatrix<f64>,
+    /// What the effects' amplitudes add to the covariance of the unknowns.
+    pub by_effects: DMatrix<f64>,
+    /// From the unknowns beside the parts of effects that predict to those beside whole ones.
+    pub to_estimate: DVector<f64>,
+}
+
+/// Why an effect is not written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotWritten {
+    /// Its amplitude is too uncertain, or it can be measured and is not sure enough.
+    Unsure,
+    /// Beside the others a bound takes all of it, or what it cannot be without.
+    Bound,
+    /// It takes off no joint's error what one would notice.
+    Small,
+    /// Held-out data are worse with it.
+    HeldOut,
 }
 
 /// One effect on its way.
 struct Way {
-    verified: Verified,
+    chosen: Chosen,
     accepted: bool,
+    /// By the joint fit in which it was asked last.
+    found: Option<Found>,
+    left: Option<NotWritten>,
     /// Amplitude in the predicting model; none where it is not in it.
     amplitude: Option<Vec<f64>>,
     change: Option<EffectChange>,
-    vetoed: bool,
 }
 
-/// Asks the parts, then held-out data.
-pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
+/// What a joint fit makes of an effect.
+struct Found {
+    verified: Verified,
+    /// With its coefficients there.
+    effect: Added,
+    /// Of its (shape, linear), row-major.
+    covariance: Vec<f64>,
+}
+
+impl Way {
+    fn stands(&self) -> bool {
+        self.left.is_none()
+    }
+}
+
+/// Settles the set, then asks held-out data.
+pub fn judge(
+    prepared: &PreparedCase,
+    searched: &SearchedCase,
+) -> Result<Judged, DiagnoseError> {
+    let fitted = prepared.blocks.list.len();
     let mut work = Judging {
         prepared,
         field: prepared.field(&searched.candidates, &searched.summed),
-        refit: true,
+        noisier: searched.noisier.as_ref().map(|sums| sums.over(0..fitted)),
+        other_numbers: true,
     };
     let mut ways = work.ways(searched);
-    work.settle(&mut ways)?;
-    work.refit = work.wants_other_numbers(&ways)?;
-    let judge = work.written(&ways, true)?;
-    work.look(&mut ways)?;
-    let written = match ways.iter().any(|w| w.vetoed) {
-        true => work.written(&ways, false)?,
-        false => judge.clone(),
-    };
-    let written = work.halfway(written);
-    work.described(&ways, judge, written)
+    let mut estimates = work.settle(&mut ways)?;
+    work.other_numbers = work.wants_other_numbers(&ways)?;
+    let judge = work.written(&ways, &estimates)?;
+    let mut written = judge.clone();
+    while let Some(harm) = work.harm(&ways, &written.1)? {
+        ways[harm].left = Some(NotWritten::HeldOut);
+        estimates = work.settle(&mut ways)?;
+        written = work.written(&ways, &estimates)?;
+    }
+    work.ask_those_that_left(&mut ways)?;
+    work.held_out(&mut ways)?;
+    Ok(work.described(&ways, &estimates, (judge.1, written)))
 }
 
 struct Judging<'a> {
     prepared: &'a PreparedCase<'a>,
     field: Field<'a>,
+    /// Sums of all blocks with as much noise again in the positions.
+    noisier: Option<Vec<DMatrix<f64>>>,
     /// Whether these data want other declared numbers than those that were given.
-    refit: bool,
+    other_numbers: bool,
 }
 
 impl Judging<'_> {
@@ -77,65 +133,140 @@ impl Judging<'_> {
             let own = |name: &String| effect.name().starts_with(name);
             joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
         };
-        let noisier = searched.noisier.as_ref();
-        let verified = tables::verified(&self.field, &searched.chosen, noisier);
-        let way = |verified: Verified| {
-            let effect = self.field.effect(&verified.chosen);
+        let way = |chosen: &Chosen| {
+            let effect = self.field.effect(chosen);
             Way {
                 accepted: named(effect) || effect.law.formula.is_some() && formula_wanted(effect),
-                verified,
+                chosen: chosen.clone(),
+                found: None,
+                left: None,
                 amplitude: None,
                 change: None,
-                vetoed: false,
             }
         };
-        verified.into_iter().map(way).collect()
+        searched.chosen.iter().map(way).collect()
     }
 
-    /// Amplitudes of the predicting model: those of the joint fit with all effects whose parts agree, so far as they do.
-    fn settle(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
-        let factors: Vec<f64> = ways.iter().map(|w| self.factor(w)).collect();
-        let kept = ways.iter().zip(&factors).filter(|(_, f)| **f > 0.0);
-        let kept: Vec<Chosen> = kept.map(|(w, _)| w.verified.chosen.clone()).collect();
-        let estimates = Estimates::of(&self.field, &kept)?;
-        let mut at = self.prepared.unknowns.len();
-        for (way, factor) in ways.iter_mut().zip(factors).filter(|(_, f)| *f > 0.0) {
-            let count = way.verified.amplitude.len();
-            let own = estimates.values.rows(at, count);
-            way.verified.amplitude = own.iter().copied().collect();
-            // beside the others a bound may hold all of it, or what it cannot be without
-            let effect = tables::effect(&self.field, &way.verified.chosen, own.as_slice());
-            let there = own.iter().any(|x| *x != 0.0) && effect.can_be();
-            way.amplitude = there.then(|| own.iter().map(|x| factor * x).collect());
-            at += count;
+    /// Lets effects leave until all that stand pass beside one another, the least sure first.
+    fn settle(&self, ways: &mut [Way]) -> Result<Estimates, DiagnoseError> {
+        loop {
+            let set: Vec<usize> = (0..ways.len()).filter(|i| ways[*i].stands()).collect();
+            let estimates = self.ask(ways, &set)?;
+            let leaves = set.iter().filter_map(|i| Some((*i, self.leaves(&ways[*i])?)));
+            let certainty = |i: usize| {
+                let found = ways[i].found.as_ref();
+                found.map_or(0.0, |f| f.verified.amplitude.certainty())
+            };
+            match leaves.min_by(|a, b| certainty(a.0).total_cmp(&certainty(b.0))) {
+                Some((i, why)) => (ways[i].left, ways[i].amplitude) = (Some(why), None),
+                None => {
+                    for i in set {
+                        let factor = self.factor(&ways[i]);
+                        let found = ways[i].found.as_ref();
+                        let own = found.map(|f| f.effect.linear.iter());
+                        ways[i].amplitude = own.map(|a| a.map(|x| factor * x).collect());
+                    }
+                    return Ok(estimates);
+                }
+            }
+        }
+    }
+
+    /// Asks the blocks for effects in one joint fit.
+    fn ask(&self, ways: &mut [Way], set: &[usize]) -> Result<Estimates, DiagnoseError> {
+        let chosen: Vec<Chosen> = set.iter().map(|i| ways[*i].chosen.clone()).collect();
+        let estimates = Estimates::of(&self.field, &chosen)?;
+        for (at, i) in set.iter().enumerate() {
+            ways[*i].found = Some(self.found(&estimates, &chosen, at)?);
+        }
+        Ok(estimates)
+    }
+
+    /// What a joint fit makes of one of its effects.
+    fn found(
+        &self,
+        estimates: &Estimates,
+        chosen: &[Chosen],
+        at: usize,
+    ) -> Result<Found, DiagnoseError> {
+        let effect = estimates.effect(&self.field, &chosen[at], at);
+        Ok(Found {
+            verified: estimates.verified(&self.field, chosen, at, self.noisier.as_deref())?,
+            covariance: estimates.covariance_of(&effect, at),
+            effect,
+        })
+    }
+
+    /// Each of those that left beside all that stand: what it would be.
+    fn ask_those_that_left(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
+        let set = ways.iter().filter(|w| w.stands());
+        let set: Vec<Chosen> = set.map(|w| w.chosen.clone()).collect();
+        for way in ways.iter_mut().filter(|w| !w.stands()) {
+            let mut asked = set.clone();
+            asked.push(way.chosen.clone());
+            let estimates = Estimates::of(&self.field, &asked)?;
+            way.found = Some(self.found(&estimates, &asked, set.len())?);
         }
         Ok(())
     }
 
-    /// Part of an effect's amplitude that predicts. What a person can measure is whole or is not there.
-    fn factor(&self, way: &Way) -> f64 {
-        let s = way.verified.agreement.s;
-        let effect = self.field.effect(&way.verified.chosen);
-        match (way.accepted, effect.law.entry.measurable) {
-            (true, _) => 1.0,
-            (false, false) => s,
-            (false, true) if s > self.field.numbers().confirmed => 1.0,
-            (false, true) => 0.0,
+    /// Why an effect leaves the set, where it does.
+    fn leaves(&self, way: &Way) -> Option<NotWritten> {
+        let Found {
+            verified, effect, ..
+        } = way.found.as_ref()?;
+        let there = effect.linear.iter().any(|x| *x != 0.0) && effect.can_be();
+        let keeps = self.prepared.case.keep;
+        match way.accepted {
+            true => None,
+            false if !there => Some(NotWritten::Bound),
+            false if self.factor(way) <= 0.0 => Some(NotWritten::Unsure),
+            // with the model held all of an effect is in question, and none of it is small
+            false if !keeps && !verified.beside.noticeable => Some(NotWritten::Small),
+            false => None,
         }
     }
 
-    /// The model with the effects that are in it, without those that held-out data took out unless `all` are asked for.
-    fn written(&self, ways: &[Way], all: bool) -> Result<AugmentedModel, DiagnoseError> {
-        let effects: Vec<_> = ways.iter().filter(|w| all || !w.vetoed).collect();
-        match effects.iter().any(|w| w.amplitude.is_some()) {
-            true => Ok(self.based(self.prepared.refit(&self.fitted(&effects))?)),
-            false => Ok(self.prepared.case.given.clone()),
+    /// Part of an effect's amplitude that predicts. What a person can measure is whole or is not there.
+    fn factor(&self, way: &Way) -> f64 {
+        let Some(Found {
+            verified, effect, ..
+        }) = &way.found
+        else {
+            return 0.0;
+        };
+        let s = verified.amplitude.s;
+        let sure = s > self.field.numbers().confirmed || self.prepared.case.keep && s > 0.0;
+        match (way.accepted, effect.law.entry.measurable) {
+            (true, _) => 1.0,
+            (false, false) => s,
+            (false, true) => f64::from(u8::from(sure)),
         }
+    }
+
+    /// The model with the effects that stand: by the judge's sums, and as torques would be computed.
+    fn written(
+        &self,
+        ways: &[Way],
+        estimates: &Estimates,
+    ) -> Result<(AugmentedModel, AugmentedModel), DiagnoseError> {
+        let case = self.prepared.case;
+        let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
+        if effects.is_empty() {
+            return Ok((case.given.clone(), case.in_use.clone()));
+        }
+        let model = self.based(self.prepared.refitted(&self.fitted(&effects))?);
+        let information = estimates.information(&self.field);
+        let in_use = (self.prepared.refit)(&Proposal {
+            model: &model,
+            information: &information,
+        })?;
+        Ok((model, in_use))
     }
 
     /// A model with effects, its declared numbers as given but for what the effects change, unless these data want others.
     fn based(&self, model: AugmentedModel) -> AugmentedModel {
-        match self.refit {
+        match self.other_numbers {
             true => model,
             false => self.as_given(model),
         }
@@ -144,7 +275,7 @@ impl Judging<'_> {
     /// Whether these data ask for declared numbers other than the given ones with what the effects change.
     fn wants_other_numbers(&self, ways: &[Way]) -> Result<bool, DiagnoseError> {
         let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
-        let fitted = self.prepared.refit(&self.fitted(&effects))?;
+        let fitted = self.prepared.refitted(&self.fitted(&effects))?;
         let kept = self.as_given(fitted.clone());
         Ok(self.prepared.is_better(&fitted, &kept)?)
     }
@@ -153,170 +284,170 @@ impl Judging<'_> {
     fn as_given(&self, mut model: AugmentedModel) -> AugmentedModel {
         let unknowns = &self.prepared.unknowns;
         let (given, fitted) = (&self.prepared.case.given, &self.prepared.fitted.model);
-        let off = |u: &Unknown| value(given, *u) - value(fitted, *u);
+        let off = |u: &Unknown| value_of(given, *u) - value_of(fitted, *u);
         let off: Vec<f64> = unknowns.list.iter().map(off).collect();
         step(&mut model, unknowns, &off);
         model
     }
 
-    /// The model with some effects as it would be written, by the sums of products.
-    fn with(&self, ways: &[&Way]) -> AugmentedModel {
-        self.based(self.fitted(ways))
-    }
-
     fn fitted(&self, ways: &[&Way]) -> AugmentedModel {
         let own = ways.iter();
-        let own = own.filter_map(|w| Some((&w.verified.chosen, w.amplitude.clone()?)));
+        let own = own.filter_map(|w| Some((&w.chosen, w.amplitude.clone()?)));
         tables::model(&self.field, &own.collect::<Vec<_>>())
     }
 
-    /// Takes out what makes a joint worse on held-out data, the worst first; then what gains least, while all are worse.
-    fn look(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
-        let case = self.prepared.case;
-        let vetoing = match case.roles.contains(&LogRole::Veto) {
+    /// Rows that may take an effect out, and whether they were given for it: blocks that are set aside are as the rest of
+    /// their log, and of single joints they measure.
+    fn judging_rows(&self) -> (HeldOutRows<'_>, bool) {
+        let roles = &self.prepared.case.roles;
+        let role = match roles.contains(&LogRole::Veto) {
             true => LogRole::Veto,
             false => LogRole::Holdout,
         };
-        let rows = self.prepared.held_out(vetoing);
-        let holdout = self.prepared.held_out(LogRole::Holdout);
-        // blocks that are set aside are as the rest of their log: of single joints they measure
-        let given = case.roles.contains(&vetoing);
-        loop {
-            let in_it = |w: &Way| w.amplitude.is_some() && !w.vetoed;
-            let kept: Vec<usize> = (0..ways.len()).filter(|i| in_it(&ways[*i])).collect();
-            let all: Vec<&Way> = kept.iter().map(|i| &ways[*i]).collect();
-            let with = self.with(&all);
-            let mut found = Vec::new();
-            for i in &kept {
-                let others = kept.iter().filter(|k| *k != i);
-                let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
-                let without = self.with(&others);
-                let models = [&without, &with];
-                found.push((*i, holdout.change(models)?, rows.change(models)?));
-            }
-            let mut worse: Vec<(usize, f64)> = Vec::new();
-            let mut costs: Vec<(usize, f64)> = Vec::new();
-            for (i, holdout, veto) in found {
-                ways[i].change = holdout;
-                let Some(veto) = veto.filter(|_| !ways[i].accepted) else {
-                    continue;
-                };
-                worse.extend(veto.worst().filter(|_| given).map(|by| (i, by)));
-                costs.push((i, veto.mean[1] - veto.mean[0]));
-            }
-            if worse.is_empty() && rows.mean_error(&with)? > rows.mean_error(&case.given)? {
-                worse = costs;
-            }
-            match worse.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((i, _)) => ways[i].vetoed = true,
-                None => return Ok(()),
-            }
-        }
+        (self.prepared.held_out(role), roles.contains(&role))
     }
 
-    /// The midpoint to the given model, where the user wants it.
-    fn halfway(&self, mut model: AugmentedModel) -> AugmentedModel {
-        let given = &self.prepared.case.given;
-        if !self.prepared.case.wishes.cautious || model.effects.len() == given.effects.len() {
-            return model;
+    /// The effect to take out, where the model that would be written is worse than the given one on held-out data, at a
+    /// joint or in the mean: the one whose absence helps most where it is worse.
+    fn harm(&self, ways: &[Way], written: &AugmentedModel) -> Result<Option<usize>, DiagnoseError> {
+        let (rows, given) = self.judging_rows();
+        let set: Vec<usize> = (0..ways.len())
+            .filter(|i| ways[*i].amplitude.is_some())
+            .collect();
+        let free = set.iter().copied().filter(|i| !ways[*i].accepted);
+        if free.clone().next().is_none() {
+            return Ok(None);
         }
-        let half = |u: &Unknown| 0.5 * (value(given, *u) - value(&model, *u));
-        let half: Vec<f64> = self.prepared.unknowns.list.iter().map(half).collect();
-        step(&mut model, &self.prepared.unknowns, &half);
-        for effect in &mut model.effects[given.effects.len()..] {
-            effect.linear.iter_mut().for_each(|x| *x *= 0.5);
+        let noticeable = self.field.numbers().noticeable;
+        let Some(change) = rows.change([&self.prepared.case.in_use, written])? else {
+            return Ok(None);
+        };
+        let worse = (change.joints.iter()).map(|j| given && j.noticeably_worse(noticeable));
+        let worse: Vec<bool> = worse.collect();
+        if !worse.contains(&true) && change.mean[1] <= change.mean[0] {
+            return Ok(None);
         }
-        model
+        let all: Vec<&Way> = set.iter().map(|i| &ways[*i]).collect();
+        let with = self.based(self.fitted(&all));
+        let mut most: Option<(usize, f64)> = None;
+        for i in free {
+            let others = set.iter().filter(|k| **k != i);
+            let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
+            let without = self.based(self.fitted(&others));
+            let Some(own) = rows.change([&without, &with])? else {
+                continue;
+            };
+            let at = own.joints.iter().zip(&worse).filter(|(_, worse)| **worse);
+            let cost = match worse.contains(&true) {
+                true => at.map(|(j, _)| j.after / j.before - 1.0).sum(),
+                false => own.mean[1] - own.mean[0],
+            };
+            if most.is_none_or(|(_, other)| cost > other) {
+                most = Some((i, cost));
+            }
+        }
+        Ok(most.map(|(i, _)| i))
+    }
+
+    /// What each effect that stands changes on held-out data, the others refitted by the judge's sums.
+    fn held_out(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
+        let rows = self.prepared.held_out(LogRole::Holdout);
+        let set: Vec<usize> = (0..ways.len())
+            .filter(|i| ways[*i].amplitude.is_some())
+            .collect();
+        let all: Vec<&Way> = set.iter().map(|i| &ways[*i]).collect();
+        let with = self.based(self.fitted(&all));
+        for i in &set {
+            let others = set.iter().filter(|k| *k != i);
+            let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
+            let without = self.based(self.fitted(&others));
+            ways[*i].change = rows.change([&without, &with])?;
+        }
+        Ok(())
     }
 
     fn described(
         &self,
         ways: &[Way],
-        judge: AugmentedModel,
-        written: AugmentedModel,
-    ) -> Result<Judged, DiagnoseError> {
-        let kept = ways.iter().filter(|w| w.amplitude.is_some());
-        let kept: Vec<Chosen> = kept.map(|w| w.verified.chosen.clone()).collect();
-        let estimates = Estimates::of(&self.field, &kept)?;
-        let unknowns = &self.prepared.unknowns;
-        let before = self.prepared.case.given.effects.len();
-        let (mut judged, mut in_file) = (before, before);
-        let mut places = estimates.places.iter();
+        estimates: &Estimates,
+        (judge, (proposed, written)): (AugmentedModel, (AugmentedModel, AugmentedModel)),
+    ) -> Judged {
+        let mut place = self.prepared.case.given.effects.len();
         let mut steps = Vec::new();
         for way in ways {
-            let place = |there: bool, next: &mut usize| {
-                let place = there.then_some(*next);
-                *next += usize::from(there);
-                place
+            let Some(mut found) = self.step(way) else {
+                continue;
             };
-            let in_it = way.amplitude.is_some();
-            let mut step = self.step(way);
-            step.judged = place(in_it, &mut judged);
-            step.written = place(in_it && !way.vetoed, &mut in_file);
-            if let Some(own) = in_it.then(|| places.next()).flatten() {
-                step.covariance = covariance(&step.estimate, &estimates.covariance, own);
+            if way.stands() {
+                (found.written, place) = (Some(place), place + 1);
             }
-            steps.push(step);
+            steps.push(found);
         }
-        Ok(Judged {
-            estimates: moved(&self.field.summed.about, unknowns, &estimates.values),
-            covariance: estimates.covariance,
-            information: estimates.information,
+        let (by_effects, to_estimate) = self.by_effects(ways, estimates);
+        Judged {
+            estimates: estimates.model(&self.field),
+            covariance: estimates.covariance.clone(),
+            by_effects,
+            to_estimate,
             steps,
+            proposed,
             judge,
             written,
-        })
+        }
     }
 
-    fn step(&self, way: &Way) -> FoundEffect {
-        let (chosen, agreement) = (&way.verified.chosen, &way.verified.agreement);
-        let effect = tables::effect(&self.field, chosen, &way.verified.amplitude);
-        let size = effect.parameters();
-        let others = chosen.alternatives.iter();
-        let held_out = self.prepared.case.roles.contains(&LogRole::Holdout);
-        let confirms = way.change.as_ref().is_some_and(EffectChange::confirms);
-        let status = match agreement.s {
-            s if s > self.field.numbers().confirmed && (confirms || !held_out) && !way.vetoed => {
-                StepStatus::Confirmed
-            }
-            s if s > 0.0 => StepStatus::Indicated,
-            _ => StepStatus::Seen,
+    /// What the amplitudes of the effects that stand do to the unknowns beside them.
+    fn by_effects(&self, ways: &[Way], estimates: &Estimates) -> (DMatrix<f64>, DVector<f64>) {
+        let declared = self.field.summed.declared.len();
+        let (mut spread, mut shift) = (DMatrix::zeros(declared, declared), DVector::zeros(declared));
+        let places = estimates.places.iter();
+        let places: Vec<usize> = places.flat_map(|p| p.terms.coefficients.clone()).collect();
+        let Some(slopes) = estimates.fit.declared_by(declared, &places) else {
+            return (spread, shift);
         };
-        FoundEffect {
+        let own = estimates.covariance.select_rows(&places).select_columns(&places);
+        spread += &slopes * own * slopes.transpose();
+        let kept = ways.iter().filter_map(|w| w.amplitude.as_ref());
+        let predicting = DVector::from_iterator(places.len(), kept.flatten().copied());
+        shift += slopes * (estimates.fit.values.select_rows(&places) - predicting);
+        (spread, shift)
+    }
+
+    fn step(&self, way: &Way) -> Option<FoundEffect> {
+        let numbers = self.field.numbers();
+        let Found {
+            verified,
+            effect,
+            covariance,
+        } = way.found.as_ref()?;
+        let amplitude = &verified.amplitude;
+        let s = amplitude.s;
+        let [torque, std] = amplitude.torque;
+        let others = way.chosen.alternatives.iter();
+        let status = match way.stands() {
+            true if s > numbers.confirmed && torque > 2.0 * std => StepStatus::Confirmed,
+            true => StepStatus::Indicated,
+            false => StepStatus::Seen,
+        };
+        Some(FoundEffect {
             alternatives: others
                 .map(|i| self.field.candidates[*i].effect.clone())
                 .collect(),
-            covariance: vec![f64::INFINITY; size * size],
-            estimate: effect,
-            judged: None,
+            covariance: covariance.clone(),
+            estimate: effect.clone(),
             written: None,
             status,
-            shrinkage: agreement.s,
-            agreement: agreement.z,
-            parts: agreement.parts.clone(),
-            gain: chosen.gain.clone(),
-            share: chosen.gain.value / chosen.error.max(f64::MIN_POSITIVE),
+            left: way.left,
+            shrinkage: s,
+            deviations: amplitude.deviations(numbers),
+            torque: amplitude.torque,
+            blocks: amplitude.blocks,
+            parts: verified.blocks.clone(),
+            gain: verified.beside.gain.clone(),
+            share: verified.beside.gain.value / verified.beside.error.max(f64::MIN_POSITIVE),
             holdout: way.change.as_ref().map(|c| c.mean),
             joints: way.change.as_ref().map_or(Vec::new(), |c| c.joints.clone()),
             accepted_by_user: way.accepted,
-        }
+        })
     }
-}
-
-/// Covariance of (shape, linear) of an effect that stands at some places; a shape that is not refined has none.
-fn covariance(effect: &Added, all: &DMatrix<f64>, places: &TermPlaces) -> Vec<f64> {
-    let (count, size) = (effect.shape.len(), effect.parameters());
-    let place = |k: usize| match k.checked_sub(count) {
-        Some(linear) => Some(places.first + linear),
-        None => (places.shapes.iter().find(|(shape, _)| *shape == k)).map(|(_, place)| *place),
-    };
-    let of = |k: usize| {
-        let (row, column) = (k / size, k % size);
-        match (place(row), place(column)) {
-            (Some(row), Some(column)) => all[(row, column)],
-            (None, _) if row == column && !effect.held[row] => f64::INFINITY,
-            _ => 0.0,
-        }
-    };
-    (0..size * size).map(of).collect()
 }

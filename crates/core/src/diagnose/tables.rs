@@ -1,4 +1,4 @@
-//! From what was chosen to two tables: estimates, and a model that predicts.
+//! The joint fit of effects that were chosen, and what leaves their set.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,136 +6,160 @@ use super::error::DiagnoseError;
 use super::prepared::moved;
 use super::search::{Chosen, Field, own_joint};
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{Agreement, BlockSums, ErrorGain, Terms, agreement};
+use crate::judge::{Amplitude, EffectTerms, ErrorGain, JointFit, Terms};
 
-/// An effect that was chosen, with what its parts say.
+/// What the blocks say of an effect.
 #[derive(Debug, Clone)]
 pub struct Verified {
-    pub chosen: Chosen,
-    pub agreement: Agreement,
-    /// Amplitude of the joint fit with all that was chosen.
-    pub amplitude: Vec<f64>,
+    pub amplitude: Amplitude,
+    /// Its coefficients by block, all else as the joint fit has it.
+    pub blocks: Vec<Vec<f64>>,
+    pub beside: Beside,
+}
+
+/// What an effect is worth beside others, which are refitted.
+#[derive(Debug, Clone)]
+pub struct Beside {
+    /// Gain on blocks left out, and their squared error without it.
+    pub gain: ErrorGain,
+    pub error: f64,
+    /// Whether it takes off some joint's error there what one would notice.
+    pub noticeable: bool,
+}
+
+/// The joint fit of declared terms and effects, shapes free.
+pub struct Estimates {
+    pub fit: JointFit,
+    /// Of its values.
+    pub covariance: DMatrix<f64>,
+    /// Where the terms of each effect stand.
+    pub places: Vec<TermPlaces>,
+    declared: usize,
 }
 
 /// Where the terms of an effect stand.
+#[derive(Debug, Clone, PartialEq)]
 pub struct TermPlaces {
-    /// The first of its coefficients.
-    pub first: usize,
-    /// Shape parameters that are refined, and the place of each.
-    pub shapes: Vec<(usize, usize)>,
-}
-
-/// The joint fit of declared terms and effects.
-pub struct Estimates {
-    /// Values of the declared unknowns, about the fitted model, then of every effect's coefficients.
-    pub values: DVector<f64>,
-    /// By the block jackknife and what is known beforehand: of unknowns, then of each effect's coefficients and shape.
-    pub covariance: DMatrix<f64>,
-    /// Of the declared unknowns beside fixed effects, in independent rows.
-    pub information: DMatrix<f64>,
-    /// Where the coefficients of each effect begin in it, and where its shapes stand.
-    pub places: Vec<TermPlaces>,
-}
-
-/// Places of the coefficients of each effect behind the declared unknowns.
-fn places(field: &Field, effects: &[Chosen]) -> Vec<Vec<usize>> {
-    let mut next = field.summed.declared.len();
-    let place = |c: &Chosen| {
-        let first = next;
-        next += field.terms_of(c.candidate).len();
-        (first..next).collect()
-    };
-    effects.iter().map(place).collect()
-}
-
-/// Asks the parts of the data for every effect that was chosen; what sums with `noisier` positions change is in doubt.
-pub fn verified(field: &Field, chosen: &[Chosen], noisier: Option<&BlockSums>) -> Vec<Verified> {
-    let (prepared, numbers) = (field.prepared, field.numbers());
-    let terms = field.terms(chosen);
-    let values = terms.fit(&field.total(), &[]).values;
-    let noisier = noisier.map(|sums| sums.over(0..prepared.blocks.list.len()));
-    let of = |(at, own): (usize, Vec<usize>)| {
-        let asked = (own.as_slice(), &values);
-        let sums = &field.summed.sums;
-        let mut agreement = agreement(sums, &prepared.blocks, &terms, asked, numbers);
-        let effect = field.effect(&chosen[at]);
-        if let Some(sums) = &noisier {
-            let part = by_noise(&terms, sums, (prepared.unknowns.len(), asked), &agreement);
-            // an effect must not be made by noise; a number that can be measured must not be hidden by it either
-            let measured = effect.law.entry.measurable;
-            agreement.doubt(if measured { part } else { part.max(0.0) }, numbers);
-        }
-        // one that gains nothing beside all the others, those after it too, is not confirmed
-        let gain = beside_the_others(field, chosen, at);
-        let joint = own_joint(effect.place);
-        if !gain.is_ok_and(|(gain, _)| gain.is_beyond(numbers.screen, joint)) {
-            agreement.s = 0.0;
-        }
-        Verified {
-            agreement,
-            amplitude: own.iter().map(|i| values[*i]).collect(),
-            chosen: chosen[at].clone(),
-        }
-    };
-    let places = places(field, chosen).into_iter();
-    places.enumerate().map(of).collect()
-}
-
-/// The part of an effect's amplitude that noise of the positions adds, or takes off, beside all the others as they are.
-fn by_noise(
-    terms: &Terms,
-    noisier: &[DMatrix<f64>],
-    (declared, (own, values)): (usize, (&[usize], &DVector<f64>)),
-    agreement: &Agreement,
-) -> f64 {
-    let others = (declared..terms.len()).filter(|i| !own.contains(i));
-    let held: Vec<(usize, f64)> = others.map(|i| (i, values[i])).collect();
-    let change = terms.fit(noisier, &held).values - values;
-    let own = own.iter().map(|i| change[*i]);
-    agreement.part(&DVector::from_vec(own.collect()))
-}
-
-/// Gain of an effect beside all the others, and the squared error without it.
-pub fn beside_the_others(
-    field: &Field,
-    chosen: &[Chosen],
-    at: usize,
-) -> Result<(ErrorGain, f64), DiagnoseError> {
-    let mut others = chosen.to_vec();
-    let own = others.remove(at).candidate;
-    let terms = field.terms(&others);
-    let left_out = field.left_out(&terms)?;
-    let gain = left_out.gain(field.terms_of(own));
-    Ok((gain, left_out.error()))
+    pub terms: EffectTerms,
+    /// Shape parameters that are free, in the order of the slopes.
+    pub shapes: Vec<usize>,
 }
 
 impl Estimates {
     /// The joint fit with some effects.
     pub fn of(field: &Field, effects: &[Chosen]) -> Result<Self, DiagnoseError> {
-        let rows_per_independent = field.prepared.case.prior.rows_per_independent;
-        let total = field.total();
-        let values = field.terms(effects).fit(&total, &[]).values;
+        let rows = field.prepared.case.prior.rows_per_independent;
         let (terms, places) = with_shapes(field, effects);
-        let left_out = field.left_out(&terms)?;
-        let without: Vec<&DVector<f64>> = left_out.values().collect();
-        let count = without.len() as f64;
-        let zero = DVector::zeros(terms.len());
-        let mean = without.iter().fold(zero, |sum, x| sum + *x) / count;
-        let mut covariance = DMatrix::zeros(terms.len(), terms.len());
-        for x in without {
-            let off = x - &mean;
-            covariance.ger((count - 1.0) / count, &off, &off, 1.0);
-        }
-        let known = terms.known_before(&total);
-        let known = known.ok_or_else(|| field.prepared.nothing_determined())?;
-        covariance += known * rows_per_independent;
+        let fitted = field.prepared.blocks.list.len();
+        let fit = JointFit::new(&field.summed.sums, fitted, terms, rows);
+        let fit = fit.ok_or_else(|| field.prepared.nothing_determined())?;
         Ok(Estimates {
-            values,
-            covariance,
-            information: field.summed.declared.information(&total) / rows_per_independent,
+            covariance: fit.covariance(),
+            fit,
             places,
+            declared: field.summed.declared.len(),
         })
     }
+
+    /// What the blocks say of one of the effects of the fit.
+    pub fn verified(
+        &self,
+        field: &Field,
+        effects: &[Chosen],
+        at: usize,
+        noisier: Option<&[DMatrix<f64>]>,
+    ) -> Result<Verified, DiagnoseError> {
+        let numbers = field.numbers();
+        let terms = &self.places[at].terms;
+        let measured = field.effect(&effects[at]).law.entry.measurable;
+        let beside = beside_the_others(field, effects, at)?;
+        Ok(Verified {
+            amplitude: self.fit.amplitude(terms, (noisier, measured), numbers),
+            blocks: self.fit.by_block(terms, numbers),
+            beside,
+        })
+    }
+
+    /// An effect of the fit with its coefficients.
+    pub fn effect(&self, field: &Field, chosen: &Chosen, at: usize) -> Added {
+        let own = self.places[at].terms.coefficients.clone();
+        let linear: Vec<f64> = own.map(|i| self.fit.values[i]).collect();
+        effect(field, chosen, &linear)
+    }
+
+    /// Covariance of (shape, linear) of an effect, row-major; a shape that is not free has none.
+    pub fn covariance_of(&self, effect: &Added, at: usize) -> Vec<f64> {
+        let all = &self.covariance;
+        let (count, size) = (effect.shape.len(), effect.parameters());
+        let TermPlaces { terms, shapes } = &self.places[at];
+        let place = |k: usize| match k.checked_sub(count) {
+            Some(linear) => Some(terms.coefficients.start + linear),
+            None => {
+                let at = shapes.iter().position(|shape| *shape == k)?;
+                Some(terms.slopes[at])
+            }
+        };
+        let of = |k: usize| {
+            let (row, column) = (k / size, k % size);
+            match (place(row), place(column)) {
+                (Some(row), Some(column)) => all[(row, column)],
+                (None, _) if row == column && !effect.held[row] => f64::INFINITY,
+                _ => 0.0,
+            }
+        };
+        (0..size * size).map(of).collect()
+    }
+
+    /// The declared model of the fit.
+    pub fn model(&self, field: &Field) -> AugmentedModel {
+        let own = self.fit.values.rows(0, self.declared).into_owned();
+        moved(&field.summed.about, &field.prepared.unknowns, &own)
+    }
+
+    /// Information matrix of the declared unknowns beside fixed effects, in independent rows.
+    pub fn information(&self, field: &Field) -> DMatrix<f64> {
+        let rows = field.prepared.case.prior.rows_per_independent;
+        self.fit.information(self.declared, rows)
+    }
+}
+
+/// What an effect is worth beside all the others.
+pub fn beside_the_others(
+    field: &Field,
+    chosen: &[Chosen],
+    at: usize,
+) -> Result<Beside, DiagnoseError> {
+    let mut others = chosen.to_vec();
+    let own = others.remove(at);
+    let terms = field.terms(&others);
+    let left_out = field.left_out(&terms)?;
+    let gain = left_out.gain(field.terms_of(own.candidate));
+    let errors = left_out.errors();
+    let numbers = field.numbers();
+    let torques = &field.summed.sums.blocks;
+    let joint = own_joint(field.effect(&own).place);
+    let noticed = |j: usize| {
+        let before: f64 = errors.iter().map(|e| e[j]).sum();
+        let torque = |sums: &DMatrix<f64>| sums[(sums.nrows() - 2, sums.nrows() - 2)];
+        let torque: f64 = torques.iter().map(|joints| torque(&joints[j])).sum();
+        let weight = terms.weights[j];
+        let after = match weight > 0.0 {
+            true => (before - gain.joints[j][0] / weight).max(0.0),
+            false => before,
+        };
+        let off = before.sqrt() - after.sqrt();
+        off > numbers.noticeable * before.sqrt() && off > numbers.noticeable_torque * torque.sqrt()
+    };
+    let mut joints = 0..terms.weights.len();
+    let noticeable = match joint {
+        Some(j) => noticed(j),
+        None => joints.any(noticed),
+    };
+    Ok(Beside {
+        error: left_out.error(),
+        gain,
+        noticeable,
+    })
 }
 
 /// Terms of declared unknowns and effects, each with the slopes by its shape, and where these stand.
@@ -146,18 +170,23 @@ fn with_shapes(field: &Field, effects: &[Chosen]) -> (Terms, Vec<TermPlaces>) {
         let candidate = &field.candidates[c.candidate];
         let first = terms.len();
         terms.list.extend_from_slice(field.terms_of(c.candidate));
-        let mut shapes = Vec::new();
-        for ((k, _), term) in candidate
-            .slopes
-            .iter()
-            .zip(&field.summed.layout.slopes[c.candidate])
-        {
+        let coefficients = first..terms.len();
+        let (mut shapes, mut slopes) = (Vec::new(), Vec::new());
+        let all = &field.summed.layout.slopes[c.candidate];
+        for ((k, _), term) in candidate.slopes.iter().zip(all) {
             if !candidate.effect.held[*k] {
-                shapes.push((*k, terms.len()));
+                shapes.push(*k);
+                slopes.push(terms.len());
                 terms.list.push(term.clone());
             }
         }
-        places.push(TermPlaces { first, shapes });
+        places.push(TermPlaces {
+            terms: EffectTerms {
+                coefficients,
+                slopes,
+            },
+            shapes,
+        });
     }
     (terms, places)
 }
@@ -165,10 +194,10 @@ fn with_shapes(field: &Field, effects: &[Chosen]) -> (Terms, Vec<TermPlaces>) {
 /// The declared model with effects of given amplitudes, its unknowns those of the fit beside them.
 pub fn model(field: &Field, effects: &[(&Chosen, Vec<f64>)]) -> AugmentedModel {
     let chosen: Vec<Chosen> = effects.iter().map(|(c, _)| (*c).clone()).collect();
-    let held = places(field, &chosen).into_iter().flatten();
+    let first = field.summed.declared.len();
     let amplitudes = effects.iter().flat_map(|(_, a)| a.iter().copied());
-    let held: Vec<(usize, f64)> = held.zip(amplitudes).collect();
-    let values = field.terms(&chosen).fit(&field.total(), &held).values;
+    let held: Vec<(usize, f64)> = (first..).zip(amplitudes).collect();
+    let values: DVector<f64> = field.terms(&chosen).fit(&field.total(), &held).values;
     let mut model = moved(&field.summed.about, &field.prepared.unknowns, &values);
     let added = effects.iter().map(|(c, linear)| effect(field, c, linear));
     model.effects.extend(added);

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use super::Numbers;
-
 /// Rows of one log that are fitted.
 #[derive(Debug, Clone)]
 pub struct LogRows {
@@ -62,8 +60,8 @@ impl LogRows {
 }
 
 /// Divides logs into parts of equal length within a log, so many that every joint that moves does so in
-/// [`Numbers::parts`] of them, and each into blocks, none of them shorter than `least_s` but where a whole log is.
-pub fn divide(logs: &[LogRows], least_s: f64, numbers: &Numbers) -> Blocks {
+/// `parts` of them, and each into `per_part` blocks, none of them shorter than `least_s` but where a whole log is.
+pub fn divide(logs: &[LogRows], least_s: f64, (parts, per_part): (usize, usize)) -> Blocks {
     let joints = logs.first().map_or(0, |log| log.moves.len());
     let moved = |j: usize| -> f64 {
         let own = logs.iter().filter(|log| log.moves[j]);
@@ -71,7 +69,7 @@ pub fn divide(logs: &[LogRows], least_s: f64, numbers: &Numbers) -> Blocks {
     };
     let shortest = (0..joints).map(moved).filter(|s| *s > 0.0);
     let total: f64 = logs.iter().map(LogRows::seconds).sum();
-    let length = shortest.fold(total, f64::min) / numbers.parts as f64;
+    let length = shortest.fold(total, f64::min) / parts as f64;
     let mut blocks = Blocks {
         least_s,
         ..Blocks::default()
@@ -81,7 +79,7 @@ pub fn divide(logs: &[LogRows], least_s: f64, numbers: &Numbers) -> Blocks {
         let most = (seconds / least_s).floor().max(1.0);
         let parts = (seconds / length - 1e-6).ceil().clamp(1.0, most);
         let within = (most / parts).floor() as usize;
-        let within = within.clamp(1, numbers.blocks_per_part);
+        let within = within.clamp(1, per_part);
         let (rows, count) = (log.rows(), parts as usize * within);
         for k in 0..count {
             let at = |k: usize| k * rows / count;
@@ -99,7 +97,6 @@ pub fn divide(logs: &[LogRows], least_s: f64, numbers: &Numbers) -> Blocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::NUMBERS;
 
     fn log(log: usize, seconds: f64, moves: &[bool]) -> LogRows {
         LogRows {
@@ -113,7 +110,7 @@ mod tests {
     #[test]
     fn two_logs_give_twelve_parts_of_two_blocks_and_no_row_twice() {
         let logs = [log(0, 30.0, &[true]), log(1, 60.0, &[true])];
-        let blocks = divide(&logs, 0.5, &NUMBERS);
+        let blocks = divide(&logs, 0.5, (12, 2));
         assert_eq!((blocks.parts, blocks.list.len()), (12, 24));
         let rows = |b: &TimeBlock| b.pieces.iter().map(|p| p.1.len()).sum::<usize>();
         assert_eq!(blocks.list.iter().map(rows).sum::<usize>(), 9000);
@@ -127,18 +124,18 @@ mod tests {
             log(1, 40.0, &[false, true]),
             log(2, 20.0, &[true, true]),
         ];
-        let blocks = divide(&logs, 0.5, &NUMBERS);
+        let blocks = divide(&logs, 0.5, (12, 2));
         for j in 0..2 {
             let own = blocks.list.iter().filter(|b| logs[b.log].moves[j]);
             let mut parts: Vec<usize> = own.map(|b| b.part).collect();
             parts.dedup();
-            assert!(parts.len() >= NUMBERS.parts, "{j}: {parts:?}");
+            assert!(parts.len() >= 12, "{j}: {parts:?}");
         }
     }
 
     #[test]
     fn blocks_are_not_shorter_than_asked_where_the_log_is_not() {
-        let blocks = divide(&[log(0, 10.0, &[true])], 3.0, &NUMBERS);
+        let blocks = divide(&[log(0, 10.0, &[true])], 3.0, (12, 2));
         assert_eq!((blocks.parts, blocks.list.len()), (3, 3));
     }
 

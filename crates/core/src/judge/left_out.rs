@@ -224,6 +224,19 @@ impl<'a> BlocksLeftOut<'a> {
         change
     }
 
+    /// Least part of the square of a column of more terms that is not in the span of those in use, over all fitted blocks;
+    /// 0 where a column is nil.
+    pub(crate) fn share_of_its_own(&self, more: &[Term]) -> f64 {
+        let (normal, _) = self.terms.firm_normal(&self.total);
+        let all = Beside::of(self, more, &self.total);
+        let Some(factor) = normal.cholesky() else {
+            return 0.0;
+        };
+        let own = &all.own - all.with.tr_mul(&factor.solve(&all.with));
+        let part = |i: usize| own[(i, i)] / all.own[(i, i)].max(f64::MIN_POSITIVE);
+        (0..more.len()).map(part).fold(f64::INFINITY, f64::min)
+    }
+
     /// Amplitudes of terms that are there in some blocks alone, beside those in use over all fitted blocks.
     pub(crate) fn amplitude_within(&self, more: &[Term], there: Range<usize>) -> DVector<f64> {
         let (normal, right) = self.terms.firm_normal(&self.total);

@@ -3,13 +3,14 @@
 //! ```text
 //! rows -> blocks of time -> sums of products per block and joint
 //!      -> each block left out: gain of a hypothesis with its standard error   (the screen)
-//!      -> parts of the data: does every part ask for the same amplitude?       (the test)
+//!      -> the joint fit with each block left out: an amplitude over its deviation   (the test)
 //! ```
 //!
 //! Nothing here knows an effect or a robot. Rows come as columns of a linear problem; a *term* is an unknown
 //! with the columns that it has in the rows of one joint or of several. Another hypothesis is other columns for
-//! the same blocks: [`compare`] sets the errors of two against each other, [`agreement_on_share`] asks the parts.
+//! the same blocks: [`compare`] sets the errors of two against each other, [`agreement_on_share`] asks parts of the logs.
 
+mod amplitude;
 mod block_errors;
 mod blocks;
 mod bounded;
@@ -19,13 +20,13 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
+pub use amplitude::{Amplitude, EffectTerms, JointFit, floor};
 pub use block_errors::{BlockErrors, FitToAll};
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
 pub(crate) use left_out::weighted;
 pub use left_out::{BlocksLeftOut, ErrorGain, compare};
-pub use parts::{Agreement, agreement_on_share};
-pub(crate) use parts::{LEAST_PARTS, agreement};
+pub use parts::{PARTS, PartNumbers, agreement_on_share};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 
 /// The numbers that decide.
@@ -34,18 +35,23 @@ pub struct Numbers {
     /// A gain on blocks left out counts above so many standard errors. Half: noise fills the six places and all rests
     /// on the parts; twice: effects of a third of the residual are passed over.
     pub screen: f64,
-    /// Number of parts that must ask for one amplitude; fewer, where logs are short or a joint rests, must agree so much
-    /// the better that chance is as small. Half: one log cut in parts agrees with itself and a fifth of the joints gets
-    /// worse; twice: logs of a minute confirm nothing.
-    pub parts: usize,
-    /// s = max(0, 1 - doubt / z). Half: noise along a motion is written; twice: a sixth of the gain is lost.
-    pub doubt: f64,
-    /// Blocks that each part is cut into for the screen. One: its standard error rests on 12 values; four: blocks as
-    /// short as the residual's own memory.
-    pub blocks_per_part: usize,
-    /// A block is at least so many 1/e times of the residual long. Half: neighbours share their noise; twice: short
-    /// logs give too few.
+    /// Blocks of equal time over all logs; fewer where these are short. Half: an effect of a few seconds passes by
+    /// chance; twice: neighbours share their noise, and half as many joints again get worse.
+    pub blocks: usize,
+    /// With fewer blocks that hold information nothing is written: F has too few degrees of freedom. Half: one block
+    /// decides; twice: logs of half a minute confirm nothing.
+    pub least_blocks: usize,
+    /// An amplitude is written from so many of its deviations on, s = max(0, 1 - deviations^2 / F). Four: three times as
+    /// many joints get worse; six: a tenth of the gain is lost.
+    pub deviations: f64,
+    /// A block is at least so many 1/e times of the residual long. Half: neighbours share their noise; five: the logs
+    /// of a robot that lacks an effect give a handful of blocks.
     pub memory_times: f64,
+    /// An effect is named where it takes this part off some joint's error on blocks left out. Half: effects that no
+    /// one sees; twice: friction shapes of a twentieth of the torque are passed over.
+    pub noticeable: f64,
+    /// The same in parts of that joint's torque. Half: a clean simulation is full of names; twice: a good sensor's are lost.
+    pub noticeable_torque: f64,
     /// Most effects beside the friction laws. Twice: the last ones fit what is left of the first.
     pub effects: usize,
     /// From this s on an effect is confirmed, and one that a person can measure is written. Lower: weak ones are
@@ -61,10 +67,12 @@ pub struct Numbers {
 /// The numbers of `diagnose`.
 pub const NUMBERS: Numbers = Numbers {
     screen: 2.0,
-    parts: 12,
-    doubt: 4.0,
-    blocks_per_part: 2,
-    memory_times: 5.0,
+    blocks: 24,
+    least_blocks: 8,
+    deviations: 5.0,
+    memory_times: 1.0,
+    noticeable: 0.02,
+    noticeable_torque: 1e-3,
     effects: 6,
     confirmed: 0.8,
     same: 1.0,

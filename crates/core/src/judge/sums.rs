@@ -18,11 +18,6 @@ impl Term {
         let own = self.columns.iter().find(|(j, _)| *j == joint);
         own.map(|(_, column)| *column)
     }
-
-    /// Whether only this joint's rows have it.
-    pub(super) fn is_of(&self, joint: usize) -> bool {
-        matches!(self.columns.as_slice(), [(j, _)] if *j == joint)
-    }
 }
 
 /// Sums of products of every joint's columns, the torque last, `[block][joint]`.

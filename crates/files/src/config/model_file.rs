@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
+use super::campaign::EstimatorKind;
 use super::candidates::CandidateSection;
 use super::held_out::{Excesses, HeldOut};
 use super::limits::Limits;
@@ -205,6 +206,9 @@ pub struct ModelProvenance {
     /// Command that wrote the file.
     #[serde(default)]
     pub command: String,
+    /// Estimator of a fit, where it was another than weighted least squares.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimator: Option<EstimatorKind>,
     /// The set-up was kept as it is declared, whatever the torques said of it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub as_declared: bool,

@@ -139,6 +139,7 @@ fn model(values: &[f64]) -> ModelFile {
         provenance: ModelProvenance {
             version: "0.1.0".to_owned(),
             command: "lsq".to_owned(),
+            estimator: None,
             as_declared: false,
             seed: Some(7),
             inputs: vec![

@@ -57,6 +57,14 @@ impl Control {
         }
     }
 
+    /// The same with nobody informed: work within other work.
+    pub(super) fn quiet(&self) -> Self {
+        Control {
+            stop: self.stop.clone(),
+            listener: None,
+        }
+    }
+
     /// Begins work; it ends when the guard is dropped.
     pub(super) fn begin(&self, work: &str, steps: Option<u64>) -> Work {
         self.report(Progress::Begin(work, steps));

@@ -1,5 +1,7 @@
 //! What the torque residual still holds, and the effects behind it.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use cft_ident_core::explain::Explain;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,6 +17,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{own_laws, refined};
 use super::open_loop::spoiled;
+use super::own_fit::{OwnFit, Refitting};
 use super::position_cutoff::known;
 use super::prior::{information, moved_alone, open};
 use super::repeated::each_row_once;
@@ -22,10 +25,10 @@ use super::temperatures;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ParameterPrior, Watch,
-    Wishes,
+    self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ParameterPrior,
+    Proposal, Watch, Wishes,
 };
-use cft_ident_core::effect::{self, AugmentedModel};
+use cft_ident_core::effect::{self, Added, AugmentedModel};
 use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::motion::ParallelFilters;
 use cft_ident_core::robot::drive::JointDrive;
@@ -68,6 +71,10 @@ pub struct Diagnosed {
     pub contacts: Vec<String>,
     /// The model as it was given.
     pub given: AugmentedModel,
+    /// The declared numbers as they would be written, without the effects; none where the given model stays.
+    pub(super) fitted: Option<ModelFile>,
+    /// They are those of `lsq` beside the effects.
+    pub(super) by_lsq: bool,
     /// What the refined model leaves of data set aside.
     pub held: Held,
     /// The motion that the models make of measured torques on held-out data, or on all where there are none.
@@ -216,16 +223,49 @@ pub fn diagnose(
         tell: &tell,
         stop: &|| control.stopped(),
     };
-    let found = diagnose::diagnose(&case, watch);
-    drop(work);
-    let diagnosis = match found {
-        Ok(diagnosis) => diagnosis,
-        Err(DiagnoseError::Interrupted) => return Err(IdentifyError::Interrupted),
-        Err(error) => return Err(IdentifyError::Diagnose(error)),
+    let own = OwnFit::of(
+        (settings.model, &before),
+        &in_memory.inputs[..data.logs.len()],
+        (settings.keep, settings.hold_friction),
+    );
+    let unknowns = case.unknowns();
+    let refitting = Refitting {
+        machine: &data.machine,
+        given: settings.model,
+        logs: &data.logs,
+        stretches: &case.stretches,
+        unknowns: &unknowns.list,
+        own,
+        control: control.clone(),
     };
+    let files: Mutex<Vec<(Vec<Added>, ModelFile)>> = Mutex::default();
+    let failed: Mutex<Option<IdentifyError>> = Mutex::default();
+    let refit = |proposal: &Proposal| {
+        let made = refitting.file(proposal).and_then(|file| {
+            let mut in_use = refined(&file, name)?;
+            in_use.effects.clone_from(&proposal.model.effects);
+            lock(&files).push((proposal.model.effects.clone(), file));
+            Ok(in_use)
+        });
+        made.map_err(|error| {
+            *lock(&failed) = Some(error);
+            DiagnoseError::Refit
+        })
+    };
+    let found = diagnose::diagnose(&case, &refit, watch);
+    drop(work);
+    let diagnosis = match (found, lock(&failed).take()) {
+        (Ok(diagnosis), _) => diagnosis,
+        (Err(DiagnoseError::Interrupted), _) => return Err(IdentifyError::Interrupted),
+        (Err(_), Some(error)) => return Err(error),
+        (Err(error), None) => return Err(IdentifyError::Diagnose(error)),
+    };
+    let by_lsq = refitting.own.is_some();
+    let mut files = std::mem::take(&mut *lock(&files));
+    files.retain(|(effects, _)| *effects == diagnosis.model.effects);
+    let added = diagnosis.written().next().is_some();
+    let fitted = files.pop().map(|(_, file)| file).filter(|_| added);
     in_memory.stretches = std::mem::take(&mut case.stretches);
-    // beside a log that vetoes, held-out data measure and choose nothing
-    let holdout_chooses = data.veto.is_empty();
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
         control.note(&format!(
@@ -239,6 +279,8 @@ pub fn diagnose(
         logs,
         contacts: contact,
         given: case.given.clone(),
+        fitted,
+        by_lsq,
         held: Held::default(),
         free_run: None,
         friction_prior,
@@ -248,30 +290,33 @@ pub fn diagnose(
         filters: case.filters.clone(),
         cutoff_hz: case.cutoff_hz,
     };
-    if found.diagnosis.written().next().is_some() {
-        let refined = found.model(machine, file);
-        let tried = hold_out(
-            machine,
-            (&refined, &found.diagnosis.model),
-            (&data.logs, &found.in_memory.inputs),
-            control,
-        );
-        found.held = or_warning(tried, &mut found.in_memory.warnings)?;
-    }
-    if as_given.is_consistent() {
-        case.stretches = std::mem::take(&mut found.in_memory.stretches);
-        let errors = found.judge_in_use(machine, &case, (name, as_given));
-        found.in_memory.stretches = case.stretches;
-        errors?;
-    }
-    if holdout_chooses && found.diagnosis.withdraw_worse(&found.given) {
-        found.held = Held::default();
+    match &found.fitted {
+        // what `lsq` left of data set aside beside the effects is what the model with them leaves
+        Some(fitted) if by_lsq => {
+            found.held.joints.clone_from(&fitted.held_out);
+            found.held.excesses.clone_from(&fitted.excesses);
+        }
+        Some(_) => {
+            let refined = found.model(machine, as_given);
+            let tried = hold_out(
+                machine,
+                (&refined, &found.diagnosis.in_use),
+                (&data.logs, &found.in_memory.inputs),
+                control,
+            );
+            found.held = or_warning(tried, &mut found.in_memory.warnings)?;
+        }
+        None => {}
     }
     let _work = control.begin("free run", None);
     found.free_run = found.run_freely(machine, (name, as_given))?;
     let spoiled = found.free_run.as_ref().and_then(spoiled);
     found.in_memory.warnings.extend(spoiled);
     Ok(DiagnoseEnd::Diagnosed(Box::new(found)))
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Channels that are no torques, as a fault: gains that differ look like friction and loads.
@@ -330,6 +375,7 @@ fn case(
         rows_per_independent: firm * (rate / (2.0 * processing.cutoff_hz)).max(1.0),
     };
     Ok(Case {
+        in_use: refined(&settings.model.file, name)?,
         given,
         prior,
         open,

@@ -15,10 +15,12 @@ use super::next_motion::separating_command;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
-    Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, Signal, SplitErrors,
-    StepStatus,
+    Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
+    SplitErrors, StepStatus,
 };
+use cft_ident_core::effect::Added;
 use cft_ident_core::motion::Summary;
+use cft_ident_core::robot::Robot;
 
 /// A diagnosis, or the fault of the data that comes before any physics.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -28,7 +30,7 @@ pub struct DiagnosisResult {
     pub steps: Vec<DiagnosisStep>,
     /// Errors of the model as it was given.
     pub before: Option<SplitErrors>,
-    /// Errors of the judge's model, before held-out data had a say: the figure without bias.
+    /// Errors with every effect that stood before held-out data had a say: the figure without bias.
     pub after: Option<SplitErrors>,
     /// Errors of the model that is written, where held-out data took an effect out of it: selected, and so optimistic.
     pub written: Option<SplitErrors>,
@@ -86,9 +88,15 @@ pub struct DiagnosisStep {
     pub status: StepStatus,
     /// Whether it stands in the model that is written.
     pub written: bool,
-    /// Factor of its amplitude that the agreement between parts of the data gives, 0..1.
+    /// What writes it whatever the judge says, as an option of `diagnose`.
+    pub accept: String,
+    /// How many deviations one number would have to be off zero to be as sure; from 5 on it is written.
+    pub deviations: f64,
+    /// Factor of its amplitude in predictions, 0..1.
     pub shrinkage: f64,
-    /// Amplitude by part of the data: of its largest coefficient.
+    /// Root mean square of its torque at the joint where it is strongest.
+    pub torque: EffectValueFound,
+    /// Amplitude by block of the data, for pictures: of its largest coefficient.
     pub parts: Vec<f64>,
     /// Gain on blocks left out, joint by joint: squared error in units of the joint's residual variance.
     pub gain: Vec<JointGain>,
@@ -97,14 +105,8 @@ pub struct DiagnosisStep {
     pub separate_command: Option<String>,
     /// What would separate it, in words.
     pub separate_by: Option<&'static str>,
-    /// Always null since diagnose/2.
-    pub unique_share: Option<f64>,
-    /// Always null since diagnose/2.
-    pub delta_bic: Option<f64>,
     /// Fraction of the squared error of blocks left out that it removes.
-    pub cv_gain: Option<f64>,
-    /// Always null since diagnose/2.
-    pub p_value: Option<f64>,
+    pub share: f64,
     /// Mean relative error on held-out data without it, the others kept and refitted.
     pub holdout_before: Option<f64>,
     /// The same with it.
@@ -118,9 +120,9 @@ pub struct DiagnosisStep {
 /// How the data were divided.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct BlocksResult {
-    pub parts: usize,
-    /// With fewer, nothing can be confirmed.
-    pub parts_needed: usize,
+    pub count: usize,
+    /// With fewer, nothing is written.
+    pub least: usize,
     /// Least length of a block \[s\].
     pub block_s: f64,
 }
@@ -168,8 +170,6 @@ pub struct CandidateResult {
     pub family: &'static str,
     /// Fraction of the squared error of blocks left out that it would remove.
     pub score: Option<f64>,
-    /// Always null since diagnose/2.
-    pub unique_share: Option<f64>,
     /// Whether it stands in the model that is written.
     pub accepted: bool,
     /// Why not; empty where accepted.
@@ -270,8 +270,8 @@ impl Diagnosed {
             written: d.selected.clone(),
             holdout_had_a_say: d.holdout_had_a_say(),
             blocks: Some(BlocksResult {
-                parts: d.parts,
-                parts_needed: d.parts_needed,
+                count: d.blocks,
+                least: d.least_blocks,
                 block_s: d.block_s,
             }),
             free_run: self.free_run.clone(),
@@ -312,7 +312,15 @@ impl Diagnosed {
             alternatives,
             status: step.status,
             written: step.written.is_some(),
+            accept: accept_option(effect, robot),
+            deviations: step.deviations,
             shrinkage: step.shrinkage,
+            torque: EffectValueFound {
+                value: step.torque[0],
+                std: Some(step.torque[1]),
+                unit: machine.file.torque_unit(effect.place.joint().unwrap_or(0)).to_owned(),
+                bound: false,
+            },
             parts: step.parts.iter().filter_map(part).collect(),
             gain: gain_of_each(robot.joint_names(), &step.gain),
             accepted_by_user: step.accepted_by_user,
@@ -320,10 +328,7 @@ impl Diagnosed {
                 .then(|| separating_command(effect, robot, "MODEL.toml"))
                 .flatten(),
             separate_by: alike.then_some(effect.law.entry.separate_by),
-            unique_share: None,
-            delta_bic: None,
-            cv_gain: Some(step.share),
-            p_value: None,
+            share: step.share,
             holdout_before: step.holdout.map(|h| h[0]),
             holdout_after: step.holdout.map(|h| h[1]),
             holdout_worsened: step.joints.iter().any(|j| j.worsened),
@@ -363,20 +368,28 @@ pub fn signal_words(names: &[String], own: usize, signal: Signal) -> String {
 }
 
 fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult {
-    let reason = match (step.written, step.status) {
-        (Some(_), _) => "",
-        (None, StepStatus::Seen) => "the parts of the data do not agree on its amplitude",
-        (None, _) if step.vetoed() => "held-out data are worse with it",
-        (None, _) => "it can be measured, and the parts of the data do not agree enough",
+    let reason = match step.left {
+        None => "",
+        Some(NotWritten::HeldOut) => "held-out data are worse with it",
+        Some(NotWritten::Bound) => "a bound of its numbers takes all of it beside the others",
+        Some(NotWritten::Small) => "it changes no error that one would notice",
+        Some(NotWritten::Unsure) => "its amplitude is too uncertain",
     };
     CandidateResult {
         effect: step.estimate.name(),
         joint: step.estimate.place.name(&machine.robot),
         family: step.estimate.family().name(),
         score: Some(step.share),
-        unique_share: None,
         accepted: step.written.is_some(),
         reason: reason.to_owned(),
+    }
+}
+
+/// The option of `diagnose` that writes an effect.
+pub fn accept_option(effect: &Added, robot: &Robot) -> String {
+    match effect.place.name(robot) {
+        Some(joint) => format!("--accept {}:{joint}", effect.name()),
+        None => format!("--accept {}", effect.name()),
     }
 }
 
@@ -390,7 +403,6 @@ fn candidate(machine: &LoggedRobot, c: &LeftCandidate) -> CandidateResult {
         joint: c.place.name(&machine.robot),
         family: family.name(),
         score: c.score,
-        unique_share: None,
         accepted: false,
         reason: c.reason.clone(),
     }

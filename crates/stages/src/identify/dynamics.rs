@@ -23,6 +23,7 @@ use cft_ident_core::inertia::solve::Fit;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::identified::friction_meaning;
 use cft_ident_files::config::model_file::{FrictionPrior, Parameter};
 use cft_ident_logs::log::Provenance;
@@ -96,6 +97,8 @@ impl IdentifiedDynamics {
     /// The model: friction as it was known, and what was fitted, with their joint covariance.
     pub fn model(&self, machine: &LoggedRobot, friction: Option<&ModelFile>) -> ModelFile {
         let mut model = new_model(machine, "lsq", &self.inputs);
+        let estimator = self.account.estimator;
+        model.provenance.estimator = (estimator != EstimatorKind::Wls).then_some(estimator);
         model.parameters = self.unknowns.iter().map(FittedUnknown::parameter).collect();
         let robot = &machine.robot;
         let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();

@@ -9,6 +9,7 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::first_look::FirstLook;
 use super::free_swing::moves_freely;
+use super::held_torque::HeldTorque;
 use super::log::Log;
 use super::open_log::OpenLog;
 use super::reference::LoggedReference;
@@ -49,7 +50,9 @@ pub struct LoggedRobot {
     /// Position cut-offs that were found from logs, in joint order \[Hz\]; empty where none were.
     pub(super) position_cutoffs_hz: Arc<Vec<f64>>,
     /// What the first look at each log found: a log is opened several times.
-    looks: Arc<Mutex<BTreeMap<String, Arc<FirstLook>>>>,
+    pub(super) looks: Arc<Mutex<BTreeMap<String, Arc<FirstLook>>>>,
+    /// Torques that are taken off logs as they are read, by log.
+    pub(super) held: Arc<BTreeMap<String, HeldTorque>>,
 }
 
 impl LoggedRobot {
@@ -70,6 +73,7 @@ impl LoggedRobot {
             robot,
             position_cutoffs_hz: Arc::default(),
             looks: Arc::default(),
+            held: Arc::default(),
             as_declared: false,
         }
     }
@@ -322,6 +326,7 @@ impl LoggedRobot {
             reader,
             control,
             centre: None,
+            held: None,
             name: escape(&log.name()),
             cutter: look.gate.cutter(&|dt| self.settings().longest_step(dt)),
             look,
@@ -388,6 +393,7 @@ impl LoggedRobot {
         let (mut open, zero_order_hold) = self.open_raw(log, control)?;
         open.centre =
             zero_order_hold.then(|| (&self.robot, ZeroOrderHold::new(self.robot.joints())));
+        open.held = self.held.get(&log.key());
         Ok(open)
     }
 

@@ -124,6 +124,7 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
         provenance: ModelProvenance {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: command.to_owned(),
+            estimator: None,
             as_declared: machine.as_declared,
             seed: None,
             inputs: inputs

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
 use super::first_look::FirstLook;
+use super::held_torque::HeldTorque;
 use cft_ident_core::motion::{MotionError, RunError, Stretch, Summary, ZeroOrderHold};
 use cft_ident_core::number::{self, clock};
 use cft_ident_core::robot::Robot;
@@ -20,6 +21,8 @@ pub struct OpenLog<'a> {
     pub(super) control: &'a Control,
     /// Brings motor forces by a zero-order hold to the rows' own time and pose.
     pub(super) centre: Option<(&'a Robot, ZeroOrderHold)>,
+    /// Torques of effects that a fit holds.
+    pub(super) held: Option<&'a HeldTorque>,
     pub(super) name: String,
     pub(super) look: Arc<FirstLook>,
     pub(super) cutter: Cutter,
@@ -39,6 +42,9 @@ impl OpenLog<'_> {
             if block.tau.is_empty() {
                 // a log without torques moves with none
                 block.tau.resize(block.q.len(), 0.0);
+            }
+            if let Some(held) = self.held {
+                held.take_off(block);
             }
             self.cutter.cut(block);
             if !more || !block.is_empty() {

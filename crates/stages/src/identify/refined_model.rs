@@ -1,6 +1,5 @@
 //! The model that a diagnosis comes to, as a file.
 
-use super::consistent::project_by;
 use super::diagnose::Diagnosed;
 use super::error::IdentifyError;
 use super::formulas::{numbers_of, written_sections};
@@ -8,7 +7,8 @@ use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
 use crate::open_loop::{FreeRun, RunSpan, free_run};
-use cft_ident_core::diagnose::{Case, SplitErrors, Unknown, errors_of};
+use cft_ident_core::diagnose::Unknown;
+pub(super) use cft_ident_core::diagnose::value_of;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -30,37 +30,11 @@ impl Diagnosed {
             return Ok(None);
         }
         let before = refined(given, name)?;
-        let after = match self.diagnosis.written().next() {
-            None => None,
-            Some(_) => Some(refined(&self.model(machine, given), name)?),
-        };
+        let added = self.diagnosis.written().next().is_some();
+        let after = added.then_some(&self.diagnosis.in_use);
         let stretches = &self.in_memory.stretches;
         let spans = self.held_out_spans();
-        Ok(free_run(&before, after.as_ref(), stretches, &spans))
-    }
-
-    /// Errors before and after by the parameters that torques are computed with, in place of those of the plain fit.
-    pub(super) fn judge_in_use(
-        &mut self,
-        machine: &LoggedRobot,
-        case: &Case,
-        (name, given): (&str, &ModelFile),
-    ) -> Result<(), IdentifyError> {
-        let together = self.diagnosis.together;
-        let of = |file: &ModelFile| -> Result<SplitErrors, IdentifyError> {
-            errors_of(case, together, &refined(file, name)?).map_err(IdentifyError::Diagnose)
-        };
-        let before = of(given)?;
-        let after = match self.diagnosis.written().next() {
-            None => before.clone(),
-            Some(_) => of(&self.model(machine, given))?,
-        };
-        self.diagnosis.before = before;
-        match &mut self.diagnosis.selected {
-            Some(selected) => *selected = after,
-            None => self.diagnosis.after = after,
-        }
-        Ok(())
+        Ok(free_run(&before, after, stretches, &spans))
     }
 
     /// Held-out spans of the stretches; all of them where nothing is held out.
@@ -89,21 +63,85 @@ impl Diagnosed {
 
     /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
     pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
-        let diagnosis = &self.diagnosis;
-        if diagnosis.written().next().is_none() {
+        let Some(fitted) = &self.fitted else {
             return file.clone();
-        }
+        };
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
-        model.parameters.clone_from(&file.parameters);
-        // inertial parameters that are kept are as consistent as they were
-        let kept = !diagnosis
-            .unknowns
-            .iter()
-            .any(|u| matches!(u, Unknown::Theta(_)));
-        if !kept {
-            model.forget_consistent();
-        }
+        model.parameters.clone_from(&fitted.parameters);
+        model.covariance.clone_from(&fitted.covariance);
+        model.residual_std.clone_from(&fitted.residual_std);
+        model.links.clone_from(&fitted.links);
+        model.drive_inertia.clone_from(&fitted.drive_inertia);
         model.friction_prior.clone_from(&self.friction_prior);
+        match self.by_lsq {
+            true => self.put_deviations_of_lsq(file, &mut model),
+            false => self.put_deviations(machine, file, &mut model),
+        }
+        self.put_effects(machine, file, &mut model);
+        let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
+        let formulas = written_sections(self);
+        let known = file.candidates.iter().chain(&self.candidates);
+        let known = known.chain(&formulas);
+        for candidate in known.filter(of_model) {
+            if !model.candidates.contains(candidate) {
+                model.candidates.push(candidate.clone());
+            }
+        }
+        self.held.write_into(&mut model);
+        model
+    }
+
+    /// Deviations of numbers that `lsq` fitted beside the effects: its own and what the effects' amplitudes add.
+    fn put_deviations_of_lsq(&self, file: &ModelFile, model: &mut ModelFile) {
+        let d = &self.diagnosis;
+        let place = |key: &String| {
+            let mut keys = d.unknowns.iter().map(|u| key_of(&d.model, *u));
+            keys.position(|(name, joint)| match joint {
+                Some(joint) => *key == format!("{name}:{joint}"),
+                None => *key == name,
+            })
+        };
+        if let Some(covariance) = &mut model.covariance {
+            let places: Vec<Option<usize>> = covariance.names.iter().map(place).collect();
+            for (row, a) in covariance.matrix.iter_mut().zip(&places) {
+                for (x, b) in row.iter_mut().zip(&places) {
+                    if let (Some(a), Some(b)) = (*a, *b) {
+                        *x += d.by_effects[(a, b)];
+                    }
+                }
+            }
+        }
+        let whole = self.is_whole();
+        for p in &mut model.parameters {
+            let Some(i) = place(&p.key()) else { continue };
+            let std = p.std.map(|std| std.hypot(d.by_effects[(i, i)].max(0.0).sqrt()));
+            if whole {
+                p.std = std;
+                if let Some(std) = std.filter(|_| !p.is_negligible()) {
+                    p.verdict = Some(verdict_of(p.value, std));
+                }
+                continue;
+            }
+            // beside a part of an effect the declared numbers take up the rest, and are no estimates
+            model.estimates.push(Estimate {
+                name: p.name.clone(),
+                joint: p.joint.clone(),
+                value: p.value + d.to_estimate[i],
+                std,
+                unit: p.unit.clone(),
+            });
+            p.std = None;
+        }
+        if !whole {
+            model.estimate_covariance = model.covariance.take();
+        } else {
+            model.estimate_covariance.clone_from(&file.estimate_covariance);
+        }
+    }
+
+    /// Deviations of numbers by the judge's sums: those of the joint fit.
+    fn put_deviations(&self, machine: &LoggedRobot, file: &ModelFile, model: &mut ModelFile) {
+        let diagnosis = &self.diagnosis;
         // beside a part of an effect the declared numbers take up the rest, and are no estimates
         let whole = self.is_whole();
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
@@ -112,20 +150,18 @@ impl Diagnosed {
             if self.hold_friction && matches!(unknown, Unknown::Friction { .. }) {
                 continue;
             }
-            let Some((name, joint, value)) = fitted(&diagnosis.model, *unknown) else {
-                continue;
-            };
+            let (name, joint) = key_of(&diagnosis.model, *unknown);
+            let value = value_of(&diagnosis.model, *unknown);
             let there = |p: &&mut Parameter| p.name == name && p.joint == joint;
             let Some(p) = model.parameters.iter_mut().find(there) else {
                 continue;
             };
             let found = diagnosis.covariance[(i, i)].max(0.0).sqrt();
             if !whole {
-                let estimate = fitted(&diagnosis.estimates, *unknown).map_or(value, |f| f.2);
                 model.estimates.push(Estimate {
                     name,
                     joint,
-                    value: estimate,
+                    value: value_of(&diagnosis.estimates, *unknown),
                     std: Some(found),
                     unit: p.unit.clone(),
                 });
@@ -157,29 +193,6 @@ impl Diagnosed {
         for (joint, std) in joints.zip(&diagnosis.residual_std) {
             model.residual_std.insert(joint.clone(), *std);
         }
-        self.put_effects(machine, file, &mut model);
-        let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
-        let formulas = written_sections(self);
-        let known = file.candidates.iter().chain(&self.candidates);
-        let known = known.chain(&formulas);
-        for candidate in known.filter(of_model) {
-            if !model.candidates.contains(candidate) {
-                model.candidates.push(candidate.clone());
-            }
-        }
-        self.held.write_into(&mut model);
-        if !kept && file.is_consistent() {
-            let key = |unknown: &Unknown| match fitted(&diagnosis.model, *unknown) {
-                Some((name, Some(joint), _)) => format!("{name}:{joint}"),
-                Some((name, None, _)) => name,
-                None => String::new(),
-            };
-            let unknowns: Vec<String> = diagnosis.unknowns.iter().map(key).collect();
-            if project_by(&mut model, &unknowns, &diagnosis.information).is_err() {
-                model.forget_consistent();
-            }
-        }
-        model
     }
 
     /// Covariance of unknowns, by key and place.
@@ -238,32 +251,22 @@ impl Diagnosed {
     }
 }
 
-/// Name, joint and value of an unknown that model files hold.
-fn fitted(model: &AugmentedModel, unknown: Unknown) -> Option<(String, Option<String>, f64)> {
-    let fitted = &model.model;
-    let robot = &fitted.robot;
-    let (name, joint, value) = match unknown {
-        Unknown::Theta(k) => (
-            robot.parameters()[k].name.to_string(),
-            None,
-            fitted.theta[k],
-        ),
-        Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
-        Unknown::Friction { joint, k } => match &fitted.friction[joint] {
-            JointFriction::None => return None,
-            JointFriction::DoubleTanh(law) => (
-                DoubleTanh::NAMES[k].to_owned(),
-                Some(joint),
-                law.parameters()[k],
-            ),
-            JointFriction::ViscousCoulomb(law) => (
-                ViscousCoulomb::NAMES[k].to_owned(),
-                Some(joint),
-                [law.viscous, law.coulomb][k],
-            ),
-        },
+/// Name and joint of an unknown, as model files have them.
+pub(super) fn key_of(model: &AugmentedModel, unknown: Unknown) -> (String, Option<String>) {
+    let robot = &model.model.robot;
+    let (name, joint) = match unknown {
+        Unknown::Theta(k) => (robot.parameters()[k].name.to_string(), None),
+        Unknown::Offset(j) => ("offset".to_owned(), Some(j)),
+        Unknown::Friction { joint, k } => {
+            let name = match &model.model.friction[joint] {
+                JointFriction::None => "",
+                JointFriction::DoubleTanh(_) => DoubleTanh::NAMES[k],
+                JointFriction::ViscousCoulomb(_) => ViscousCoulomb::NAMES[k],
+            };
+            (name.to_owned(), Some(joint))
+        }
     };
-    Some((name, joint.map(|j| robot.joint_names()[j].clone()), value))
+    (name, joint.map(|j| robot.joint_names()[j].clone()))
 }
 
 /// Gives a parameter what was found; how much wider its deviation is, where nothing else explains the same torque.

@@ -7,7 +7,7 @@ use super::channels::Carried;
 use super::problem::Problem;
 use super::trial::Trial;
 use cft_ident_core::inertia::columns::Own;
-use cft_ident_core::judge::NUMBERS;
+use cft_ident_core::judge::{NUMBERS, PARTS};
 
 /// A joint whose friction drives it, whichever block is left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,7 +103,7 @@ fn below(trial: &Trial, f: &DVector<f64>) -> Option<(f64, f64)> {
     let (mean, std) = jackknife(&values);
     let all = values.iter().all(|x| *x < 0.0);
     // as sure as an agreement of parts
-    let beyond = mean * mean * (1.0 - NUMBERS.confirmed) > NUMBERS.doubt * std * std;
+    let beyond = mean * mean * (1.0 - NUMBERS.confirmed) > PARTS.doubt * std * std;
     (all && beyond).then_some((mean, std))
 }
 

@@ -10,7 +10,7 @@ use super::channels::{Carried, Channels, Drive};
 use super::correction::Correction;
 use super::sample::Sample;
 use cft_ident_core::inertia::columns::{Own, RegressorColumns};
-use cft_ident_core::judge::{Blocks, Bound, NUMBERS, Term, divide};
+use cft_ident_core::judge::{Blocks, Bound, PARTS, Term, divide};
 use cft_ident_core::math::gram::{gram, stride};
 use cft_ident_core::robot::Robot;
 
@@ -99,7 +99,7 @@ impl<'a> Problem<'a> {
         // a motor behind a linkage is no joint
         let linked = channels.drive == Drive::Motors;
         Self {
-            blocks: divide(&sample.logs(), 1.0, &NUMBERS),
+            blocks: divide(&sample.logs(), 1.0, (PARTS.parts, PARTS.blocks_per_part)),
             moving: joints_that_move(&sample, linked),
             robot,
             in_gravity,

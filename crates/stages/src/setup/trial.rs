@@ -201,12 +201,12 @@ impl Compared {
         better.retain(|j| changed(j, 1.0));
         let only = before.only(&better);
         let errors = (&before.left_out[..], &after.left_out[..]);
-        let parts = agreement_on_share(errors, &only, &problem.blocks, &NUMBERS);
+        let parts = agreement_on_share(errors, &only, &problem.blocks);
         let floor = after.square(&better) <= LIMITS.floor * before.square(&better);
         let beyond = before.gain(after, &better).is_beyond(NUMBERS.screen, None);
         Self {
             harms: everyone.iter().any(|j| changed(j, -1.0)),
-            agreed: if floor && beyond { parts.s } else { 0.0 },
+            agreed: if floor && beyond { parts } else { 0.0 },
             better,
         }
     }

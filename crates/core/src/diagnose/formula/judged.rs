@@ -1,5 +1,5 @@
 //! Formulas before the judge of every other effect: each an effect of the user's own whose shapes are refined, asked of
-//! parts and of data set aside.
+//! blocks and of data set aside.
 
 use super::Proposed;
 use super::picture::OnHeldOut;
@@ -44,8 +44,8 @@ impl PreparedCase<'_> {
             let first = judged.steps.len() - all.len();
             for (p, step) in all.iter().zip(&judged.steps[first..]) {
                 let mut found = self.found(searched, confirmed, p, step.clone());
-                if let Some(place) = step.judged {
-                    let held = OnHeldOut::of(self, (&judged.judge, place), p.joint)?;
+                if let Some(place) = step.written {
+                    let held = OnHeldOut::of(self, (&judged.proposed, place), p.joint)?;
                     found.picture = held.picture(&found.signals);
                     found.at_reversals = held.at_reversals();
                 }
@@ -105,7 +105,8 @@ impl PreparedCase<'_> {
         let first = chosen.len() - taken.len();
         let field = self.field(&candidates, &summed);
         for at in first..chosen.len() {
-            (chosen[at].gain, chosen[at].error) = beside_the_others(&field, &chosen, at)?;
+            let beside = beside_the_others(&field, &chosen, at)?;
+            (chosen[at].gain, chosen[at].error) = (beside.gain, beside.error);
         }
         let case = SearchedCase {
             noisier: Some(self.noisier(&summed, &candidates)?),
@@ -194,7 +195,7 @@ impl PreparedCase<'_> {
         let replaced = confirmed.iter().filter(stays);
         let end = match &step {
             _ if of.p_value > self.case.formula.chance => FormulaEnd::Chance,
-            step if step.status == StepStatus::Seen => FormulaEnd::Parts,
+            step if step.status == StepStatus::Seen => FormulaEnd::Unsure,
             step if step.joints.iter().any(|j| j.worsened) => FormulaEnd::Worse,
             _ => FormulaEnd::Found,
         };

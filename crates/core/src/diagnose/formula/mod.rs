@@ -5,7 +5,7 @@
 //!      -> library: functions of signals, and products of two, whose units one constant makes right
 //!      -> select: the greatest gain on blocks left out, exchanged, pruned
 //!      -> chance: the same search where whole parts of the residual have another sign
-//!      -> judged: its shapes refined, then parts, held-out data, no joint worse
+//!      -> judged: its shapes refined, its amplitude, held-out data, no joint worse
 //! ```
 //!
 //! Regression with few terms on a library (Brunton, Proctor and Kutz 2016), and not by evolution of trees: a library's
@@ -44,7 +44,7 @@ use super::searched::SearchedCase;
 use super::steps::Judged;
 use super::watch::Watch;
 use crate::effect::{AugmentedModel, Place};
-use crate::judge::{LEAST_PARTS, compare};
+use crate::judge::compare;
 
 /// A formula of a joint before the judge.
 pub struct Proposed {
@@ -65,12 +65,12 @@ impl PreparedCase<'_> {
         found: &Diagnosis,
         watch: Watch,
     ) -> Result<SearchedFormulas, DiagnoseError> {
-        let joints: Vec<usize> = match self.blocks.parts >= LEAST_PARTS {
+        let joints: Vec<usize> = match self.blocks.list.len() >= self.case.numbers.least_blocks {
             true => found.structured_joints().collect(),
             false => Vec::new(),
         };
         let confirmed = searched.chosen.iter().zip(&judged.steps);
-        let confirmed = confirmed.filter(|(_, step)| step.judged.is_some());
+        let confirmed = confirmed.filter(|(_, step)| step.written.is_some());
         let confirmed: Vec<Chosen> = confirmed.map(|(c, _)| c.clone()).collect();
         let part = watch.part("formulas", joints.len());
         let mut proposed = Vec::new();

@@ -11,8 +11,10 @@ use crate::robot::drive::JointDrive;
 
 /// What a diagnosis works on.
 pub struct Case {
-    /// The declared model as it was given.
+    /// The declared model as it was fitted: what effects are looked for beside.
     pub given: AugmentedModel,
+    /// The given model as torques are computed with it.
+    pub in_use: AugmentedModel,
     pub prior: ParameterPrior,
     pub open: FreeParameters,
     pub stretches: Vec<Stretch>,
@@ -43,8 +45,6 @@ pub struct Case {
 /// What the user asks for besides.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Wishes {
-    /// The written model is halfway between the given one and that of the judge.
-    pub cautious: bool,
     /// Effects that are written whatever the judge says: name, and joint where it is of one.
     pub accepted: Vec<(String, Option<String>)>,
     /// A formula of what is left is looked for.
@@ -75,7 +75,8 @@ pub fn formula_name(joint: &str) -> String {
 }
 
 impl Case {
-    pub(crate) fn unknowns(&self) -> Unknowns {
+    /// The declared unknowns.
+    pub fn unknowns(&self) -> Unknowns {
         Unknowns::of(&self.given, &self.open, self.keep)
     }
 

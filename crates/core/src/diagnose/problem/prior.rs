@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::unknowns::{Unknown, Unknowns, value};
+use super::unknowns::{Unknown, Unknowns, value_of};
 use crate::effect::AugmentedModel;
 use crate::robot::model::JointFriction;
 
@@ -45,7 +45,7 @@ impl ParameterPrior {
             self.rows_per_independent * self.information[(places[a], places[b])]
         });
         let off = unknowns.list.iter();
-        let off = off.map(|x| value(&self.centre, *x) - value(model, *x));
+        let off = off.map(|x| value_of(&self.centre, *x) - value_of(model, *x));
         let pull = &information * DVector::from_iterator(u, off);
         (information, pull)
     }

@@ -86,7 +86,8 @@ pub fn step(model: &mut AugmentedModel, unknowns: &Unknowns, delta: &[f64]) {
     }
 }
 
-pub fn value(model: &AugmentedModel, unknown: Unknown) -> f64 {
+/// Value of an unknown in a model.
+pub fn value_of(model: &AugmentedModel, unknown: Unknown) -> f64 {
     match unknown {
         Unknown::Theta(i) => model.model.theta[i],
         Unknown::Offset(j) => model.model.offset[j],

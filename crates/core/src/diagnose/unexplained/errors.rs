@@ -64,14 +64,9 @@ pub struct JointChange {
 }
 
 impl JointChange {
-    /// Whether the interval lies below zero.
-    pub(crate) fn improved(&self) -> bool {
-        self.interval_95[1] < 0.0
-    }
-
-    /// Whether it worsened by an amount that shows in a report: with rows enough any change is surely above zero.
-    pub(crate) fn noticeably_worse(&self) -> bool {
-        self.worsened && self.after - self.before > NOTICEABLE * self.before
+    /// Whether it worsened by this part of the error: with rows enough any change is surely above zero.
+    pub(crate) fn noticeably_worse(&self, noticeable: f64) -> bool {
+        self.worsened && self.after - self.before > noticeable * self.before
     }
 }
 
@@ -91,9 +86,6 @@ pub struct PieceErrors {
     /// Squared error and torque, and number, of the rows in which the joint rests.
     rest: [f64; 3],
 }
-
-/// Relative change of an error below which it is not reported as worse.
-const NOTICEABLE: f64 = 0.01;
 
 const SEED: u64 = 20_020_520;
 
@@ -295,9 +287,9 @@ mod tests {
         let of = |after: f64| changes(&joints, (&pieces(0.00146), &pieces(after)), 1).remove(0);
         let tiny = of(0.001461);
         assert!(tiny.worsened && tiny.interval_95[0] > 0.0, "{tiny:?}");
-        assert!(!tiny.noticeably_worse(), "{tiny:?}");
-        assert!(of(0.0016).noticeably_worse());
+        assert!(!tiny.noticeably_worse(0.02), "{tiny:?}");
+        assert!(of(0.0032).noticeably_worse(0.02));
         let better = of(0.0013);
-        assert!(better.improved() && !better.worsened && !better.noticeably_worse());
+        assert!(!better.worsened && !better.noticeably_worse(0.02));
     }
 }

@@ -1,7 +1,7 @@
 //! The report of `diagnose`.
 
 use super::diagnose_words::{errors as errors_of, words};
-use super::step_words::{agreement, alternatives, grade, in_words, worsened};
+use super::step_words::{alternatives, certainty, grade, in_words, seen, torque, worsened};
 use super::{first_screen, formulas, found_effects, what_is_left};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
@@ -103,6 +103,7 @@ pub(super) fn diagnosed(
     let d = &found.diagnosis;
     report.terminal().line("");
     in_short(&mut report.usual(), machine, d);
+    report.terminal().list(d.steps.iter().filter_map(|step| seen(machine, step)));
     let mut detail = report.detail();
     detail.table(before_and_after(machine, d));
     if !d.steps.is_empty() {
@@ -191,7 +192,13 @@ fn numbered(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usize
         let worse = worsened(step);
         format!("held-out data, the others kept and refitted: {before} without it, {after} with it{worse}")
     });
-    let lines = [format!("{}: {}", grade(step), agreement(step)), gain];
+    let sure = format!(
+        "{}: torque {} (rms, 95 % CI), {}",
+        grade(step),
+        torque(machine, step),
+        certainty(step)
+    );
+    let lines = [sure, gain];
     let more = unseen.into_iter().chain(alternatives(machine, step));
     for line in lines.into_iter().chain(more) {
         terminal.note(MARGIN, &line, 7);
@@ -278,6 +285,7 @@ pub(super) fn sections(
     }
     page.list(doubts(machine, found));
     found_effects::show(page, machine, found, replayed);
+    page.list(d.steps.iter().filter_map(|step| seen(machine, step)));
     page.list(changes(machine, found));
     let errors = errors_of(d.errors_now()).1.joints.iter();
     let errors = errors.map(|e| e.relative_error);

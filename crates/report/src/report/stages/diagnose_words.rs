@@ -23,22 +23,17 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) 
             return (text.to_owned(), false);
         }
         _ if !d.long_enough() => format!(
-            "These logs are too short to confirm an effect: they give {} independent parts of {} s, where {} are usual (fewer must agree more closely), and nothing is written.",
-            d.parts,
+            "These logs are too short to find an effect: {} blocks of {} s, {} are needed.",
+            d.blocks,
             number::significant(d.block_s, 2),
-            d.parts_needed
+            d.least_blocks
         ),
         DiagnosisVerdict::NothingMissing if d.steps.is_empty() => {
             "Nothing is missing: the remaining residual is noise.".to_owned()
         }
         DiagnosisVerdict::NothingMissing => "Nothing that matters is missing.".to_owned(),
-        _ => "No effect is confirmed: a residual above the noise is left that none explains in all parts of the data."
-            .to_owned(),
+        _ => "No effect is sure enough to be written; more than noise is left.".to_owned(),
     };
-    if !matches!(lacking, DiagnosisVerdict::EffectsFound) && not_written(d).next().is_some() {
-        let added = added(machine, d);
-        text += &format!(" {} (`--accept` writes it).", added.trim_end_matches('.'));
-    }
     let (bought, gains_nothing) = bought(d);
     text += &format!(" {bought}");
     text += &taken_out(machine, d);
@@ -84,12 +79,6 @@ pub(super) fn is_exact(d: &Diagnosis) -> bool {
     errors(d.errors_now()).1.overall.mean_relative_error < 0.5 * least
 }
 
-/// Effects that the parts speak for, too little for one that can be measured.
-fn not_written(d: &Diagnosis) -> impl Iterator<Item = &FoundEffect> {
-    let indicated = d.steps.iter().filter(|s| s.status == StepStatus::Indicated);
-    indicated.filter(|s| s.written.is_none() && !s.vetoed())
-}
-
 /// The effects of the written model, by how firm they are.
 fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
     let graded = |grade: &str, steps: Vec<&FoundEffect>| {
@@ -109,7 +98,6 @@ fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
         steps.filter(|s| s.status == status).collect::<Vec<_>>()
     };
     let wanted = d.written().filter(|s| s.accepted_by_user).collect();
-    let left = not_written(d).collect();
     let firm = match d.after.holdout {
         Some(_) => "confirmed, on held-out data too",
         None => "confirmed",
@@ -118,7 +106,6 @@ fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
         graded(firm, by(StepStatus::Confirmed)),
         graded("indicated, and written in part", by(StepStatus::Indicated)),
         graded("written because you asked for it", wanted),
-        graded("indicated, and not written", left),
     ];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }

@@ -102,9 +102,9 @@ pub(super) fn next(machine: &LoggedRobot, found: &Diagnosed, (path, logs): (&str
     }
     if !d.long_enough() && d.written().next().is_none() {
         return format!(
-            "Next: log for longer: {} s at least, {} parts of {} s each.",
-            number::significant(d.block_s * d.parts_needed as f64, 2),
-            d.parts_needed,
+            "Next: log for longer: {} s at least ({} blocks of {} s).",
+            number::significant(d.block_s * d.least_blocks as f64, 2),
+            d.least_blocks,
             number::significant(d.block_s, 2)
         );
     }

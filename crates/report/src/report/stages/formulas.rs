@@ -77,7 +77,7 @@ fn why_not(of: &FormulaResult) -> String {
             "chance makes as much in {} of searches",
             number::percent(of.p_value)
         ),
-        FormulaEnd::Parts => "the parts of the data do not agree".to_owned(),
+        FormulaEnd::Unsure => "its amplitude is too uncertain".to_owned(),
         FormulaEnd::Worse => "a joint gets worse on data set aside".to_owned(),
     }
 }

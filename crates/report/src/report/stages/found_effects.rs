@@ -1,6 +1,6 @@
 //! The effects that a diagnosis found, on a page: a table of their numbers, and a card for each that is written.
 
-use super::step_words::{agreement, alternatives, grade, in_words, titled, worsened};
+use super::step_words::{alternatives, certainty, grade, in_words, titled, torque, worsened};
 use crate::report::Writer;
 use crate::report::sections::effects;
 use crate::report::table::Columns;
@@ -32,7 +32,8 @@ pub(super) fn show(
         .words("parameters", |step| in_words(machine, step))
         .percent("gain on blocks left out", |step| step.share)
         .words("grade", grade)
-        .words("agreement", agreement);
+        .words("torque (rms, 95 % CI)", |step| torque(machine, step))
+        .words("certainty", certainty);
     page.table_if_any(columns);
 }
 

@@ -1,10 +1,10 @@
 //! One effect that was found, in words.
 
 use crate::report::words::{listed, scaled};
-use cft_ident_core::diagnose::{FoundEffect, StepStatus};
+use cft_ident_core::diagnose::{FoundEffect, NotWritten, StepStatus};
 use cft_ident_core::effect::Added;
 use cft_ident_core::number;
-use cft_ident_stages::identify::{LoggedRobot, numbers_of};
+use cft_ident_stages::identify::{LoggedRobot, accept_option, numbers_of};
 
 /// The joints that an effect makes worse on held-out data, with the change of their errors.
 pub(super) fn worsened(step: &FoundEffect) -> String {
@@ -22,39 +22,57 @@ pub(super) fn worsened(step: &FoundEffect) -> String {
     }
 }
 
-/// How firm an effect is, in a word, and whether it is written.
+/// How firm an effect is, in a word.
 pub(super) fn grade(step: &FoundEffect) -> &'static str {
-    match (step.status, step.written) {
+    match step.status {
         _ if step.accepted_by_user => "written because you asked for it",
-        (StepStatus::Confirmed, _) => "confirmed",
-        (StepStatus::Indicated, Some(_)) => "indicated",
-        (StepStatus::Indicated, None) => "indicated, not written",
-        (StepStatus::Seen, _) => "nothing",
+        StepStatus::Confirmed => "confirmed",
+        StepStatus::Indicated => "indicated",
+        StepStatus::Seen => "seen, not written",
     }
 }
 
-/// How far the parts of the data agree on an effect, and how much of it is written for that.
-pub(super) fn agreement(step: &FoundEffect) -> String {
-    let of_parts = format!(
-        "s = {} by {} parts of the data",
-        number::significant(step.shrinkage, 2),
-        step.parts.len()
+/// How sure an effect is, and how much of it is written for that.
+pub(super) fn certainty(step: &FoundEffect) -> String {
+    let by = format!(
+        "{} standard deviations by {:.0} blocks",
+        number::significant(step.deviations, 2),
+        step.blocks
     );
     let measurable = step.estimate.law.entry.measurable;
-    match (step.status, step.written) {
-        _ if step.accepted_by_user => of_parts,
-        (StepStatus::Seen, _) => "the parts of the data do not agree on its size".to_owned(),
-        (_, Some(_)) if measurable => format!("{of_parts}, written as estimated"),
-        (_, Some(_)) => format!(
-            "{of_parts}, written with {} of it",
-            number::percent(step.shrinkage)
-        ),
-        (_, None) if step.vetoed() => format!("{of_parts}; held-out data are worse with it"),
-        (_, None) if measurable => {
-            format!("{of_parts}; it can be measured, and is written from s = 0.8 on")
+    match step.left {
+        _ if step.accepted_by_user => by,
+        None if measurable => format!("{by}, written as estimated"),
+        None => format!("{by}, written with {} of it", number::percent(step.shrinkage)),
+        Some(NotWritten::HeldOut) => format!("{by}; held-out data are worse with it"),
+        Some(NotWritten::Bound) => "at a bound beside the other effects".to_owned(),
+        Some(NotWritten::Small) => format!("{by}; it changes no error noticeably"),
+        Some(NotWritten::Unsure) if measurable && step.shrinkage > 0.0 => {
+            format!("{by}; it can be measured, and is written from 11 on")
         }
-        (_, None) => format!("{of_parts}; the model is worse with all that was found"),
+        Some(NotWritten::Unsure) => format!("{by}; it is written from 5 on"),
     }
+}
+
+/// The torque that an effect makes, root mean square, with its 95 % CI.
+pub(super) fn torque(machine: &LoggedRobot, step: &FoundEffect) -> String {
+    let [torque, std] = step.torque;
+    let unit = machine.file.torque_unit(step.estimate.place.joint().unwrap_or(0));
+    format!("{} {unit}", number::plus_minus(torque, 1.96 * std))
+}
+
+/// An effect that is not written, in a line: its torque, what it would gain, and what writes it.
+pub(super) fn seen(machine: &LoggedRobot, step: &FoundEffect) -> Option<String> {
+    let option = accept_option(&step.estimate, &machine.robot);
+    (step.status == StepStatus::Seen && !step.accepted_by_user).then(|| {
+        format!(
+            "seen, not written: {}, torque {} (rms, 95 % CI); would take {} off the squared error of blocks left out; {}; `{option}` writes it",
+            step.estimate.title(&machine.robot),
+            torque(machine, step),
+            number::percent(step.share.max(0.0)),
+            certainty(step)
+        )
+    })
 }
 
 /// The name of an effect where it was found.

@@ -1,0 +1,351 @@
+//! The amplitude of an effect in the joint fit over its own deviation, by leaving out each block: the interval that is
+//! printed is the one that judges.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::Numbers;
+use super::bounded::{self, Bound};
+use super::sums::{BlockSums, Terms};
+
+/// Places of an effect's terms: its coefficients, and the slopes by which its shape is free.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectTerms {
+    pub coefficients: Range<usize>,
+    pub slopes: Vec<usize>,
+}
+
+/// Fits of all terms together, to all blocks and with each of them left out.
+pub struct JointFit {
+    terms: Terms,
+    total: Vec<DMatrix<f64>>,
+    /// Values of the terms by all blocks.
+    pub values: DVector<f64>,
+    /// The same without each block; what the fit to all has at a bound is held there.
+    without: Vec<DVector<f64>>,
+    at_bound: Vec<bool>,
+    /// Sums of products of every block, `[block][joint]`.
+    blocks: Vec<Vec<DMatrix<f64>>>,
+    /// Rows of each joint.
+    rows: Vec<f64>,
+    /// Covariance of the values by what was known before, in the unit of [`JointFit::covariance`].
+    known: DMatrix<f64>,
+}
+
+/// What the blocks say of an effect's amplitude.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Amplitude {
+    /// Coefficients of the joint fit.
+    pub values: Vec<f64>,
+    /// a' V^-1 a / k of the torque that the k free coefficients make, each measured along its own column.
+    pub f: f64,
+    /// The F that chance exceeds as rarely as five deviations of one number; none where too few blocks tell.
+    pub floor: Option<f64>,
+    /// Number of blocks that hold the information.
+    pub blocks: f64,
+    /// Root mean square of its torque over the rows of the joints that it acts on, and the standard deviation.
+    pub torque: [f64; 2],
+    /// Factor of its amplitude in predictions, 0..1.
+    pub s: f64,
+}
+
+impl Amplitude {
+    /// How many of its deviations one number would have to be off zero to be as sure.
+    pub fn deviations(&self, numbers: &Numbers) -> f64 {
+        let floor = self.floor.unwrap_or(f64::INFINITY);
+        numbers.deviations * (self.f / floor).sqrt()
+    }
+
+    /// F over its floor; 0 where there is none.
+    pub fn certainty(&self) -> f64 {
+        self.floor.map_or(0.0, |floor| self.f / floor)
+    }
+}
+
+impl JointFit {
+    /// Fits terms to the first `fitted` blocks; information of what is known beforehand counts in rows of which so many
+    /// are one independent row. None where the data determine nothing.
+    pub fn new(sums: &BlockSums, fitted: usize, terms: Terms, rows: f64) -> Option<Self> {
+        let total = sums.over(0..fitted);
+        let own = terms.own_of_all();
+        let all = terms.normal(&total);
+        let diagonal: Vec<f64> = all.0.diagonal().iter().map(|x| x.max(1e-300)).collect();
+        let (mut normal, mut side) = all.clone();
+        terms.firm(&mut normal, &mut side, &diagonal);
+        let mut bounds: Vec<Bound> = terms.list.iter().map(|t| t.bound).collect();
+        let values = bounded::solve(&normal, &side, &bounds);
+        if !values.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let mut at_bound = vec![false; terms.len()];
+        for ((bound, x), at) in bounds.iter_mut().zip(&values).zip(&mut at_bound) {
+            *at = *x <= bound.least || *x >= bound.most;
+            if *at {
+                (bound.least, bound.most) = (*x, *x);
+            }
+        }
+        let without = sums.blocks[..fitted].iter().map(|block| {
+            let mut others = all.clone();
+            terms.add_normal(&own, block, -1.0, &mut others);
+            let (mut normal, mut side) = others;
+            terms.firm(&mut normal, &mut side, &diagonal);
+            bounded::solve(&normal, &side, &bounds)
+        });
+        let without = without.collect();
+        let known = terms.known_before(&total)? * rows;
+        Some(JointFit {
+            without,
+            at_bound,
+            blocks: sums.blocks[..fitted].to_vec(),
+            rows: (0..total.len()).map(|j| sums.rows_of(j)).collect(),
+            known,
+            terms,
+            total,
+            values,
+        })
+    }
+
+    /// Covariance of all values: their scatter over fits without each block, and what was known before.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let each = self.without.iter().map(|x| x - &self.values);
+        self.scatter(each) + &self.known
+    }
+
+    /// (n - 1) / n of the sum of squares: the variance of an estimate from those without each of n blocks.
+    fn scatter(&self, each: impl Iterator<Item = DVector<f64>>) -> DMatrix<f64> {
+        let (mut out, mut count) = (None, 0.0);
+        for off in each {
+            let out = out.get_or_insert_with(|| DMatrix::zeros(off.len(), off.len()));
+            out.ger(1.0, &off, &off, 1.0);
+            count += 1.0;
+        }
+        let out = out.unwrap_or_else(|| DMatrix::zeros(0, 0));
+        out * ((count - 1.0) / f64::max(count, 1.0))
+    }
+
+    /// What the blocks say of an effect. `noisier` are the sums of all blocks with as much noise again in the
+    /// positions, which may make an effect, and may hide one that is `measured`.
+    pub fn amplitude(
+        &self,
+        effect: &EffectTerms,
+        (noisier, measured): (Option<&[DMatrix<f64>]>, bool),
+        numbers: &Numbers,
+    ) -> Amplitude {
+        let own: Vec<usize> = effect.coefficients.clone().collect();
+        let free: Vec<usize> = own.iter().copied().filter(|i| !self.at_bound[*i]).collect();
+        let mut out = Amplitude {
+            values: own.iter().map(|i| self.values[*i]).collect(),
+            f: 0.0,
+            floor: None,
+            blocks: 0.0,
+            torque: [0.0; 2],
+            s: 0.0,
+        };
+        let joints = 0..self.total.len();
+        let of_joint: Vec<DMatrix<f64>> = joints
+            .clone()
+            .map(|j| self.products(&self.total[j], j, &free, &free))
+            .collect();
+        let sum = |of: &dyn Fn(usize) -> DMatrix<f64>| {
+            let weighed = joints.clone().map(|j| of(j) * self.terms.weights[j]);
+            weighed.fold(None, |sum: Option<DMatrix<f64>>, x| Some(sum.map_or(x.clone(), |s| s + x)))
+        };
+        let Some(gram) = sum(&|j| of_joint[j].clone()) else {
+            return out;
+        };
+        let across = sum(&|j| self.products(&self.total[j], j, &free, &effect.slopes));
+        let (Some(factor), Some(across)) = (firm(&gram, numbers.ridge).cholesky(), across) else {
+            return out;
+        };
+        // the torque that a change of shape makes, along the columns of the coefficients
+        let by_shape = factor.solve(&across);
+        let along = |x: &DVector<f64>| x.select_rows(&free) + &by_shape * x.select_rows(&effect.slopes);
+        let amplitude = along(&self.values);
+        let off = self.without.iter().map(|x| along(x) - &amplitude);
+        let mut spread = self.scatter(off);
+        let places: Vec<usize> = free.iter().chain(&effect.slopes).copied().collect();
+        let known = self.known.select_rows(&places).select_columns(&places);
+        let k = free.len();
+        let mut map = DMatrix::zeros(k, places.len());
+        map.view_mut((0, 0), (k, k)).fill_with_identity();
+        map.view_mut((0, k), (k, effect.slopes.len())).copy_from(&by_shape);
+        spread += &map * known * map.transpose();
+        let pull = &gram * &amplitude;
+        let size = amplitude.dot(&pull);
+        if k == 0 || size.is_nan() || size <= 0.0 {
+            return out;
+        }
+        let part = noisier.map_or(0.0, |sums| self.by_noise(sums, (&own, &free), &pull) / size);
+        // noise must not make an effect; a number that can be measured must not be hidden by it either
+        let part = if measured { part } else { part.max(0.0) };
+        spread.ger(part * part, &amplitude, &amplitude, 1.0);
+        for i in 0..k {
+            spread[(i, i)] += EXACT * amplitude[i] * amplitude[i] + f64::MIN_POSITIVE;
+        }
+        let strongest = joints.clone().max_by(|a, b| {
+            let square = |j: usize| self.terms.weights[j] * amplitude.dot(&(&of_joint[j] * &amplitude));
+            square(*a).total_cmp(&square(*b))
+        });
+        if let Some(j) = strongest {
+            let own = &of_joint[j] * &amplitude;
+            let square = amplitude.dot(&own).max(f64::MIN_POSITIVE);
+            let rms = (square / self.rows[j].max(1.0)).sqrt();
+            out.torque = [rms, rms * own.dot(&(&spread * &own)).max(0.0).sqrt() / square];
+        }
+        let in_block = |block: &Vec<DMatrix<f64>>| -> f64 {
+            let each = block.iter().enumerate().map(|(j, sums)| {
+                let own = self.products(sums, j, &free, &free);
+                self.terms.weights[j] * amplitude.dot(&(own * &amplitude))
+            });
+            each.sum()
+        };
+        let each: Vec<f64> = self.blocks.iter().map(in_block).collect();
+        let (sum, squares) = each.iter().fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
+        out.blocks = sum * sum / f64::max(squares, f64::MIN_POSITIVE);
+        out.floor = floor(k, out.blocks, numbers);
+        if let Some(factor) = spread.cholesky() {
+            out.f = amplitude.dot(&factor.solve(&amplitude)) / k as f64;
+        }
+        out.s = out.floor.map_or(0.0, |floor| (1.0 - floor / out.f).max(0.0));
+        out
+    }
+
+    /// Amplitude of an effect in each block, all else as the joint fit has it; none where its torque is next to nothing.
+    pub fn by_block(&self, effect: &EffectTerms, numbers: &Numbers) -> Vec<Vec<f64>> {
+        let own: Vec<usize> = effect.coefficients.clone().collect();
+        let k = own.len();
+        let each = self.blocks.iter().map(|block| {
+            let (mut gram, mut right) = (DMatrix::zeros(k, k), DVector::zeros(k));
+            for (j, sums) in block.iter().enumerate() {
+                let w = self.terms.weights[j];
+                gram += self.products(sums, j, &own, &own) * w;
+                for (at, i) in own.iter().enumerate() {
+                    right[at] += w * self.left(sums, j, *i);
+                }
+            }
+            (gram, right)
+        });
+        let each: Vec<_> = each.collect();
+        let total = each.iter().fold(DMatrix::zeros(k, k), |t, (g, _)| t + g);
+        let mean = total.trace() / each.len().max(1) as f64;
+        let some = each.iter().filter(|(g, _)| g.trace() > SILENT * mean);
+        let found = some.filter_map(|(gram, right)| {
+            let mut gram = gram.clone();
+            for i in 0..k {
+                gram[(i, i)] += numbers.ridge * total[(i, i)].max(f64::MIN_POSITIVE);
+            }
+            let step = gram.cholesky()?.solve(right);
+            Some(own.iter().zip(step.iter()).map(|(i, x)| self.values[*i] + x).collect())
+        });
+        found.collect()
+    }
+
+    /// Change of the first values by a change of these others, all else held.
+    pub fn declared_by(&self, declared: usize, others: &[usize]) -> Option<DMatrix<f64>> {
+        let normal = self.terms.information(&self.total);
+        let own = normal.view((0, 0), (declared, declared)).into_owned();
+        let first: Vec<usize> = (0..declared).collect();
+        let across = normal.select_rows(&first).select_columns(others);
+        Some(-firm(&own, f64::EPSILON).cholesky()?.solve(&across))
+    }
+
+    /// Information matrix of the first terms alone, in independent rows of which each counts so many.
+    pub fn information(&self, first: usize, rows: f64) -> DMatrix<f64> {
+        let all = self.terms.information(&self.total);
+        all.view((0, 0), (first, first)).into_owned() / rows
+    }
+
+    /// Products of some terms with others in the rows of a joint; 0 for terms that it does not have.
+    fn products(&self, sums: &DMatrix<f64>, j: usize, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+        let column = |i: usize| self.terms.list[i].column(j);
+        DMatrix::from_fn(rows.len(), columns.len(), |a, b| {
+            let both = column(rows[a]).zip(column(columns[b]));
+            both.map_or(0.0, |(a, b)| sums[(a, b)])
+        })
+    }
+
+    /// What is left to pull a term in some rows of a joint.
+    fn left(&self, sums: &DMatrix<f64>, j: usize, term: usize) -> f64 {
+        let Some(column) = self.terms.list[term].column(j) else {
+            return 0.0;
+        };
+        let own = self.terms.own(j);
+        let through: f64 = own.iter().map(|(i, c)| sums[(column, *c)] * self.values[*i]).sum();
+        sums[(column, sums.ncols() - 1)] - through
+    }
+
+    /// Along `pull`, what noise of the positions adds to free coefficients, all other effects held.
+    fn by_noise(
+        &self,
+        noisier: &[DMatrix<f64>],
+        (own, free): (&[usize], &[usize]),
+        pull: &DVector<f64>,
+    ) -> f64 {
+        let declared = self.terms.prior.1.len();
+        let others = (declared..self.terms.len()).filter(|i| !own.contains(i));
+        let held: Vec<(usize, f64)> = others.map(|i| (i, self.values[i])).collect();
+        let change = self.terms.fit(noisier, &held).values - &self.values;
+        change.select_rows(free).dot(pull)
+    }
+}
+
+/// A matrix with a part of its diagonal added.
+fn firm(of: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
+    let mut out = of.clone();
+    for i in 0..out.nrows() {
+        out[(i, i)] += ridge * of[(i, i)] + f64::MIN_POSITIVE;
+    }
+    out
+}
+
+/// Square of the relative deviation of a number that sums of products give exactly.
+const EXACT: f64 = 1e-12;
+/// Part of the mean information below which a block says nothing of an amplitude.
+const SILENT: f64 = 1e-3;
+/// Steps of halving by which the floor is found.
+const HALVINGS: usize = 60;
+
+/// The F of k numbers by n blocks that chance exceeds as rarely as [`Numbers::deviations`] of one number by
+/// [`Numbers::blocks`] (Hotelling 1931); none of too few blocks.
+pub fn floor(k: usize, n: f64, numbers: &Numbers) -> Option<f64> {
+    let chance = |k: f64, n: f64, f: f64| Some(FisherSnedecor::new(k, n).ok()?.sf(f));
+    let usual = numbers.blocks as f64 - 1.0;
+    let rare = chance(1.0, usual, numbers.deviations.powi(2))?;
+    let k = k as f64;
+    // blocks that are not there are not missed
+    let n = n.min(numbers.blocks as f64);
+    if n < numbers.least_blocks as f64 || n <= k {
+        return None;
+    }
+    let (mut low, mut high) = (0.0_f64, 1e9_f64);
+    for _ in 0..HALVINGS {
+        let middle = (low.max(1e-9) * high).sqrt();
+        match chance(k, n - k, middle)? > rare {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    Some((n - 1.0) / (n - k) * high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::NUMBERS;
+
+    #[test]
+    fn the_floor_is_that_of_one_chance_for_every_number_of_numbers_and_blocks() {
+        let of = |k, n| floor(k, n, &NUMBERS).unwrap();
+        let near = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 0.04, "{found} {wanted}");
+        for (k, wanted) in [(1, 25.0), (2, 17.0), (3, 14.0), (4, 13.0), (10, 18.0)] {
+            near(of(k, 24.0), wanted);
+        }
+        for (k, wanted) in [(1, 42.0), (2, 35.0), (3, 38.0), (4, 46.0)] {
+            near(of(k, 12.0), wanted);
+        }
+        assert_eq!(floor(1, 7.9, &NUMBERS), None);
+        assert!(of(1, 8.0) > of(1, 12.0));
+    }
+}
