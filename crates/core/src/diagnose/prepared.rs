@@ -63,7 +63,7 @@ impl<'a> PreparedCase<'a> {
             split,
             rest_speed: &case.rest_speed,
         };
-        let logs = split.logs(&case.stretches, LogRole::Train);
+        let logs = split.logs(case.rows(), LogRole::Train);
         let whole = divide(&logs, f64::INFINITY, (1, 1)).list;
         let fitted = fit(case, &case.given, (&data, &whole), None)?;
         let train = case.stretches_of(LogRole::Train);
@@ -105,7 +105,7 @@ impl<'a> PreparedCase<'a> {
         let least = (numbers.memory_times * memory).max(reach);
         let count = (numbers.blocks, 1);
         self.blocks = divide(logs, least, count);
-        let judging = divide(&split.logs(&case.stretches, LogRole::Veto), least, count);
+        let judging = divide(&split.logs(case.rows(), LogRole::Veto), least, count);
         self.all_blocks = [self.blocks.list.as_slice(), &judging.list].concat();
         let rows = |p: &Piece| p.rows.len() as f64 * split.step_s[p.stretch];
         let lengths: Vec<f64> = split.pieces.iter().map(rows).collect();

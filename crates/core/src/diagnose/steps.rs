@@ -64,6 +64,7 @@ struct Way {
     /// By the joint fit in which it was asked last.
     found: Option<Found>,
     left: Option<NotWritten>,
+    came_back: bool,
     /// Amplitude in the predicting model; none where it is not in it.
     amplitude: Option<Vec<f64>>,
     change: Option<EffectChange>,
@@ -97,13 +98,15 @@ pub fn judge(
         other_numbers: true,
     };
     let mut ways = work.ways(searched);
-    let mut estimates = work.settle(&mut ways)?;
+    work.settle(&mut ways)?;
+    let mut estimates = work.readmit(&mut ways)?;
     work.other_numbers = work.wants_other_numbers(&ways)?;
     let judge = work.written(&ways, &estimates)?;
     let mut written = judge.clone();
     while let Some(harm) = work.harm(&ways, &written.1)? {
         ways[harm].left = Some(NotWritten::HeldOut);
-        estimates = work.settle(&mut ways)?;
+        work.settle(&mut ways)?;
+        estimates = work.readmit(&mut ways)?;
         written = work.written(&ways, &estimates)?;
     }
     work.ask_those_that_left(&mut ways)?;
@@ -140,6 +143,7 @@ impl Judging<'_> {
                 chosen: chosen.clone(),
                 found: None,
                 left: None,
+                came_back: false,
                 amplitude: None,
                 change: None,
             }
@@ -158,8 +162,9 @@ impl Judging<'_> {
                 found.map_or(0.0, |f| f.verified.amplitude.certainty())
             };
             match leaves.min_by(|a, b| certainty(a.0).total_cmp(&certainty(b.0))) {
-                Some((i, why)) => (ways[i].left, ways[i].amplitude) = (Some(why), None),
+                Some((i, why)) => ways[i].left = Some(why),
                 None => {
+                    ways.iter_mut().for_each(|way| way.amplitude = None);
                     for i in set {
                         let factor = self.factor(&ways[i]);
                         let found = ways[i].found.as_ref();
@@ -170,6 +175,43 @@ impl Judging<'_> {
                 }
             }
         }
+    }
+
+    /// Lets those that left come back where they pass beside all that stand, the surest first: of effects that explain
+    /// the same, one that left beside another is surer when that has left too. One stays where blocks left out are
+    /// better explained by the set that settles with it.
+    fn readmit(&self, ways: &mut [Way]) -> Result<Estimates, DiagnoseError> {
+        loop {
+            self.ask_those_that_left(ways)?;
+            let certainty = |i: &usize| {
+                let found = ways[*i].found.as_ref();
+                found.map_or(0.0, |f| f.verified.amplitude.certainty())
+            };
+            let passes = |i: &usize| {
+                let way = &ways[*i];
+                let out = !matches!(way.left, None | Some(NotWritten::HeldOut));
+                out && !way.came_back && self.leaves(way).is_none()
+            };
+            let surest = (0..ways.len()).filter(passes);
+            let Some(i) = surest.max_by(|a, b| certainty(a).total_cmp(&certainty(b))) else {
+                return self.settle(ways);
+            };
+            let before = (self.error_left_out(ways)?, Vec::from_iter(ways.iter().map(|w| w.left)));
+            (ways[i].left, ways[i].came_back) = (None, true);
+            self.settle(ways)?;
+            if self.error_left_out(ways)? >= before.0 {
+                for (way, left) in ways.iter_mut().zip(before.1) {
+                    way.left = left;
+                }
+            }
+        }
+    }
+
+    /// Weighted squared error of blocks left out by all that stand.
+    fn error_left_out(&self, ways: &[Way]) -> Result<f64, DiagnoseError> {
+        let set = ways.iter().filter(|w| w.stands());
+        let set: Vec<Chosen> = set.map(|w| w.chosen.clone()).collect();
+        Ok(self.field.left_out(&self.field.terms(&set))?.error())
     }
 
     /// Asks the blocks for effects in one joint fit.

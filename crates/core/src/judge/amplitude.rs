@@ -43,7 +43,7 @@ pub struct Amplitude {
     pub f: f64,
     /// The F that chance exceeds as rarely as five deviations of one number; none where too few blocks tell.
     pub floor: Option<f64>,
-    /// Number of blocks that hold the information.
+    /// Number of blocks of equal information that would say as much.
     pub blocks: f64,
     /// Root mean square of its torque over the rows of the joints that it acts on, and the standard deviation.
     pub torque: [f64; 2],
@@ -194,22 +194,48 @@ impl JointFit {
             let rms = (square / self.rows[j].max(1.0)).sqrt();
             out.torque = [rms, rms * own.dot(&(&spread * &own)).max(0.0).sqrt() / square];
         }
-        let in_block = |block: &Vec<DMatrix<f64>>| -> f64 {
-            let each = block.iter().enumerate().map(|(j, sums)| {
-                let own = self.products(sums, j, &free, &free);
-                self.terms.weights[j] * amplitude.dot(&(own * &amplitude))
-            });
-            each.sum()
-        };
-        let each: Vec<f64> = self.blocks.iter().map(in_block).collect();
-        let (sum, squares) = each.iter().fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
-        out.blocks = sum * sum / f64::max(squares, f64::MIN_POSITIVE);
-        out.floor = floor(k, out.blocks, numbers);
+        let leverages = self.leverages(&free, &amplitude);
+        if let Some((blocks, wide)) = freedom(&leverages) {
+            out.blocks = blocks;
+            out.floor = floor(k, blocks, numbers).map(|floor| floor / wide);
+        }
+        if self.blocks.len() < numbers.least_blocks {
+            out.floor = None;
+        }
         if let Some(factor) = spread.cholesky() {
             out.f = amplitude.dot(&factor.solve(&amplitude)) / k as f64;
         }
         out.s = out.floor.map_or(0.0, |floor| (1.0 - floor / out.f).max(0.0));
         out
+    }
+
+    /// Part of the information on an amplitude that each block holds: of the square of its torque beside what all other
+    /// terms explain of it.
+    fn leverages(&self, free: &[usize], amplitude: &DVector<f64>) -> Vec<f64> {
+        let normal = self.terms.information(&self.total);
+        let others: Vec<usize> = (0..self.terms.len()).filter(|i| !free.contains(i)).collect();
+        let own = normal.select_rows(&others).select_columns(&others);
+        let across = normal.select_rows(&others).select_columns(free) * amplitude;
+        let mut beside = DVector::zeros(self.terms.len());
+        if let Some(factor) = firm(&own, f64::EPSILON).cholesky() {
+            let explained = factor.solve(&across);
+            others.iter().zip(explained.iter()).for_each(|(i, x)| beside[*i] = -x);
+        }
+        free.iter().zip(amplitude.iter()).for_each(|(i, x)| beside[*i] = *x);
+        let in_block = |block: &Vec<DMatrix<f64>>| -> f64 {
+            let each = block.iter().enumerate().map(|(j, sums)| {
+                let own = self.terms.own(j);
+                let through = |(i, a): &(usize, usize)| {
+                    let products = sums.column(*a);
+                    beside[*i] * own.iter().map(|(l, b)| products[*b] * beside[*l]).sum::<f64>()
+                };
+                self.terms.weights[j] * own.iter().map(through).sum::<f64>()
+            });
+            each.sum::<f64>().max(0.0)
+        };
+        let each: Vec<f64> = self.blocks.iter().map(in_block).collect();
+        let sum = each.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        each.iter().map(|x| x / sum).collect()
     }
 
     /// Amplitude of an effect in each block, all else as the joint fit has it; none where its torque is next to nothing.
@@ -291,6 +317,23 @@ impl JointFit {
     }
 }
 
+/// How many equal blocks would show as much scatter by chance as these, and how much wider than the truth the deviation
+/// comes out: the jackknife's variance of independent blocks with these leverages (Satterthwaite 1946; Bell and
+/// McCaffrey 2002).
+fn freedom(leverages: &[f64]) -> Option<(f64, f64)> {
+    let h: Vec<f64> = leverages.iter().map(|h| h.min(1.0 - f64::EPSILON.sqrt())).collect();
+    let n = h.len() as f64;
+    let mean: f64 = h.iter().map(|h| h / (1.0 - h)).sum();
+    let mut square = 0.0;
+    for (b, x) in h.iter().enumerate() {
+        for (c, y) in h.iter().enumerate() {
+            let covariance = if b == c { x * (1.0 - x) } else { -x * y };
+            square += (covariance / ((1.0 - x) * (1.0 - y))).powi(2);
+        }
+    }
+    (square > 0.0).then(|| (1.0 + mean * mean / square, mean * (n - 1.0) / n))
+}
+
 /// A matrix with a part of its diagonal added.
 fn firm(of: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
     let mut out = of.clone();
@@ -308,7 +351,7 @@ const SILENT: f64 = 1e-3;
 const HALVINGS: usize = 60;
 
 /// The F of k numbers by n blocks that chance exceeds as rarely as [`Numbers::deviations`] of one number by
-/// [`Numbers::blocks`] (Hotelling 1931); none of too few blocks.
+/// [`Numbers::blocks`] (Hotelling 1931); none of blocks that are no more than these numbers.
 pub fn floor(k: usize, n: f64, numbers: &Numbers) -> Option<f64> {
     let chance = |k: f64, n: f64, f: f64| Some(FisherSnedecor::new(k, n).ok()?.sf(f));
     let usual = numbers.blocks as f64 - 1.0;
@@ -316,7 +359,7 @@ pub fn floor(k: usize, n: f64, numbers: &Numbers) -> Option<f64> {
     let k = k as f64;
     // blocks that are not there are not missed
     let n = n.min(numbers.blocks as f64);
-    if n < numbers.least_blocks as f64 || n <= k {
+    if n <= k + 1.0 {
         return None;
     }
     let (mut low, mut high) = (0.0_f64, 1e9_f64);
@@ -345,7 +388,12 @@ mod tests {
         for (k, wanted) in [(1, 42.0), (2, 35.0), (3, 38.0), (4, 46.0)] {
             near(of(k, 12.0), wanted);
         }
-        assert_eq!(floor(1, 7.9, &NUMBERS), None);
+        assert_eq!(floor(2, 3.0, &NUMBERS), None);
+        let (blocks, wide) = freedom(&[1.0 / 24.0; 24]).unwrap();
+        assert!((blocks - 24.0).abs() < 1e-9 && (wide - 1.0).abs() < 1e-9);
+        let half: Vec<f64> = (0..24).map(|b| if b < 6 { 1.0 / 6.0 } else { 0.0 }).collect();
+        let (blocks, wide) = freedom(&half).unwrap();
+        assert!((blocks - 6.0).abs() < 1e-9 && wide > 1.0);
         assert!(of(1, 8.0) > of(1, 12.0));
     }
 }

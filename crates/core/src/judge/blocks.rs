@@ -13,6 +13,8 @@ pub struct LogRows {
     pub step_s: f64,
     /// Whether each joint moves in it.
     pub moves: Vec<bool>,
+    /// Whether each row counts in the length of a block, in order: something moves there.
+    pub counts: Vec<bool>,
 }
 
 /// Neighbouring rows of one log.
@@ -35,25 +37,31 @@ pub struct Blocks {
 }
 
 impl LogRows {
+    /// Rows that count.
     fn rows(&self) -> usize {
-        self.pieces.iter().map(|(_, rows)| rows.len()).sum()
+        self.counts.iter().filter(|counts| **counts).count()
     }
 
     fn seconds(&self) -> f64 {
         self.rows() as f64 * self.step_s
     }
 
-    /// Rows `from..until` of all of them.
+    /// From the row that counts as number `from` until that of number `until`; what does not count goes with the row
+    /// before it, and what stands before the first with that.
     fn cut(&self, from: usize, until: usize) -> Vec<(usize, Range<usize>)> {
-        let mut before = 0;
-        let mut out = Vec::new();
+        let mut counted = 0;
+        let mut out: Vec<(usize, Range<usize>)> = Vec::new();
+        let mut counts = self.counts.iter();
         for (stretch, rows) in &self.pieces {
-            let first = from.max(before) - before;
-            let last = until.clamp(before, before + rows.len()) - before;
-            if first < last {
-                out.push((*stretch, rows.start + first..rows.start + last));
+            let own = rows.clone().filter(|_| {
+                counted += usize::from(counts.next().is_some_and(|counts| *counts));
+                // the row that counts as number k, and those behind it that do not
+                (from..until).contains(&counted.saturating_sub(1))
+            });
+            let own: Vec<usize> = own.collect();
+            if let (Some(first), Some(last)) = (own.first(), own.last()) {
+                out.push((*stretch, *first..last + 1));
             }
-            before += rows.len();
         }
         out
     }
@@ -104,6 +112,7 @@ mod tests {
             pieces: vec![(log, 0..(seconds * 100.0) as usize)],
             step_s: 0.01,
             moves: moves.to_vec(),
+            counts: vec![true; (seconds * 100.0) as usize],
         }
     }
 
@@ -146,7 +155,24 @@ mod tests {
             pieces: vec![(0, 10..60), (1, 0..50)],
             step_s: 1.0,
             moves: vec![true],
+            counts: vec![true; 100],
         };
         assert_eq!(rows.cut(40, 70), [(0, 50..60), (1, 0..20)]);
+    }
+
+    #[test]
+    fn rows_at_rest_are_no_block_of_their_own() {
+        let mut rows = log(0, 60.0, &[true]);
+        for k in (0..6000).filter(|k| *k < 500 || *k >= 3000) {
+            rows.counts[k] = false;
+        }
+        let blocks = divide(&[rows], 0.5, (24, 1));
+        assert_eq!(blocks.list.len(), 24);
+        let first = &blocks.list[0].pieces[0].1;
+        let last = &blocks.list[23].pieces[0].1;
+        assert_eq!((first.start, last.end), (0, 6000));
+        assert_eq!(first.end, 604);
+        let all: usize = blocks.list.iter().map(|b| b.pieces[0].1.len()).sum();
+        assert_eq!(all, 6000);
     }
 }

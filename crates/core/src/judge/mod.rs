@@ -38,8 +38,8 @@ pub struct Numbers {
     /// Blocks of equal time over all logs; fewer where these are short. Half: an effect of a few seconds passes by
     /// chance; twice: neighbours share their noise, and half as many joints again get worse.
     pub blocks: usize,
-    /// With fewer blocks that hold information nothing is written: F has too few degrees of freedom. Half: one block
-    /// decides; twice: logs of half a minute confirm nothing.
+    /// With fewer blocks nothing is written: F has too few degrees of freedom. Half: one block decides; twice: logs of
+    /// half a minute confirm nothing.
     pub least_blocks: usize,
     /// An amplitude is written from so many of its deviations on, s = max(0, 1 - deviations^2 / F). Four: three times as
     /// many joints get worse; six: a tenth of the gain is lost.

@@ -73,6 +73,7 @@ impl Campaign {
             pieces: vec![(log, 0..rows)],
             step_s: 1.0 / RATE,
             moves: vec![true],
+            counts: vec![true; rows],
         };
         let logs: Vec<LogRows> = (0..motions.len()).map(of_log).collect();
         let blocks = divide(&logs, memory.max(0.1), (NUMBERS.blocks, 1));

@@ -87,6 +87,7 @@ impl Sample {
                     pieces: vec![(out.len(), own.clone())],
                     step_s: 1.0,
                     moves: (0..self.joints).map(fast).collect(),
+                    counts: vec![true; rows],
                 });
             }
         }

@@ -80,6 +80,11 @@ impl Case {
         Unknowns::of(&self.given, &self.open, self.keep)
     }
 
+    /// Stretches, their filters, and the speeds up to which joints rest.
+    pub(crate) fn rows(&self) -> (&[Stretch], &ParallelFilters, &[f64]) {
+        (&self.stretches, &self.filters, &self.rest_speed)
+    }
+
     pub(crate) fn split(&self) -> DataSplit {
         let robot = &self.given.model.robot;
         let filters = (&self.filters, self.cutoff_hz);

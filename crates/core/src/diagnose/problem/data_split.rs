@@ -118,13 +118,25 @@ impl DataSplit {
         }
     }
 
-    /// Rows of every log with a role, as the judge divides them.
-    pub(crate) fn logs(&self, stretches: &[Stretch], role: LogRole) -> Vec<LogRows> {
+    /// Rows of every log with a role, as the judge divides them; joints rest up to these speeds.
+    pub(crate) fn logs(
+        &self,
+        (stretches, filters, rest_speed): (&[Stretch], &ParallelFilters, &[f64]),
+        role: LogRole,
+    ) -> Vec<LogRows> {
         let mut logs: Vec<LogRows> = Vec::new();
         for piece in self.pieces.iter().filter(|p| p.role == role) {
             let (stretch, rows) = (piece.stretch, piece.rows.clone());
             let moves = self.stationary[stretch].iter().map(|still| !still);
             let log = stretches[stretch].log;
+            let of = &stretches[stretch];
+            let parallel = filters.of(of);
+            let counts = rows.clone().map(|row| {
+                let k = parallel.sample_of(row);
+                let mut joints = of.v.iter().zip(rest_speed);
+                joints.any(|(v, rest)| v.get(k).is_some_and(|v| v.abs() > *rest))
+            });
+            let counts: Vec<bool> = counts.collect();
             match logs.last_mut().filter(|l| l.log == log) {
                 Some(own) => {
                     let follows =
@@ -134,14 +146,20 @@ impl DataSplit {
                         None => own.pieces.push((stretch, rows)),
                     }
                     (own.moves.iter_mut().zip(moves)).for_each(|(all, own)| *all |= own);
+                    own.counts.extend(counts);
                 }
                 None => logs.push(LogRows {
                     log,
                     pieces: vec![(stretch, rows)],
                     step_s: self.step_s[stretch],
                     moves: moves.collect(),
+                    counts,
                 }),
             }
+        }
+        // where nothing moves at all every row is as good as another
+        if logs.iter().all(|log| !log.counts.contains(&true)) {
+            logs.iter_mut().for_each(|log| log.counts.fill(true));
         }
         logs
     }
@@ -176,7 +194,7 @@ mod tests {
     use crate::motion::FilterSettings;
     use crate::robot::JointKind;
 
-    fn split(roles: &[LogRole]) -> (DataSplit, Vec<Stretch>) {
+    fn split(roles: &[LogRole]) -> (DataSplit, Vec<Stretch>, ParallelFilters) {
         let wave: Vec<f64> = (0..30_000).map(|k| (1e-3 * f64::from(k)).sin()).collect();
         let stretch = |log| Stretch {
             log,
@@ -189,12 +207,12 @@ mod tests {
         let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
         let robot = Robot::single_joint("slide", JointKind::Prismatic);
         let split = DataSplit::of(&robot, &stretches, roles, (&filters, 10.0));
-        (split, stretches)
+        (split, stretches, filters)
     }
 
     #[test]
     fn no_row_has_two_uses_and_other_uses_keep_their_distance() {
-        let (split, stretches) = split(&[LogRole::Train, LogRole::Veto]);
+        let (split, stretches, filters) = split(&[LogRole::Train, LogRole::Veto]);
         for (i, a) in split.pieces.iter().enumerate() {
             let later = split.pieces[i + 1..].iter();
             for b in later.filter(|b| b.stretch == a.stretch) {
@@ -207,15 +225,15 @@ mod tests {
         let held = split.rows_of(LogRole::Holdout) as f64;
         let fitted = split.rows_of(LogRole::Train) as f64;
         assert!((0.15..0.3).contains(&(held / fitted)), "{held} {fitted}");
-        let logs = split.logs(&stretches, LogRole::Train);
+        let logs = split.logs((&stretches, &filters, &[0.0]), LogRole::Train);
         assert_eq!((logs.len(), logs[0].pieces.len()), (1, 4));
     }
 
     #[test]
     fn logs_that_are_held_out_leave_the_training_logs_whole() {
-        let (split, stretches) = split(&[LogRole::Train, LogRole::Veto, LogRole::Holdout]);
+        let (split, stretches, filters) = split(&[LogRole::Train, LogRole::Veto, LogRole::Holdout]);
         assert!(split.set_aside.is_empty());
-        let logs = split.logs(&stretches, LogRole::Train);
+        let logs = split.logs((&stretches, &filters, &[0.0]), LogRole::Train);
         assert_eq!(logs[0].pieces.len(), 1);
         assert!(logs[0].pieces[0].1.len() > 2900);
     }
