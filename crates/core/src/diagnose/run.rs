@@ -171,7 +171,9 @@ fn left_candidates(
     steps: &[FoundEffect],
     numbers: &Numbers,
 ) -> Vec<LeftCandidate> {
-    let small = steps.iter().filter(|step| step.left == Some(NotWritten::Small));
+    let small = steps
+        .iter()
+        .filter(|step| step.left == Some(NotWritten::Small));
     let small = small.map(|step| LeftCandidate {
         law: step.estimate.law,
         place: step.estimate.place,

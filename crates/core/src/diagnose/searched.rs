@@ -169,7 +169,9 @@ impl PreparedCase<'_> {
         let estimates = Estimates::of(&field, laws)?;
         let numbers = field.numbers();
         let sure = (laws.iter().zip(&estimates.places)).filter(|(_, place)| {
-            let found = estimates.fit.amplitude(&place.terms, (None, false), numbers);
+            let found = estimates
+                .fit
+                .amplitude(&place.terms, (None, false), numbers);
             found.s > 0.0
         });
         let effects = sure.map(|(c, _)| candidates[c.candidate].effect.clone());
@@ -220,11 +222,15 @@ impl PreparedCase<'_> {
     }
 
     /// Why an effect that the user wants is no candidate.
-    fn not_there(&self, wanted: &(String, Option<String>), not_tried: &[NotTried]) -> DiagnoseError {
+    fn not_there(
+        &self,
+        wanted: &(String, Option<String>),
+        not_tried: &[NotTried],
+    ) -> DiagnoseError {
         let robot = &self.case.given.model.robot;
-        let own = not_tried.iter().find(|n| {
-            n.law.entry.name == wanted.0 && n.place.name(robot) == wanted.1
-        });
+        let own = not_tried
+            .iter()
+            .find(|n| n.law.entry.name == wanted.0 && n.place.name(robot) == wanted.1);
         let why = match own {
             Some(own) => ErrorText::new(&own.lacking),
             None => ErrorText::new("there is no such effect at this place, or the model has it already: see `candidates` in the JSON document for those that there are").remedy("a formula is there with --search"),

@@ -86,10 +86,7 @@ impl Way {
 }
 
 /// Settles the set, then asks held-out data.
-pub fn judge(
-    prepared: &PreparedCase,
-    searched: &SearchedCase,
-) -> Result<Judged, DiagnoseError> {
+pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
     let fitted = prepared.blocks.list.len();
     let mut work = Judging {
         prepared,
@@ -156,7 +153,9 @@ impl Judging<'_> {
         loop {
             let set: Vec<usize> = (0..ways.len()).filter(|i| ways[*i].stands()).collect();
             let estimates = self.ask(ways, &set)?;
-            let leaves = set.iter().filter_map(|i| Some((*i, self.leaves(&ways[*i])?)));
+            let leaves = set
+                .iter()
+                .filter_map(|i| Some((*i, self.leaves(&ways[*i])?)));
             let certainty = |i: usize| {
                 let found = ways[i].found.as_ref();
                 found.map_or(0.0, |f| f.verified.amplitude.certainty())
@@ -196,7 +195,10 @@ impl Judging<'_> {
             let Some(i) = surest.max_by(|a, b| certainty(a).total_cmp(&certainty(b))) else {
                 return self.settle(ways);
             };
-            let before = (self.error_left_out(ways)?, Vec::from_iter(ways.iter().map(|w| w.left)));
+            let before = (
+                self.error_left_out(ways)?,
+                Vec::from_iter(ways.iter().map(|w| w.left)),
+            );
             (ways[i].left, ways[i].came_back) = (None, true);
             self.settle(ways)?;
             if self.error_left_out(ways)? >= before.0 {
@@ -441,13 +443,17 @@ impl Judging<'_> {
     /// What the amplitudes of the effects that stand do to the unknowns beside them.
     fn by_effects(&self, ways: &[Way], estimates: &Estimates) -> (DMatrix<f64>, DVector<f64>) {
         let declared = self.field.summed.declared.len();
-        let (mut spread, mut shift) = (DMatrix::zeros(declared, declared), DVector::zeros(declared));
+        let (mut spread, mut shift) =
+            (DMatrix::zeros(declared, declared), DVector::zeros(declared));
         let places = estimates.places.iter();
         let places: Vec<usize> = places.flat_map(|p| p.terms.coefficients.clone()).collect();
         let Some(slopes) = estimates.fit.declared_by(declared, &places) else {
             return (spread, shift);
         };
-        let own = estimates.covariance.select_rows(&places).select_columns(&places);
+        let own = estimates
+            .covariance
+            .select_rows(&places)
+            .select_columns(&places);
         spread += &slopes * own * slopes.transpose();
         let kept = ways.iter().filter_map(|w| w.amplitude.as_ref());
         let predicting = DVector::from_iterator(places.len(), kept.flatten().copied());

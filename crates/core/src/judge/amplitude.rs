@@ -150,7 +150,9 @@ impl JointFit {
             .collect();
         let sum = |of: &dyn Fn(usize) -> DMatrix<f64>| {
             let weighed = joints.clone().map(|j| of(j) * self.terms.weights[j]);
-            weighed.fold(None, |sum: Option<DMatrix<f64>>, x| Some(sum.map_or(x.clone(), |s| s + x)))
+            weighed.fold(None, |sum: Option<DMatrix<f64>>, x| {
+                Some(sum.map_or(x.clone(), |s| s + x))
+            })
         };
         let Some(gram) = sum(&|j| of_joint[j].clone()) else {
             return out;
@@ -161,7 +163,8 @@ impl JointFit {
         };
         // the torque that a change of shape makes, along the columns of the coefficients
         let by_shape = factor.solve(&across);
-        let along = |x: &DVector<f64>| x.select_rows(&free) + &by_shape * x.select_rows(&effect.slopes);
+        let along =
+            |x: &DVector<f64>| x.select_rows(&free) + &by_shape * x.select_rows(&effect.slopes);
         let amplitude = along(&self.values);
         let off = self.without.iter().map(|x| along(x) - &amplitude);
         let mut spread = self.scatter(off);
@@ -170,14 +173,17 @@ impl JointFit {
         let k = free.len();
         let mut map = DMatrix::zeros(k, places.len());
         map.view_mut((0, 0), (k, k)).fill_with_identity();
-        map.view_mut((0, k), (k, effect.slopes.len())).copy_from(&by_shape);
+        map.view_mut((0, k), (k, effect.slopes.len()))
+            .copy_from(&by_shape);
         spread += &map * known * map.transpose();
         let pull = &gram * &amplitude;
         let size = amplitude.dot(&pull);
         if k == 0 || size.is_nan() || size <= 0.0 {
             return out;
         }
-        let part = noisier.map_or(0.0, |sums| self.by_noise(sums, (&own, &free), &pull) / size);
+        let part = noisier.map_or(0.0, |sums| {
+            along(&self.by_noise(sums, &own, &effect.slopes)).dot(&pull) / size
+        });
         // noise must not make an effect; a number that can be measured must not be hidden by it either
         let part = if measured { part } else { part.max(0.0) };
         spread.ger(part * part, &amplitude, &amplitude, 1.0);
@@ -185,14 +191,18 @@ impl JointFit {
             spread[(i, i)] += EXACT * amplitude[i] * amplitude[i] + f64::MIN_POSITIVE;
         }
         let strongest = joints.clone().max_by(|a, b| {
-            let square = |j: usize| self.terms.weights[j] * amplitude.dot(&(&of_joint[j] * &amplitude));
+            let square =
+                |j: usize| self.terms.weights[j] * amplitude.dot(&(&of_joint[j] * &amplitude));
             square(*a).total_cmp(&square(*b))
         });
         if let Some(j) = strongest {
             let own = &of_joint[j] * &amplitude;
             let square = amplitude.dot(&own).max(f64::MIN_POSITIVE);
             let rms = (square / self.rows[j].max(1.0)).sqrt();
-            out.torque = [rms, rms * own.dot(&(&spread * &own)).max(0.0).sqrt() / square];
+            out.torque = [
+                rms,
+                rms * own.dot(&(&spread * &own)).max(0.0).sqrt() / square,
+            ];
         }
         let leverages = self.leverages(&free, &amplitude);
         if let Some((blocks, wide)) = freedom(&leverages) {
@@ -205,7 +215,9 @@ impl JointFit {
         if let Some(factor) = spread.cholesky() {
             out.f = amplitude.dot(&factor.solve(&amplitude)) / k as f64;
         }
-        out.s = out.floor.map_or(0.0, |floor| (1.0 - floor / out.f).max(0.0));
+        out.s = out
+            .floor
+            .map_or(0.0, |floor| (1.0 - floor / out.f).max(0.0));
         out
     }
 
@@ -213,21 +225,32 @@ impl JointFit {
     /// terms explain of it.
     fn leverages(&self, free: &[usize], amplitude: &DVector<f64>) -> Vec<f64> {
         let normal = self.terms.information(&self.total);
-        let others: Vec<usize> = (0..self.terms.len()).filter(|i| !free.contains(i)).collect();
+        let others: Vec<usize> = (0..self.terms.len())
+            .filter(|i| !free.contains(i))
+            .collect();
         let own = normal.select_rows(&others).select_columns(&others);
         let across = normal.select_rows(&others).select_columns(free) * amplitude;
         let mut beside = DVector::zeros(self.terms.len());
         if let Some(factor) = firm(&own, f64::EPSILON).cholesky() {
             let explained = factor.solve(&across);
-            others.iter().zip(explained.iter()).for_each(|(i, x)| beside[*i] = -x);
+            others
+                .iter()
+                .zip(explained.iter())
+                .for_each(|(i, x)| beside[*i] = -x);
         }
-        free.iter().zip(amplitude.iter()).for_each(|(i, x)| beside[*i] = *x);
+        free.iter()
+            .zip(amplitude.iter())
+            .for_each(|(i, x)| beside[*i] = *x);
         let in_block = |block: &Vec<DMatrix<f64>>| -> f64 {
             let each = block.iter().enumerate().map(|(j, sums)| {
                 let own = self.terms.own(j);
                 let through = |(i, a): &(usize, usize)| {
                     let products = sums.column(*a);
-                    beside[*i] * own.iter().map(|(l, b)| products[*b] * beside[*l]).sum::<f64>()
+                    beside[*i]
+                        * own
+                            .iter()
+                            .map(|(l, b)| products[*b] * beside[*l])
+                            .sum::<f64>()
                 };
                 self.terms.weights[j] * own.iter().map(through).sum::<f64>()
             });
@@ -263,7 +286,12 @@ impl JointFit {
                 gram[(i, i)] += numbers.ridge * total[(i, i)].max(f64::MIN_POSITIVE);
             }
             let step = gram.cholesky()?.solve(right);
-            Some(own.iter().zip(step.iter()).map(|(i, x)| self.values[*i] + x).collect())
+            Some(
+                own.iter()
+                    .zip(step.iter())
+                    .map(|(i, x)| self.values[*i] + x)
+                    .collect(),
+            )
         });
         found.collect()
     }
@@ -284,7 +312,13 @@ impl JointFit {
     }
 
     /// Products of some terms with others in the rows of a joint; 0 for terms that it does not have.
-    fn products(&self, sums: &DMatrix<f64>, j: usize, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+    fn products(
+        &self,
+        sums: &DMatrix<f64>,
+        j: usize,
+        rows: &[usize],
+        columns: &[usize],
+    ) -> DMatrix<f64> {
         let column = |i: usize| self.terms.list[i].column(j);
         DMatrix::from_fn(rows.len(), columns.len(), |a, b| {
             let both = column(rows[a]).zip(column(columns[b]));
@@ -298,22 +332,20 @@ impl JointFit {
             return 0.0;
         };
         let own = self.terms.own(j);
-        let through: f64 = own.iter().map(|(i, c)| sums[(column, *c)] * self.values[*i]).sum();
+        let through: f64 = own
+            .iter()
+            .map(|(i, c)| sums[(column, *c)] * self.values[*i])
+            .sum();
         sums[(column, sums.ncols() - 1)] - through
     }
 
-    /// Along `pull`, what noise of the positions adds to free coefficients, all other effects held.
-    fn by_noise(
-        &self,
-        noisier: &[DMatrix<f64>],
-        (own, free): (&[usize], &[usize]),
-        pull: &DVector<f64>,
-    ) -> f64 {
+    /// What noise of the positions adds to the values, all other effects held.
+    fn by_noise(&self, noisier: &[DMatrix<f64>], own: &[usize], slopes: &[usize]) -> DVector<f64> {
         let declared = self.terms.prior.1.len();
-        let others = (declared..self.terms.len()).filter(|i| !own.contains(i));
+        let others = declared..self.terms.len();
+        let others = others.filter(|i| !own.contains(i) && !slopes.contains(i));
         let held: Vec<(usize, f64)> = others.map(|i| (i, self.values[i])).collect();
-        let change = self.terms.fit(noisier, &held).values - &self.values;
-        change.select_rows(free).dot(pull)
+        self.terms.fit(noisier, &held).values - &self.values
     }
 }
 
@@ -321,7 +353,10 @@ impl JointFit {
 /// comes out: the jackknife's variance of independent blocks with these leverages (Satterthwaite 1946; Bell and
 /// McCaffrey 2002).
 fn freedom(leverages: &[f64]) -> Option<(f64, f64)> {
-    let h: Vec<f64> = leverages.iter().map(|h| h.min(1.0 - f64::EPSILON.sqrt())).collect();
+    let h: Vec<f64> = leverages
+        .iter()
+        .map(|h| h.min(1.0 - f64::EPSILON.sqrt()))
+        .collect();
     let n = h.len() as f64;
     let mean: f64 = h.iter().map(|h| h / (1.0 - h)).sum();
     let mut square = 0.0;
@@ -381,7 +416,9 @@ mod tests {
     #[test]
     fn the_floor_is_that_of_one_chance_for_every_number_of_numbers_and_blocks() {
         let of = |k, n| floor(k, n, &NUMBERS).unwrap();
-        let near = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 0.04, "{found} {wanted}");
+        let near = |found: f64, wanted: f64| {
+            assert!((found / wanted - 1.0).abs() < 0.04, "{found} {wanted}")
+        };
         for (k, wanted) in [(1, 25.0), (2, 17.0), (3, 14.0), (4, 13.0), (10, 18.0)] {
             near(of(k, 24.0), wanted);
         }
@@ -391,7 +428,9 @@ mod tests {
         assert_eq!(floor(2, 3.0, &NUMBERS), None);
         let (blocks, wide) = freedom(&[1.0 / 24.0; 24]).unwrap();
         assert!((blocks - 24.0).abs() < 1e-9 && (wide - 1.0).abs() < 1e-9);
-        let half: Vec<f64> = (0..24).map(|b| if b < 6 { 1.0 / 6.0 } else { 0.0 }).collect();
+        let half: Vec<f64> = (0..24)
+            .map(|b| if b < 6 { 1.0 / 6.0 } else { 0.0 })
+            .collect();
         let (blocks, wide) = freedom(&half).unwrap();
         assert!((blocks - 6.0).abs() < 1e-9 && wide > 1.0);
         assert!(of(1, 8.0) > of(1, 12.0));

@@ -51,7 +51,10 @@ pub fn agreement_on_share(
     let mean = total / parts.len().max(1) as f64;
     parts.retain(|[all, _]| *all > SILENT * mean);
     let share = parts.iter().map(|[_, off]| off).sum::<f64>() / total.max(f64::MIN_POSITIVE);
-    let scatter: f64 = (parts.iter().map(|[all, off]| all * (off / all - share).powi(2))).sum();
+    let scatter: f64 = (parts
+        .iter()
+        .map(|[all, off]| all * (off / all - share).powi(2)))
+    .sum();
     let p = parts.len() as f64;
     let z = match scatter > 0.0 {
         true => share * share * total * (p - 1.0) / (p * scatter),

@@ -147,7 +147,8 @@ impl Campaign {
         let mut set = self.chosen();
         loop {
             let fit = self.joint_fit(&set);
-            let of = |(i, c): (usize, &usize)| (*c, fit.amplitude(&own(i), (None, false), &NUMBERS));
+            let of =
+                |(i, c): (usize, &usize)| (*c, fit.amplitude(&own(i), (None, false), &NUMBERS));
             let found: Vec<(usize, Amplitude)> = set.iter().enumerate().map(of).collect();
             let out = found.iter().enumerate().filter(|(_, (_, a))| a.s == 0.0);
             let out = out.min_by(|a, b| a.1.1.certainty().total_cmp(&b.1.1.certainty()));
@@ -208,24 +209,31 @@ fn what_is_there_is_chosen_confirmed_and_has_its_amplitude() {
 }
 
 #[test]
-fn two_columns_that_trade_are_sure_together() {
-    // the same column twice, one of them bent a little: each coefficient holds zero, their torque does not
+fn a_shape_that_trades_with_its_amplitude_leaves_the_torque_as_sure() {
     let truth = |c: &[Vec<f64>], k: usize| 2.0 * c[2][k] + 2.0 * c[DECLARED + 2][k];
     let campaign = Campaign::of(2, 5, 0.0, &truth);
     let fit = campaign.joint_fit(&[2, 3]);
-    let both = EffectTerms {
-        coefficients: DECLARED..DECLARED + 2,
-        slopes: Vec::new(),
+    let of = |coefficients, slopes| {
+        let own = EffectTerms {
+            coefficients,
+            slopes,
+        };
+        fit.amplitude(&own, (None, false), &NUMBERS)
     };
-    let found = fit.amplitude(&both, (None, false), &NUMBERS);
-    assert!(found.s > 0.8 && found.torque[0] > 5.0 * found.torque[1], "{found:?}");
-    // as the slope of a shape it trades with the amplitude, which is that of the torque
-    let bent = EffectTerms {
-        coefficients: DECLARED..DECLARED + 1,
-        slopes: vec![DECLARED + 1],
-    };
-    let shaped = fit.amplitude(&bent, (None, false), &NUMBERS);
-    assert!(shaped.f > 2.0 * found.f, "{shaped:?} {found:?}");
+    let shaped = of(DECLARED..DECLARED + 1, vec![DECLARED + 1]);
+    let both = of(DECLARED..DECLARED + 2, Vec::new());
+    let alone = of(DECLARED..DECLARED + 1, Vec::new());
+    assert!(
+        (shaped.torque[0] / both.torque[0] - 1.0).abs() < 1e-3,
+        "{shaped:?} {both:?}"
+    );
+    // the coefficient by itself is as uncertain as the shape lets it be, the torque is not
+    assert!(shaped.f > 4.0 * alone.f, "{shaped:?} {alone:?}");
+    // of two numbers the torque is as sure as both together
+    assert!(
+        2.0 * both.f > 0.9 * shaped.f && both.s > 0.8,
+        "{shaped:?} {both:?}"
+    );
 }
 
 #[test]
@@ -256,7 +264,10 @@ fn what_noise_of_positions_adds_is_in_the_deviation() {
     sums[0].set_row(tau, &through.transpose());
     let doubted = fit.amplitude(&own(0), (Some(&sums), false), &NUMBERS);
     let expected = 1.0 / (1.0 / plain.f + 1.0 / 9.0);
-    assert!((doubted.f / expected - 1.0).abs() < 0.02, "{doubted:?} {expected}");
+    assert!(
+        (doubted.f / expected - 1.0).abs() < 0.02,
+        "{doubted:?} {expected}"
+    );
     assert!(plain.s > 0.7 && doubted.s == 0.0);
 }
 

@@ -318,7 +318,10 @@ impl Diagnosed {
             torque: EffectValueFound {
                 value: step.torque[0],
                 std: Some(step.torque[1]),
-                unit: machine.file.torque_unit(effect.place.joint().unwrap_or(0)).to_owned(),
+                unit: machine
+                    .file
+                    .torque_unit(effect.place.joint().unwrap_or(0))
+                    .to_owned(),
                 bound: false,
             },
             parts: step.parts.iter().filter_map(part).collect(),

@@ -88,7 +88,15 @@ mod tests {
             ..Block::default()
         };
         held.take_off(&mut block);
-        let of = |j: usize| block.tau.iter().skip(j).step_by(2).copied().collect::<Vec<_>>();
+        let of = |j: usize| {
+            block
+                .tau
+                .iter()
+                .skip(j)
+                .step_by(2)
+                .copied()
+                .collect::<Vec<_>>()
+        };
         assert_eq!(of(0), [9.0, 9.0, 8.5, 6.0, 6.0, 2.0, 2.0]);
         assert_eq!(of(1), [10.0, 10.0, 10.0, 10.0, 10.0, 9.0, 9.0]);
     }

@@ -114,7 +114,9 @@ impl Diagnosed {
         let whole = self.is_whole();
         for p in &mut model.parameters {
             let Some(i) = place(&p.key()) else { continue };
-            let std = p.std.map(|std| std.hypot(d.by_effects[(i, i)].max(0.0).sqrt()));
+            let std = p
+                .std
+                .map(|std| std.hypot(d.by_effects[(i, i)].max(0.0).sqrt()));
             if whole {
                 p.std = std;
                 if let Some(std) = std.filter(|_| !p.is_negligible()) {
@@ -135,7 +137,9 @@ impl Diagnosed {
         if !whole {
             model.estimate_covariance = model.covariance.take();
         } else {
-            model.estimate_covariance.clone_from(&file.estimate_covariance);
+            model
+                .estimate_covariance
+                .clone_from(&file.estimate_covariance);
         }
     }
 

@@ -103,7 +103,9 @@ pub(super) fn diagnosed(
     let d = &found.diagnosis;
     report.terminal().line("");
     in_short(&mut report.usual(), machine, d);
-    report.terminal().list(d.steps.iter().filter_map(|step| seen(machine, step)));
+    report
+        .terminal()
+        .list(d.steps.iter().filter_map(|step| seen(machine, step)));
     let mut detail = report.detail();
     detail.table(before_and_after(machine, d));
     if !d.steps.is_empty() {

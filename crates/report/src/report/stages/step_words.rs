@@ -43,7 +43,10 @@ pub(super) fn certainty(step: &FoundEffect) -> String {
     match step.left {
         _ if step.accepted_by_user => by,
         None if measurable => format!("{by}, written as estimated"),
-        None => format!("{by}, written with {} of it", number::percent(step.shrinkage)),
+        None => format!(
+            "{by}, written with {} of it",
+            number::percent(step.shrinkage)
+        ),
         Some(NotWritten::HeldOut) => format!("{by}; held-out data are worse with it"),
         Some(NotWritten::Bound) => "at a bound beside the other effects".to_owned(),
         Some(NotWritten::Small) => format!("{by}; it changes no error noticeably"),
@@ -57,7 +60,9 @@ pub(super) fn certainty(step: &FoundEffect) -> String {
 /// The torque that an effect makes, root mean square, with its 95 % CI.
 pub(super) fn torque(machine: &LoggedRobot, step: &FoundEffect) -> String {
     let [torque, std] = step.torque;
-    let unit = machine.file.torque_unit(step.estimate.place.joint().unwrap_or(0));
+    let unit = machine
+        .file
+        .torque_unit(step.estimate.place.joint().unwrap_or(0));
     format!("{} {unit}", number::plus_minus(torque, 1.96 * std))
 }
 
