@@ -220,9 +220,9 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Whether some joint's residual still holds structure.
-    pub fn structured(&self) -> bool {
-        self.structured_joints().next().is_some()
+    /// Whether something is missing yet: more than a little is left above the noise, or friction changes over time.
+    pub fn incomplete(&self) -> bool {
+        self.left.unexplained.iter().any(Unexplained::matters) || !self.changes.is_empty()
     }
 
     /// Joints whose residual still holds structure.

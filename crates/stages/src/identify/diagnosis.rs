@@ -227,7 +227,7 @@ impl Diagnosed {
         let diagnosis = &self.diagnosis;
         if diagnosis.written().next().is_some() {
             DiagnosisVerdict::EffectsFound
-        } else if diagnosis.structured() || !diagnosis.determined || !diagnosis.long_enough() {
+        } else if diagnosis.incomplete() || !diagnosis.determined || !diagnosis.long_enough() {
             DiagnosisVerdict::UnexplainedResidual
         } else {
             DiagnosisVerdict::NothingMissing

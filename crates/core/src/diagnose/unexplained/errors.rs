@@ -21,12 +21,15 @@ pub struct JointErrors {
     pub relative_error_moving: Option<f64>,
     /// The same of the rows in which it rests.
     pub relative_error_rest: Option<f64>,
-    /// Bootstrap interval of the relative error.
+    /// Bootstrap interval of the relative error while the joint moves; of all rows where it never does.
     pub interval_95: [f64; 2],
     pub relative_error_raw: f64,
     pub max_abs: f64,
     pub r2: f64,
     pub samples: u64,
+    /// Squared residual a row, of the rows that the headline counts.
+    #[serde(skip)]
+    pub(crate) power: f64,
 }
 
 /// Errors over all joints.
@@ -40,8 +43,17 @@ pub struct OverallErrors {
     pub relative_error_rest: Option<f64>,
     /// Root mean square over joints of their relative errors.
     pub mean_relative_error: f64,
-    /// Bootstrap interval of the mean relative error.
+    /// The same of the rows in which each joint moves: the headline.
+    pub mean_relative_error_moving: f64,
+    /// Bootstrap interval of that.
     pub interval_95: [f64; 2],
+}
+
+impl JointErrors {
+    /// The error that counts: of the rows in which the joint moves, of all where it never does.
+    pub fn headline(&self) -> f64 {
+        self.relative_error_moving.unwrap_or(self.relative_error)
+    }
 }
 
 /// Errors over the rows of one use.
@@ -51,7 +63,7 @@ pub struct Errors {
     pub overall: OverallErrors,
 }
 
-/// Relative error of one joint before and after a change of the model, over the same rows.
+/// Relative error of one joint before and after a change of the model, over the same rows: those in which it moves.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JointChange {
     pub joint: String,
@@ -151,12 +163,21 @@ fn ratio(a: f64, b: f64) -> f64 {
     if b > 0.0 { (a / b).sqrt() } else { f64::NAN }
 }
 
-/// Relative error of every joint over those of the pieces that were picked.
+/// Relative error of every joint over those of the pieces that were picked, of the rows in which it moves, or of all
+/// where it never does.
 fn relative(pieces: &[Vec<PieceErrors>], picked: &[usize]) -> Vec<f64> {
     let joints = 0..pieces.first().map_or(0, Vec::len);
     let of_joint = |j: usize| {
-        let sum = |of: fn(&PieceErrors) -> f64| picked.iter().map(|p| of(&pieces[*p][j])).sum();
-        ratio(sum(|s| s.error), sum(|s| s.torque))
+        let sum = |of: fn(&PieceErrors) -> f64| -> f64 {
+            picked.iter().map(|p| of(&pieces[*p][j])).sum()
+        };
+        match sum(|s| s.rows) > sum(|s| s.rest[2]) {
+            true => ratio(
+                (sum(|s| s.error) - sum(|s| s.rest[0])).max(0.0),
+                sum(|s| s.torque) - sum(|s| s.rest[1]),
+            ),
+            false => ratio(sum(|s| s.error), sum(|s| s.torque)),
+        }
     };
     joints.map(of_joint).collect()
 }
@@ -233,7 +254,7 @@ pub fn summed(case: &Case, (pieces, block): (&Pieces, usize)) -> Option<Errors> 
             joint: case.given.model.robot.joint_names()[j].clone(),
             unit: units[j].clone(),
             rmse: (sum(|s| s.error) / rows.max(1.0)).sqrt(),
-            relative_error: found[j],
+            relative_error: ratio(sum(|s| s.error), sum(|s| s.torque)),
             relative_error_moving: moving,
             relative_error_rest: rest,
             interval_95: intervals[j],
@@ -244,6 +265,11 @@ pub fn summed(case: &Case, (pieces, block): (&Pieces, usize)) -> Option<Errors> 
                 false => f64::NAN,
             },
             samples: rows as u64,
+            power: {
+                let [moving, rest] = parts(j);
+                let [error, _, rows] = if moving[2] > 0.0 { moving } else { rest };
+                error / rows.max(1.0)
+            },
         }
     };
     let joints: Vec<JointErrors> = (0..n).map(of_joint).collect();
@@ -259,7 +285,8 @@ pub fn summed(case: &Case, (pieces, block): (&Pieces, usize)) -> Option<Errors> 
             relative_error: one_unit.then(|| ratio(total(|s| s.error), total(|s| s.torque))),
             relative_error_moving: pooled(0),
             relative_error_rest: pooled(1),
-            mean_relative_error: mean(&found),
+            mean_relative_error: mean(&joints.iter().map(|j| j.relative_error).collect::<Vec<_>>()),
+            mean_relative_error_moving: mean(&found),
             interval_95: intervals[n],
         },
         joints,

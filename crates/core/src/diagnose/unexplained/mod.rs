@@ -25,6 +25,11 @@ impl Unexplained {
     pub fn is_structure(&self) -> bool {
         self.over_floor.is_none_or(|over| over > STRUCTURED) && self.share > NEGLIGIBLE
     }
+
+    /// Whether so much is left that something is missing.
+    pub fn matters(&self) -> bool {
+        self.is_structure() && self.share > MATTERS * MATTERS
+    }
 }
 
 /// Residual power over the floor's from which on a residual is called structured.
@@ -32,14 +37,18 @@ pub const STRUCTURED: f64 = 2.0;
 /// Share of the torque's power below which structure is not worth a name.
 pub const NEGLIGIBLE: f64 = 2e-6;
 
+/// Part of the torque that is left above the noise from which on something is missing. Half: the filter's own error is
+/// a finding; twice: a drift of a twentieth of the torque is none.
+const MATTERS: f64 = 0.02;
+
 /// Power of a torque's noise over its own below which it is that of rounding, and no noise.
 const NO_NOISE: f64 = 1e-10;
 
 /// How much of each joint's residual is above the noise floor.
 fn above(noise: &[f64], found: &Errors) -> Vec<Unexplained> {
     let of_joint = |(e, noise): (&JointErrors, &f64)| {
-        let residual = e.rmse * e.rmse;
-        let torque = residual / (e.relative_error * e.relative_error);
+        let residual = e.power;
+        let torque = residual / (e.headline() * e.headline());
         Unexplained {
             share: ((residual - noise) / torque).max(0.0),
             over_floor: (*noise > NO_NOISE * torque).then(|| residual / noise),

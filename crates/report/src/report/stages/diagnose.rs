@@ -136,19 +136,24 @@ fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
     let (data, after) = errors_of(d.errors_now());
     let changed = d.written().next().is_some();
     let hundred = number::hundredths;
-    let relative: Vec<f64> = after.joints.iter().map(|e| e.relative_error).collect();
+    let relative: Vec<f64> = after.joints.iter().map(|e| e.headline()).collect();
     let (joints, more) = summary::most_wrong(&relative);
-    let caption = format!("relative torque error [%] of each joint, {data}");
+    let caption = format!("relative torque error [%] of each joint while it moves, {data}");
     let columns = Columns::new(&caption, joints)
         .words("joint", |j| &machine.robot.joint_names()[j])
         .when(changed, |t| {
-            t.numbers("as given", |j| hundred(before.joints[j].relative_error))
+            t.numbers("before", |j| hundred(before.joints[j].headline()))
         })
-        .numbers(if changed { "now" } else { "error" }, |j| {
+        .numbers(if changed { "after" } else { "error" }, |j| {
             hundred(relative[j])
         })
         .column(Align::Right, "95 % CI", |j| {
             after.joints[j].interval_95.map(hundred).join("..")
+        })
+        .when(after.joints.iter().any(|e| e.relative_error_rest.is_some()), |t| {
+            t.numbers("at rest", |j| {
+                after.joints[j].relative_error_rest.map_or(number::ABSENT.to_owned(), hundred)
+            })
         });
     usual.table(columns);
     if let Some(more) = more {
@@ -209,12 +214,12 @@ fn numbered(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usize
 
 /// Relative errors joint by joint.
 fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
-    let caption = "relative torque error [%] on fitted and held-out data, as given and after; above noise: residual power beyond \
+    let caption = "relative torque error [%] of moving rows on fitted and held-out data, before and after; above noise: residual power beyond \
          the noise, over the torque's [%]";
     let hundred = number::hundredths;
-    let fitted = |errors: &SplitErrors, j: usize| hundred(errors.train.joints[j].relative_error);
+    let fitted = |errors: &SplitErrors, j: usize| hundred(errors.train.joints[j].headline());
     let unseen = |errors: &SplitErrors, j: usize| match &errors.holdout {
-        Some(errors) => hundred(errors.joints[j].relative_error),
+        Some(errors) => hundred(errors.joints[j].headline()),
         None => number::ABSENT.to_owned(),
     };
     let (names, now) = (machine.robot.joint_names(), d.errors_now());
@@ -290,7 +295,7 @@ pub(super) fn sections(
     page.list(d.steps.iter().filter_map(|step| seen(machine, step)));
     page.list(changes(machine, found));
     let errors = errors_of(d.errors_now()).1.joints.iter();
-    let errors = errors.map(|e| e.relative_error);
+    let errors = errors.map(|e| e.headline());
     sketch::section(page, machine, replayed.poses.as_ref(), errors);
     let drawn = |name: &'static str, styles| Drawn {
         names: [name.into(), format!("residual {name}").into()],
@@ -343,7 +348,7 @@ pub(super) fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed
         None => vec![("", now)],
     };
     let names = machine.robot.joint_names();
-    let percent = |e: &Errors, j: usize| number::percent(e.joints[j].relative_error);
+    let percent = |e: &Errors, j: usize| number::percent(e.joints[j].headline());
     let mut columns =
         Columns::new("relative torque error", 0..names.len()).words("joint", |j| &names[j]);
     for (side, errors) in &sides {

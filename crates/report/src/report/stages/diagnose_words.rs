@@ -28,10 +28,7 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) 
             number::significant(d.block_s, 2),
             d.least_blocks
         ),
-        DiagnosisVerdict::NothingMissing if d.steps.is_empty() => {
-            "Nothing is missing: the remaining residual is noise.".to_owned()
-        }
-        DiagnosisVerdict::NothingMissing => "Nothing that matters is missing.".to_owned(),
+        DiagnosisVerdict::NothingMissing => "Nothing is missing: what is left is noise.".to_owned(),
         _ => "No effect is sure enough to be written; more than noise is left.".to_owned(),
     };
     let (bought, gains_nothing) = bought(d);
@@ -40,7 +37,7 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) 
     if !is_exact(d) {
         text += &format!(" {}", usual::words(machine.file.log.torque_is));
     }
-    let unusual = errors(d.errors_now()).1.overall.mean_relative_error
+    let unusual = errors(d.errors_now()).1.overall.mean_relative_error_moving
         > usual::band(machine.file.log.torque_is)[1];
     if unusual {
         text += " That is more than usual.";
@@ -76,7 +73,7 @@ fn runs_worse(found: &Diagnosed) -> String {
 /// Whether the error is so small that no published figure is of use beside it.
 pub(super) fn is_exact(d: &Diagnosis) -> bool {
     let [least, _] = usual::band(None);
-    errors(d.errors_now()).1.overall.mean_relative_error < 0.5 * least
+    errors(d.errors_now()).1.overall.mean_relative_error_moving < 0.5 * least
 }
 
 /// The effects of the written model, by how firm they are.
@@ -121,7 +118,7 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
 /// How the diagnosis changed the error, and whether effects were written that gain nothing.
 fn bought(d: &Diagnosis) -> (String, bool) {
     let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
-    let mean = |e: &Errors| e.overall.mean_relative_error;
+    let mean = |e: &Errors| e.overall.mean_relative_error_moving;
     let [from, to] = [before, after].map(|e| number::percent(mean(e)));
     let changed = d.written().next().is_some();
     let rises = mean(after) > mean(before);
@@ -148,7 +145,7 @@ fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
     let vetoed = d.steps.iter().filter(|s| s.vetoed());
     let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
     let names = names.join("; ");
-    let error = |of: &SplitErrors| number::percent(errors(of).1.overall.mean_relative_error);
+    let error = |of: &SplitErrors| number::percent(errors(of).1.overall.mean_relative_error_moving);
     if d.written().next().is_none() {
         let after = error(&d.after);
         return format!(" Not written, for held-out data are worse with it ({after}): {names}.");
@@ -164,7 +161,7 @@ fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
 /// The joint with the largest share of its torque left beyond the noise.
 pub(super) fn worst(d: &Diagnosis) -> Option<usize> {
     let share = |j: &usize| d.left.unexplained[*j].share;
-    let structured = d.structured_joints();
+    let structured = d.structured_joints().filter(|j| d.left.unexplained[*j].matters());
     structured.max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
@@ -172,7 +169,7 @@ pub(super) fn worst(d: &Diagnosis) -> Option<usize> {
 fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let names = machine.robot.joint_names();
     let worst = worst(d)?;
-    let error = number::percent(errors(d.errors_now()).1.joints[worst].relative_error);
+    let error = number::percent(errors(d.errors_now()).1.joints[worst].headline());
     let place = match names.len() {
         1 => format!("More than noise is left ({error} of the torque)"),
         _ => format!(

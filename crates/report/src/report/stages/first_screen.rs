@@ -37,7 +37,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
     };
     let errors = [&d.before, d.errors_now()].map(|split| errors_of(split).1);
     let bar = |errors: &Errors, j: usize| ErrorBar {
-        error: errors.joints[j].relative_error,
+        error: errors.joints[j].headline(),
         interval_95: Some(errors.joints[j].interval_95),
     };
     let joints = machine.robot.joint_names().iter().enumerate();
