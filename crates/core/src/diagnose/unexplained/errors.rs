@@ -9,6 +9,7 @@ use crate::diagnose::problem::rests::{resting, standing};
 use crate::effect::AugmentedModel;
 use crate::math::bootstrap::intervals_95;
 use crate::motion::MotionError;
+use crate::robot::model::JointFriction;
 
 /// Errors of one joint.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -97,6 +98,8 @@ pub struct PieceErrors {
     raw_torque: f64,
     /// Squared error and torque, and number, of the rows in which the joint rests.
     rest: [f64; 3],
+    /// The same of those in which it moves, weighed as a fit does.
+    moving: [f64; 3],
 }
 
 const SEED: u64 = 20_020_520;
@@ -118,7 +121,20 @@ pub fn pieces(
         }
         let parallel = case.filters.of(stretch);
         let hat = model.reconstruct(stretch);
-        let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
+        // samples where a joint turns or stands count less in its error while it moves, as in a fit
+        let by_weight = stretch.tau.iter().chain(&hat).enumerate().map(|(c, x)| {
+            let (j, friction) = (c % n, &model.model.friction);
+            match friction[j] {
+                JointFriction::None => x.clone(),
+                _ => {
+                    let weights = parallel.weights(stretch, j, case.rest_speed[j]);
+                    x.iter().zip(weights).map(|(x, w)| x * w).collect()
+                }
+            }
+        });
+        let by_weight: Vec<Vec<f64>> = by_weight.collect();
+        let channels = stretch.tau.iter().chain(&hat).chain(&by_weight);
+        let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
         let resting = resting(model, stretch, parallel, &case.rest_speed)?;
         let still = |j| match moving {
@@ -139,10 +155,16 @@ pub fn pieces(
                     s.mean += measured;
                     s.rows += 1.0;
                     s.largest = s.largest.max(e.abs());
-                    if resting[j][i] {
-                        let rest = [e * e, measured * measured, 1.0];
-                        s.rest.iter_mut().zip(rest).for_each(|(sum, x)| *sum += x);
-                    }
+                    let (of, own) = match resting[j][i] {
+                        true => ([e, measured], &mut s.rest),
+                        false => {
+                            let [tau, hat] = [&rows[2 * n + j], &rows[3 * n + j]].map(|x| x[i]);
+                            ([tau - hat, tau], &mut s.moving)
+                        }
+                    };
+                    let [e, measured] = of;
+                    let squares = [e * e, measured * measured, 1.0];
+                    own.iter_mut().zip(squares).for_each(|(sum, x)| *sum += x);
                 }
                 let first = parallel.sample_of(piece.rows.start);
                 let last = parallel.sample_of(piece.rows.end).min(stretch.len());
@@ -171,11 +193,8 @@ fn relative(pieces: &[Vec<PieceErrors>], picked: &[usize]) -> Vec<f64> {
         let sum = |of: fn(&PieceErrors) -> f64| -> f64 {
             picked.iter().map(|p| of(&pieces[*p][j])).sum()
         };
-        match sum(|s| s.rows) > sum(|s| s.rest[2]) {
-            true => ratio(
-                (sum(|s| s.error) - sum(|s| s.rest[0])).max(0.0),
-                sum(|s| s.torque) - sum(|s| s.rest[1]),
-            ),
+        match sum(|s| s.moving[2]) > 0.0 {
+            true => ratio(sum(|s| s.moving[0]), sum(|s| s.moving[1])),
             false => ratio(sum(|s| s.error), sum(|s| s.torque)),
         }
     };
@@ -240,9 +259,13 @@ pub fn summed(case: &Case, (pieces, block): (&Pieces, usize)) -> Option<Errors> 
     let sum = |j: usize, of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
     let parts = |j: usize| -> [[f64; 3]; 2] {
         let sum = |of| sum(j, of);
-        let all = [sum(|s| s.error), sum(|s| s.torque), sum(|s| s.rows)];
+        let moving = [
+            sum(|s| s.moving[0]),
+            sum(|s| s.moving[1]),
+            sum(|s| s.moving[2]),
+        ];
         let rest = [sum(|s| s.rest[0]), sum(|s| s.rest[1]), sum(|s| s.rest[2])];
-        [std::array::from_fn(|k| (all[k] - rest[k]).max(0.0)), rest]
+        [moving, rest]
     };
     let part = |[error, torque, rows]: [f64; 3]| (rows > 0.0).then(|| ratio(error, torque));
     let of_joint = |j: usize| {

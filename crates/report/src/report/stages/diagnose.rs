@@ -150,11 +150,16 @@ fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
         .column(Align::Right, "95 % CI", |j| {
             after.joints[j].interval_95.map(hundred).join("..")
         })
-        .when(after.joints.iter().any(|e| e.relative_error_rest.is_some()), |t| {
-            t.numbers("at rest", |j| {
-                after.joints[j].relative_error_rest.map_or(number::ABSENT.to_owned(), hundred)
-            })
-        });
+        .when(
+            after.joints.iter().any(|e| e.relative_error_rest.is_some()),
+            |t| {
+                t.numbers("at rest", |j| {
+                    after.joints[j]
+                        .relative_error_rest
+                        .map_or(number::ABSENT.to_owned(), hundred)
+                })
+            },
+        );
     usual.table(columns);
     if let Some(more) = more {
         usual.line(&more);

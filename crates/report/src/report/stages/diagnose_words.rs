@@ -161,7 +161,9 @@ fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
 /// The joint with the largest share of its torque left beyond the noise.
 pub(super) fn worst(d: &Diagnosis) -> Option<usize> {
     let share = |j: &usize| d.left.unexplained[*j].share;
-    let structured = d.structured_joints().filter(|j| d.left.unexplained[*j].matters());
+    let structured = d
+        .structured_joints()
+        .filter(|j| d.left.unexplained[*j].matters());
     structured.max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
