@@ -62,6 +62,8 @@ pub struct FoundEffect {
     pub joints: Vec<JointChange>,
     /// The user wants it whatever the judge says.
     pub accepted_by_user: bool,
+    /// The written model without it, all else fitted anew by the judge's sums; none of one that is not written.
+    pub without: Option<AugmentedModel>,
 }
 
 impl FoundEffect {

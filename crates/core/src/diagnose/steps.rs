@@ -68,6 +68,8 @@ struct Way {
     /// Amplitude in the predicting model; none where it is not in it.
     amplitude: Option<Vec<f64>>,
     change: Option<EffectChange>,
+    /// The written model without it, all else fitted anew.
+    without: Option<AugmentedModel>,
 }
 
 /// What a joint fit makes of an effect.
@@ -107,7 +109,7 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
         written = work.written(&ways, &estimates)?;
     }
     work.ask_those_that_left(&mut ways)?;
-    work.held_out(&mut ways)?;
+    work.held_out(&mut ways, &written.1)?;
     Ok(work.described(&ways, &estimates, (judge.1, written)))
 }
 
@@ -143,6 +145,7 @@ impl Judging<'_> {
                 came_back: false,
                 amplitude: None,
                 change: None,
+                without: None,
             }
         };
         searched.chosen.iter().map(way).collect()
@@ -394,18 +397,27 @@ impl Judging<'_> {
     }
 
     /// What each effect that stands changes on held-out data, the others refitted by the judge's sums.
-    fn held_out(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
+    fn held_out(&self, ways: &mut [Way], written: &AugmentedModel) -> Result<(), DiagnoseError> {
         let rows = self.prepared.held_out(LogRole::Holdout);
         let set: Vec<usize> = (0..ways.len())
             .filter(|i| ways[*i].amplitude.is_some())
             .collect();
         let all: Vec<&Way> = set.iter().map(|i| &ways[*i]).collect();
         let with = self.based(self.fitted(&all));
-        for i in &set {
+        let unknowns = &self.prepared.unknowns;
+        let before = self.prepared.case.given.effects.len();
+        for (at, i) in set.iter().enumerate() {
             let others = set.iter().filter(|k| *k != i);
             let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
             let without = self.based(self.fitted(&others));
             ways[*i].change = rows.change([&without, &with])?;
+            // the written model moved by as much as the judge's sums move without the effect
+            let moved = |u: &Unknown| value_of(&without, *u) - value_of(&with, *u);
+            let moved: Vec<f64> = unknowns.list.iter().map(moved).collect();
+            let mut alone = written.clone();
+            step(&mut alone, unknowns, &moved);
+            alone.effects.remove(before + at);
+            ways[*i].without = Some(alone);
         }
         Ok(())
     }
@@ -496,6 +508,7 @@ impl Judging<'_> {
             holdout: way.change.as_ref().map(|c| c.mean),
             joints: way.change.as_ref().map_or(Vec::new(), |c| c.joints.clone()),
             accepted_by_user: way.accepted,
+            without: way.without.clone(),
         })
     }
 }

@@ -69,7 +69,7 @@ pub struct Diagnosed {
     pub logs: Vec<String>,
     /// Stretches in which something may push the robot, one sentence each.
     pub contacts: Vec<String>,
-    /// The model as it was given.
+    /// The given model as torques are computed with it.
     pub given: AugmentedModel,
     /// The declared numbers as they would be written, without the effects; none where the given model stays.
     pub(super) fitted: Option<ModelFile>,
@@ -278,7 +278,7 @@ pub fn diagnose(
         in_memory,
         logs,
         contacts: contact,
-        given: case.given.clone(),
+        given: case.in_use.clone(),
         fitted,
         by_lsq,
         held: Held::default(),

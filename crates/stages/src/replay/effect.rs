@@ -1,4 +1,5 @@
-//! One effect along logs: the residual without it over the signal on which it depends, and the torque that it adds.
+//! One effect along logs: the residual of the model that is fitted without it over the signal on which it depends, and
+//! what the model with it explains of that.
 
 use super::Replay;
 use cft_ident_core::effect::empirical::ways;
@@ -16,20 +17,20 @@ pub struct EffectRows {
     pub over: (String, String),
     /// The torque counts along the motion: it flips with the direction.
     pub along_motion: bool,
-    /// Root mean squares of the residual without the effect and with it, nothing else fitted anew [Nm or N].
+    /// Root mean squares of the residual without the effect, all else fitted anew, and with it [Nm or N].
     pub rms: [f64; 2],
-    /// Signal, residual without the effect, torque of the effect.
+    /// Signal, residual of the model that is fitted without the effect, and what the model with it explains of that.
     pub rows: Vec<[f64; 3]>,
 }
 
 pub(super) fn effect(
     replay: &Replay,
-    model: &AugmentedModel,
+    (model, without): (&AugmentedModel, &AugmentedModel),
     at: usize,
     logs: &[usize],
 ) -> Result<EffectRows, MotionError> {
     let effect = &model.effects[at];
-    let (joint, mut rows) = rows(replay, model, at, logs)?;
+    let (joint, mut rows) = rows(replay, (model, without), at, logs)?;
     let rms = |of: fn(&[f64; 3]) -> f64| {
         let squares = rows.iter().map(|row| of(row).powi(2));
         let sum: f64 = squares.filter(|x| x.is_finite()).sum();
@@ -53,13 +54,11 @@ pub(super) fn effect(
 /// The rows of an effect: at its joint, or where it adds the most.
 fn rows(
     replay: &Replay,
-    model: &AugmentedModel,
+    (model, without): (&AugmentedModel, &AugmentedModel),
     at: usize,
     logs: &[usize],
 ) -> Result<(usize, Vec<[f64; 3]>), MotionError> {
     let effect = &model.effects[at];
-    let mut without = model.clone();
-    without.effects.remove(at);
     let joints = replay.machine.robot.joints();
     let mut all: Vec<Vec<[f64; 3]>> = vec![Vec::new(); joints];
     let wanted = |stretch: &&Stretch| logs.contains(&stretch.log);

@@ -148,16 +148,18 @@ impl ReplayedDiagnosis {
         let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
         let shown = if others.is_empty() { fitted } else { others };
         // without an effect the given model stands
-        let after = d.written().next().map(|_| &d.model);
+        let after = d.written().next().map(|_| &d.in_use);
         let models: Vec<&AugmentedModel> = [&found.given].into_iter().chain(after).collect();
-        let added = d.written().filter_map(|step| step.written);
-        let rows = |at| effect::effect(&replay, &d.model, at, shown);
+        let added = d
+            .written()
+            .filter_map(|step| Some((step.written?, step.without.as_ref()?)));
+        let rows = |(at, without)| effect::effect(&replay, (&d.in_use, without), at, shown);
         Ok(ReplayedDiagnosis {
             logs: shown.iter().map(|log| replay.names[*log].clone()).collect(),
             held_out: !others.is_empty(),
             torque: torque::torque(&replay, shown, &models)?,
             effects: added.map(rows).collect::<Result<_, _>>()?,
-            friction: friction::friction(&replay, refined, &d.model)?,
+            friction: friction::friction(&replay, refined, &d.in_use)?,
             residual: residual::residual(&replay, fitted, &found.given, after)?,
             poses: poses::poses(&replay, shown),
         })
