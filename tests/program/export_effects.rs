@@ -45,6 +45,8 @@ fn shape(key: &str, i: usize) -> f64 {
         "to" => 0.8,
         "r" => -0.8,
         "order" => 3.0,
+        "scale" | "T" => 0.9,
+        "signal" => 1.0 + (i % 2) as f64,
         _ => 0.3 + 0.17 * i as f64,
     }
 }

@@ -41,6 +41,32 @@ pub enum Shape {
         time_s: f64,
     },
     Drift,
+    /// A drift that settles [s].
+    SettlingDrift {
+        time_s: f64,
+    },
+    /// A torque constant that falls as the motor warms up [s].
+    WarmMotor {
+        time_s: f64,
+    },
+    /// A torque constant that falls in proportion to the current.
+    FullIron,
+    /// A torque constant that varies along the turn.
+    UnevenMotor {
+        order: f64,
+        phase: f64,
+    },
+    /// Friction that another joint's pose sets.
+    PoseFriction {
+        other: usize,
+        phase: f64,
+    },
+    /// What another joint's motion asks for: Coulomb friction with it, and with the sum of both; viscous friction.
+    GearTrain {
+        other: usize,
+        together: f64,
+        viscous: f64,
+    },
     /// Outside every catalogue: a torque that follows the square of the position's swing and the speed's sign.
     Stray,
     /// Those of the study of formulas.
@@ -102,6 +128,23 @@ impl Added {
                 }
             }
             Shape::Drift => torque(k * t),
+            Shape::SettlingDrift { time_s } => torque(k * (1.0 - (-t / time_s).exp())),
+            // what the drive is told and does not give
+            Shape::WarmMotor { time_s } => torque(seen.drive * k * (1.0 - (-t / time_s).exp())),
+            Shape::FullIron => torque(seen.drive * k * seen.drive.abs()),
+            Shape::UnevenMotor { order, phase } => {
+                torque(seen.drive * k * (order * q_own + phase).sin())
+            }
+            Shape::PoseFriction { other, phase } => level(k * (seen.q[other] + phase).cos()),
+            Shape::GearTrain {
+                other,
+                together,
+                viscous,
+            } => {
+                let sign = |v: f64| if v == 0.0 { 0.0 } else { v.signum() };
+                let (w, both) = (v[other], v_own + v[other]);
+                torque(k * (sign(w) + together * sign(both) + viscous * w))
+            }
             Shape::Uncatalogued(law) => law.share(k, self.joint, seen),
             Shape::Stray => torque(k * (3.0 * q_own).sin() * (2.5 * v_own).cos()),
         }

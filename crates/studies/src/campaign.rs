@@ -29,7 +29,7 @@ impl Campaign {
     }
 
     /// Fits and diagnoses, and says what was written and what it did to the unseen log: the exit status, the steps as
-    /// `[effect, family, joint, status, alternatives]`, the effects written as `[name, joint]`, and the errors by joint
+    /// `[effect, family, joint, status, alternatives, parameters]`, the effects written as `[name, joint]`, and the errors by joint
     /// before and after. `model.toml` and `refined.toml` are left in the folder.
     pub fn diagnosed(&self, tool: &Tool, folder: &File) -> Result<Value, StudyError> {
         let logs = || self.fitted.iter().map(String::as_str);
@@ -54,7 +54,8 @@ impl Campaign {
                     s["family"],
                     s["joint"],
                     s["status"],
-                    s["alternatives"]
+                    s["alternatives"],
+                    s["parameters"]
                 ])
             })
             .collect();

@@ -131,6 +131,7 @@ pub fn robot_text(machine: &Machine, rate_hz: f64, urdf: &str, more: &str) -> St
     let kind = |joint: usize| match machine.drive {
         Drive::Harmonic => "harmonic",
         Drive::BallScrew if machine.slides(joint) => "screw",
+        _ if machine.plant.drives[joint].is_some_and(|drive| drive.gap > 0.0) => "geared",
         _ => "direct",
     };
     for (i, name) in machine.names.iter().enumerate() {

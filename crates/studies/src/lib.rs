@@ -10,6 +10,7 @@
 //! | [`coverage`] | do 95 % intervals hold the truth, where the verdict is "identified"? |
 //! | [`clean`] | is an effect written where nothing is missing? |
 //! | [`planted`] | is what was planted named, and does the model predict as well as the truth? |
+//! | [`kinds`] | is each kind of effect found with its size on machines that have it, and on none without? |
 //! | [`formula`] | is the formula of a law found that stands in no catalogue? |
 //! | [`next_motion`] | what is the motion worth that `lsq` proposes to record next? |
 //! | [`nulls`] | is an effect written where the torque is the model's and noise, along measured motions? |
@@ -33,6 +34,7 @@ pub mod files;
 pub mod formula;
 pub mod friction;
 pub mod judge;
+pub mod kinds;
 pub mod lab;
 pub mod machine;
 pub mod measured;

@@ -1,4 +1,4 @@
-//! `studies coverage|clean|planted|formula|nulls|rotations|setup|next|payload [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]`
+//! `studies coverage|clean|planted|kinds|formula|nulls|rotations|setup|next|payload [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]`
 //! makes the runs of a study that are not yet in FOLDER/independent_STUDY.jsonl: a study goes on where it was stopped.
 //! `--keep FOLDER` records nothing and leaves the files of the last run there. `studies tables` writes the tables of
 //! docs/independent.md anew from all runs; `studies speed` says how long the plants take.
@@ -9,8 +9,8 @@ use std::process::ExitCode;
 use cft_ident_studies::study::{Rows, StudyError};
 use cft_ident_studies::tool::Tool;
 use cft_ident_studies::{
-    clean, coverage, drive, files, formula, machine, next_motion, nulls, page, path, payload,
-    planted, rotations, setup,
+    clean, coverage, drive, files, formula, kinds, machine, next_motion, nulls, page, path,
+    payload, planted, rotations, setup,
 };
 use serde_json::Value;
 
@@ -114,6 +114,15 @@ fn run(asked: &Asked) -> Result<(), StudyError> {
                 c.0.run(&tool, folder, c.1, k)
             })
         }
+        ["kinds"] => {
+            let cells = kinds::cells();
+            let named = cells
+                .iter()
+                .map(|cell| (cell.name(), cell, kinds::USUAL_RUNS));
+            all(asked, &tool, "kinds", named, |cell, folder, k| {
+                cell.run(&tool, folder, k)
+            })
+        }
         ["formula"] => {
             let cells: Vec<_> = formula::subjects()
                 .into_iter()
@@ -176,7 +185,7 @@ fn run(asked: &Asked) -> Result<(), StudyError> {
         }
         _ => {
             eprintln!(
-                "usage: studies coverage|clean|planted|formula|nulls|rotations|setup|next|payload|tables|speed [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]"
+                "usage: studies coverage|clean|planted|kinds|formula|nulls|rotations|setup|next|payload|tables|speed [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]"
             );
             Ok(())
         }

@@ -4,7 +4,9 @@
 use std::path::Path;
 
 use crate::study::{Rows, StudyError};
-use crate::{clean, coverage, formula, next_motion, nulls, payload, planted, rotations, setup};
+use crate::{
+    clean, coverage, formula, kinds, next_motion, nulls, payload, planted, rotations, setup,
+};
 
 /// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
 pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
@@ -13,6 +15,7 @@ pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
         ("coverage", coverage::table as fn(&Rows) -> String),
         ("clean", clean::table),
         ("planted", planted::table),
+        ("kinds", kinds::table),
         ("nulls", nulls::table),
         ("rotations", rotations::table),
         ("formula", formula::table),

@@ -70,6 +70,8 @@ pub struct State {
     load: Joints,
     a: Joints,
     memory: [Memory; JOINTS],
+    /// Torques of the drives as they are told.
+    told: Joints,
 }
 
 struct Rates {
@@ -94,12 +96,14 @@ impl Plant {
             load: [0.0; JOINTS],
             a: [0.0; JOINTS],
             memory: q.map(Memory::at),
+            told: [0.0; JOINTS],
         }
     }
 
     /// A step of `h` seconds under torques of the drives.
     pub fn step(&self, s: &mut State, u: &Joints, h: f64) {
         let from = s.q;
+        s.told = *u;
         self.go(s, u, h);
         if !self.added.is_empty() {
             for (i, memory) in s.memory.iter_mut().enumerate().take(self.joints) {
@@ -168,6 +172,7 @@ impl Plant {
                 v: &s.v,
                 a: s.a[joint],
                 load: s.load[joint],
+                drive: s.told[joint],
                 memory: &s.memory[joint],
             };
             let one = added.share(&seen, by_law);

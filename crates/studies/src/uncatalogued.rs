@@ -159,6 +159,8 @@ pub struct Seen<'a> {
     /// Acceleration of the joint a step before.
     pub a: f64,
     pub load: f64,
+    /// Torque that the drive is told to give.
+    pub drive: f64,
     pub memory: &'a Memory,
 }
 

@@ -3,9 +3,11 @@
 use super::problem::case::Case;
 pub use super::problem::pass::Candidate;
 use crate::effect::{
-    Added, AugmentedModel, Cover, Family, LAWS, Law, Number, Place, Role, Search, Seen,
+    Added, AugmentedModel, Cover, Family, LAWS, Law, Number, Place, Role, Rule, Search, Seen,
+    ShapeRange,
 };
 use crate::judge::Bound;
+use crate::number;
 
 /// Whether two effects may not both be added: one shape per family and place, and one wave per order.
 pub fn exclude(a: &Added, b: &Added) -> bool {
@@ -107,7 +109,7 @@ fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> O
     let coefficient = |key: &str| value(&effect.linear, key) != value(&twice, key);
     let of_coefficients = |number: &Number| match number {
         Number::Key(key) | Number::Size(key) => coefficient(key),
-        Number::Amplitude(..) => true,
+        Number::Amplitude(..) | Number::AtTopSpeed(..) => true,
         // of coefficients that are all one they are the shape's
         Number::Ratio(..) | Number::Weight => false,
     };
@@ -129,18 +131,62 @@ pub fn refined_shapes(
     cover: &Cover,
     effect: &Added,
 ) -> Vec<(usize, Bound)> {
-    let law = effect.law;
-    let seen = seen(model, cover, case, effect.place);
-    let limits = law.limits_on(cover, effect.place);
-    let of = |(k, [least, most]): (usize, [f64; 2])| {
-        let (known, here) = (bound(effect, law.shape[k], &seen), effect.shape[k]);
+    let ranges = shape_ranges(model, case, cover, effect).into_iter();
+    let of = |(k, range): (usize, ShapeRange)| {
+        let here = effect.shape[k];
         let bound = Bound {
-            least: (known.least.max(least) - here).min(0.0),
-            most: (known.most.min(most) - here).max(0.0),
+            least: (range.least - here).min(0.0),
+            most: (range.most - here).max(0.0),
         };
         (k, bound)
     };
-    limits.into_iter().enumerate().map(of).collect()
+    ranges.enumerate().map(of).collect()
+}
+
+/// Ranges of the shapes that are refined, within what its numbers must be.
+fn shape_ranges(
+    model: &AugmentedModel,
+    case: &Case,
+    cover: &Cover,
+    effect: &Added,
+) -> Vec<ShapeRange> {
+    let law = effect.law;
+    let seen = seen(model, cover, case, effect.place);
+    let ranges = law.limits_on(cover, effect.place, &effect.shape);
+    let of = |(k, range): (usize, ShapeRange)| {
+        let known = bound(effect, law.shape[k], &seen);
+        range.within(known.least, known.most)
+    };
+    ranges.into_iter().enumerate().map(of).collect()
+}
+
+/// Why an effect with its numbers is no finding, where it is none: a shape stands at an end of its range, beyond which
+/// the law is another or nothing is left of it; it has no torque; or its numbers together are none that a machine has.
+pub fn no_finding(
+    model: &AugmentedModel,
+    case: &Case,
+    cover: &Cover,
+    effect: &Added,
+) -> Option<String> {
+    let law = effect.law;
+    if effect.linear.iter().all(|x| *x == 0.0) || !effect.can_be() {
+        return Some("its size is at a bound, where it has no torque".to_owned());
+    }
+    let ranges = shape_ranges(model, case, cover, effect).into_iter();
+    let mut ends = ranges.enumerate().filter_map(|(k, range)| {
+        let end = range.end_at(effect.shape[k])?;
+        Some((law.shape[k], end))
+    });
+    if let Some((key, end)) = ends.next() {
+        return Some(format!(
+            "{key} stands at {}, an end of its range: beyond it another law begins",
+            number::significant(end, 3)
+        ));
+    }
+    let seen = seen(model, cover, case, effect.place);
+    // an amplitude beyond its usual size is told as large, and is there
+    let told = |rule: &Rule| matches!(rule.of, Number::Amplitude(..));
+    effect.broken(&seen, &told).map(|(_, why)| why)
 }
 
 /// Values that a coefficient can have.

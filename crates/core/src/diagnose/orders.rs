@@ -36,11 +36,13 @@ pub fn find(
             JointKind::Revolute => std::f64::consts::TAU / range,
             JointKind::Prismatic => 1.0 / range,
         };
-        let (mut plain, mut flipped) = (Vec::new(), Vec::new());
+        let [mut plain, mut flipped, mut loaded] = [(); 3].map(|()| Vec::new());
         for residual in [&filtered, &raw] {
-            let [as_is, signed, count] = binned(&cover.joints[j], j, stretches, residual);
+            let [as_is, signed, by_torque, count] =
+                binned(&cover.joints[j], j, stretches, residual);
             plain.extend(peaks(&as_is, &count));
             flipped.extend(peaks(&signed, &count));
+            loaded.extend(peaks(&by_torque, &count));
         }
         let orders = |mut waves: Vec<f64>| -> Vec<f64> {
             waves.sort_by(f64::total_cmp);
@@ -49,25 +51,27 @@ pub fn find(
         };
         cover.joints[j].ripple_orders = orders(plain);
         cover.joints[j].friction_orders = orders(flipped);
+        cover.joints[j].torque_orders = orders(loaded);
     }
     Ok(())
 }
 
-/// A residual summed over position: as it is, times the sign of the speed, and the number of its rows.
+/// A residual summed over position: as it is, times the sign of the speed and times that of the torque, and the number
+/// of its rows.
 fn binned(
     joint: &JointCover,
     j: usize,
     stretches: &[Stretch],
     residual: &[Vec<f64>],
-) -> [Vec<f64>; 3] {
+) -> [Vec<f64>; 4] {
     let (low, range) = (joint.position[0], joint.range());
     let slow = 0.02 * joint.speed_rms;
-    let mut bins = [(); 3].map(|()| vec![0.0; BINS]);
+    let mut bins = [(); 4].map(|()| vec![0.0; BINS]);
     for (s, e) in stretches.iter().zip(residual) {
-        let rows = s.q[j].iter().zip(&s.v[j]).zip(e);
-        for ((q, v), e) in rows.filter(|((_, v), _)| v.abs() > slow) {
+        let rows = s.q[j].iter().zip(&s.v[j]).zip(&s.tau[j]).zip(e);
+        for (((q, v), tau), e) in rows.filter(|(((_, v), _), _)| v.abs() > slow) {
             let bin = (((q - low) / range * BINS as f64) as usize).min(BINS - 1);
-            let row = [*e, e * v.signum(), 1.0];
+            let row = [*e, e * v.signum(), e * tau.signum(), 1.0];
             bins.iter_mut()
                 .zip(row)
                 .for_each(|(sums, x)| sums[bin] += x);

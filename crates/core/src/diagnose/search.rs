@@ -158,6 +158,6 @@ impl<'a> Field<'a> {
 pub fn own_joint(place: Place) -> Option<usize> {
     match place {
         Place::Joint(j) | Place::Pair { on: j, .. } => Some(j),
-        Place::Actuator(_) | Place::Geared { .. } | Place::All => None,
+        Place::Actuator(_) | Place::Actuators | Place::Geared { .. } | Place::All => None,
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::candidates::no_finding;
 use super::error::DiagnoseError;
 use super::held_out::{EffectChange, HeldOutRows};
 use super::outcome::{FoundEffect, StepStatus};
@@ -49,7 +50,8 @@ pub struct Judged {
 pub enum NotWritten {
     /// Its amplitude is too uncertain, or it can be measured and is not sure enough.
     Unsure,
-    /// Beside the others a bound takes all of it, or what it cannot be without.
+    /// Beside the others a bound takes all of it, or what it cannot be without; or its shape is at an end of its range,
+    /// beyond which another law begins.
     Bound,
     /// It takes off no joint's error what one would notice.
     Small,
@@ -262,8 +264,10 @@ impl Judging<'_> {
         let Found {
             verified, effect, ..
         } = way.found.as_ref()?;
-        let there = effect.linear.iter().any(|x| *x != 0.0) && effect.can_be();
-        let keeps = self.prepared.case.keep;
+        let Self { prepared, .. } = self;
+        let (about, case) = (&prepared.fitted.model, prepared.case);
+        let there = no_finding(about, case, &prepared.cover, effect).is_none();
+        let keeps = case.keep;
         match way.accepted {
             true => None,
             false if !there => Some(NotWritten::Bound),

@@ -1,7 +1,7 @@
 //! `actuator-friction`: friction in the actuator coordinates, tau = J' F(J v). On the CFT robot it
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
-use super::{Entry, Family, Key, Ladder, Law, Place, Places, Search, Unit};
+use super::{Entry, Family, Key, Ladder, Law, Places, Search, ShapeRange, Unit};
 use crate::robot::cft::pantograph::reference_jacobian;
 
 pub static ENTRY: Entry = Entry {
@@ -32,20 +32,21 @@ pub static LAW: Law = Law {
         }
         Ok([50.0, 200.0, 1000.0].map(|w| vec![w]).to_vec())
     },
-    limits: |_, _| vec![[10.0, 1e5]],
+    limits: |_, _, _| vec![ShapeRange::of(10.0, 1e5).open_above()],
     code: Some(|to| {
         let [viscous, coulomb, slope] = [to.x(0), to.x(1), to.s(0)];
-        to.of_screw(|speed, _| {
+        to.of_screws(|speed, _| {
             format!("{viscous} * {speed} + {coulomb} * tanh({slope} * {speed})")
         });
     }),
     ..Law::linear(&ENTRY, &["viscous", "coulomb"], |at, _, out| {
-        let Place::Actuator(r) = at.place else { return };
         let [q, v, _] = at.state();
         let jacobian = reference_jacobian(&q);
-        let speed = jacobian[r][0] * v[2] + jacobian[r][1] * v[3];
-        let share = jacobian[r][at.joint - 2];
-        out[0] = share * speed;
-        out[1] = share * (at.shape[0] * speed).tanh();
+        for r in at.place.rows() {
+            let speed = jacobian[r][0] * v[2] + jacobian[r][1] * v[3];
+            let share = jacobian[r][at.joint - 2];
+            out[0] += share * speed;
+            out[1] += share * (at.shape[0] * speed).tanh();
+        }
     })
 };

@@ -188,6 +188,7 @@ impl Added {
             (Place::Geared { other, .. }, Some(motor)) => {
                 format!("{name} of {motor} and {}", robot.joint_names()[other])
             }
+            (Place::Actuators, _) => format!("{name} of {}", self.place.words(robot)),
             (_, Some(place)) => format!("{name} of {place}"),
             (_, None) => name.to_owned(),
         }
@@ -196,9 +197,8 @@ impl Added {
     /// What it is called where it was found: `ripple of q1, 2.5 mm pitch, 1.2 N`. `torque` is the torque's unit.
     pub fn said(&self, robot: &Robot, torque: &str) -> String {
         let numbers = self.numbers(robot, torque, None).into_iter();
-        let at = self.place.name(robot);
         let words = (self.law.entry.said)(&Facts {
-            at: at.unwrap_or_else(|| "all joints".to_owned()),
+            at: self.place.words(robot),
             with: (self.place.from()).map_or(String::new(), |j| robot.joint_names()[j].clone()),
             kind: self.place.kind(robot),
             numbers: numbers.map(|n| (n.key, n.value, n.unit)).collect(),
@@ -235,7 +235,7 @@ impl Added {
         let own = own.map(|number| {
             let unit = self.law.entry.key(number.key);
             let unit = match unit.map_or(Unit::One, |key| key.unit) {
-                Unit::Signal => self.curve().map_or(Unit::One, |(signal, _)| signal.unit()),
+                Unit::Signal => (self.law.signal_unit).map_or(Unit::One, |of| of(&self.shape)),
                 unit => unit,
             };
             // a number of held ones alone

@@ -1,9 +1,7 @@
 //! `backlash`: a play of width `gap`. After a reversal the motor crosses the gap and does not feel
 //! what lies behind it: c sgn(v) is missing until the gap is used up, a fixed distance.
 
-use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit, exact,
-};
+use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit, exact};
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
@@ -41,9 +39,9 @@ pub static LAW: Law = Law {
         let shares = [0.001, 0.003, 0.01, 0.02, 0.05, 0.1];
         Ok(shares.map(|s| vec![s * joint.range()]).to_vec())
     },
-    limits: |cover, place| {
+    limits: |cover, place, _| {
         let range = cover.at(place).range();
-        vec![[1e-4 * range, 0.3 * range]]
+        vec![ShapeRange::of(1e-4 * range, 0.3 * range)]
     },
     // where the far side of the gap stands: a play operator
     memory: Some(1),

@@ -1,9 +1,11 @@
 //! `coupling`: what another joint j does to joint i through shared gears or a linkage: viscous v_j,
-//! coulomb sgn(v_i + r v_j), inertia a_j.
+//! coulomb_from sgn(v_j), inertia a_j, each in the direction of r, and coulomb sgn(v_i + r v_j) of what both turn.
+//! Which of the two Coulomb frictions a machine has hangs on where its seals and bearings are; together they
+//! are one law, and not two that take the place of each other.
 //!
 //! Where both joints turn one motor, as in the wrist of many arms, what it asks of joint i it asks of
-//! joint j too: power is kept, so that both rows have the same three numbers. That place is named by
-//! `both`.
+//! joint j too: power is kept, so that both rows have the same three numbers, and nothing goes by joint j
+//! alone. That place is named by `both`.
 
 use super::{CodeSite, Entry, Family, Key, Ladder, Law, Place, Places, Rule, Search, Unit};
 use crate::robot::friction::sign;
@@ -16,6 +18,7 @@ pub static ENTRY: Entry = Entry {
         Key::size("viscous", Unit::CoupledViscous),
         Key::torque("coulomb"),
         Key::size("inertia", Unit::CoupledInertia),
+        Key::torque("coulomb_from").or_zero(),
         Key::shape("r", Unit::CoupledRatio),
     ],
     places: Places::Pairs,
@@ -24,15 +27,16 @@ pub static ENTRY: Entry = Entry {
         Rule::not_negative("viscous", TRAIN),
         Rule::not_negative("coulomb", TRAIN),
         Rule::not_negative("inertia", TRAIN),
+        Rule::not_negative("coulomb_from", TRAIN),
     ],
     ladder: Some(Ladder::USUAL),
     separate_by: "move the other joint alone, both ways at several speeds",
-    formula: "viscous v_j + coulomb sgn(v_i + r v_j) + inertia a_j of joint j = from, counted \
-                from 1",
+    formula: "sgn(r) (viscous v_j + coulomb_from sgn(v_j) + inertia a_j) + coulomb sgn(v_i + r v_j) of joint \
+                j = from, counted from 1",
     source: "gears that two joints share, as in the wrist of many arms, or a linkage",
     at_rest: true,
     said: |f| {
-        let friction = f.size("coulomb");
+        let friction = f.sum("coulomb", "coulomb_from");
         match f.value("both") == 1.0 {
             true => format!(
                 "gear train that {} shares with {}, with {friction} of friction",
@@ -61,11 +65,11 @@ pub static LAW: Law = Law {
         }
     },
     code: Some(written),
-    ..Law::linear(&ENTRY, &["viscous", "coulomb", "inertia"], |at, _, out| {
+    ..Law::linear(&ENTRY, &["viscous", "coulomb", "inertia", "coulomb_from"], |at, _, out| {
         let (s, k, r) = (at.scene.stretch, at.k, at.shape[0]);
         // whose motion the row gets, what turns the motor, and how the row sees the motor
         let (of, [a, b], scale, lever) = match at.place {
-            Place::Pair { on, of } => (of, [on, of], 1.0, 1.0),
+            Place::Pair { on, of } => (of, [on, of], sign(r), 1.0),
             Place::Geared { motor, other } if at.joint == motor => (other, [motor, other], r, 1.0),
             Place::Geared { motor, other } => (motor, [motor, other], r, r),
             _ => return,
@@ -73,12 +77,15 @@ pub static LAW: Law = Law {
         out[0] = scale * s.v[of][k];
         out[1] = lever * sign(s.v[a][k] + r * s.v[b][k]);
         out[2] = scale * s.a[of][k];
+        if matches!(at.place, Place::Pair { .. }) {
+            out[3] = scale * sign(s.v[of][k]);
+        }
     })
 };
 
 /// What it adds to generated code.
 fn written(to: &mut CodeSite) {
-    let [viscous, coulomb, inertia, r] = [to.x(0), to.x(1), to.x(2), to.s(0)];
+    let [viscous, coulomb, inertia, from, r] = [to.x(0), to.x(1), to.x(2), to.x(3), to.s(0)];
     match to.place {
         Place::Geared { motor, other } => {
             let name = format!("shared_{}", to.number);
@@ -95,7 +102,8 @@ fn written(to: &mut CodeSite) {
         Place::Pair { on, of } => {
             let turning = format!("$sign(v[{on}] + {r} * v[{of}])");
             to.added(format!(
-                "{viscous} * v[{of}] + {coulomb} * {turning} + {inertia} * a[{of}]"
+                "$sign({r}) * ({viscous} * v[{of}] + {from} * $sign(v[{of}]) + {inertia} * a[{of}]) + {coulomb} * \
+                 {turning}"
             ));
         }
         _ => {}

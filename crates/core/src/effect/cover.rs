@@ -21,6 +21,10 @@ pub struct JointCover {
     pub ripple_orders: Vec<f64>,
     /// The same of the residual times the sign of the speed.
     pub friction_orders: Vec<f64>,
+    /// The same of the residual times the sign of the torque.
+    pub torque_orders: Vec<f64>,
+    /// Greatest torque that is logged [N or Nm].
+    pub torque: f64,
     /// The joint is stationary in every log.
     pub stationary: bool,
     /// Gravity acts on it, as far as the robot's model knows.
@@ -67,6 +71,8 @@ impl Cover {
                     count += 1;
                 }
                 acceleration += s.a[j].iter().map(|a| a * a).sum::<f64>();
+                let torques = s.tau[j].iter().map(|tau| tau.abs());
+                joint.torque = torques.fold(joint.torque, f64::max);
             }
             joint.speed_rms = (square / count.max(1) as f64).sqrt();
             joint.acceleration_rms = (acceleration / count.max(1) as f64).sqrt();

@@ -7,10 +7,7 @@
 
 use nalgebra::Matrix4;
 
-use super::{
-    Entry, Family, Key, KeyValue, Law, Limit, Number, Reparametrisation, Rule, Scene, Search, Unit,
-    exact,
-};
+use super::{Entry, Family, Key, KeyValue, Law, Limit, Number, Reparametrisation, Rule, Scene, Search, ShapeRange, Unit, exact};
 
 pub static ENTRY: Entry = Entry {
     name: "elasticity",
@@ -55,7 +52,10 @@ pub static LAW: Law = Law {
         let seen = starts.into_iter().filter(|s| s[0] < highest(cover.dt));
         Ok(seen.collect())
     },
-    limits: |cover, _| vec![[0.1 * cover.cutoff_hz, highest(cover.dt)], [1e-3, 1.0]],
+    limits: |cover, _, _| {
+        let frequency = ShapeRange::of(0.1 * cover.cutoff_hz, highest(cover.dt));
+        vec![frequency, ShapeRange::of(1e-3, 1.0).open_below()]
+    },
     // stiffness = inertia (2 pi frequency)^2
     reparametrised: Some(Reparametrisation {
         of_keys: |values| {
@@ -156,7 +156,7 @@ fn next(step: &[f64], z: [f64; 2], before: f64, after: f64) -> [f64; 2] {
 }
 
 /// M_jj in the middle of the stretch: the column of a unit acceleration less that of none.
-fn inertia(scene: &Scene, j: usize) -> f64 {
+pub(super) fn inertia(scene: &Scene, j: usize) -> f64 {
     let n = scene.robot.joints();
     let p = scene.theta.len();
     let k = scene.len() / 2;

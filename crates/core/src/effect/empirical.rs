@@ -65,6 +65,7 @@ pub static LAW: Law = Law {
         let signal = CurveSignal::of(shape[0]);
         (signal.family(), signal == CurveSignal::Position)
     }),
+    signal_unit: Some(|shape| CurveSignal::of(shape[0]).unit()),
     memory: Some(TURNING),
     code: Some(written),
     ..Law::linear(&ENTRY, &VALUES, |at, kept, out| {

@@ -115,6 +115,8 @@ pub struct Key {
     pub size: bool,
     /// What a machine can have.
     pub range: Option<Range>,
+    /// Whether a model file may leave it out, as those that are older than the key do: it is 0 there.
+    pub optional: bool,
 }
 
 /// Values that a key can have.
@@ -136,6 +138,7 @@ impl Key {
             unit,
             size: true,
             range: None,
+            optional: false,
         }
     }
 
@@ -149,6 +152,14 @@ impl Key {
         Self {
             size: false,
             ..Self::size(name, unit)
+        }
+    }
+
+    /// The key that files may leave out, 0 there.
+    pub(super) const fn or_zero(self) -> Self {
+        Self {
+            optional: true,
+            ..self
         }
     }
 

@@ -34,6 +34,13 @@ impl Facts {
         with_unit(self.value(key).abs(), unit)
     }
 
+    /// Two numbers of one unit together, as one with that unit.
+    pub(crate) fn sum(&self, one: &str, other: &str) -> String {
+        let found = self.numbers.iter().find(|(k, _, _)| k == one);
+        let unit = found.map_or("", |(_, _, unit)| unit.as_str());
+        with_unit((self.value(one) + self.value(other)).abs(), unit)
+    }
+
     /// The amplitude of a wave with its unit.
     pub(crate) fn amplitude(&self) -> String {
         with_unit(self.value("sin").hypot(self.value("cos")), &self.torque)

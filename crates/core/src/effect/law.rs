@@ -2,7 +2,9 @@
 //! shaped by others.
 
 use super::formula::Formulas;
-use super::{CodeSite, Cover, EffectError, Entry, Family, Instant, Place, Property, Values};
+use super::{
+    CodeSite, Cover, EffectError, Entry, Family, Instant, Place, Property, ShapeRange, Unit, Values,
+};
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
@@ -23,8 +25,8 @@ pub struct Law {
     pub linear: &'static [&'static str],
     /// Shapes to try on these data, or what they lack.
     pub(super) starts: fn(&Cover, Place) -> Starts,
-    /// Limits of each shape parameter that is refined, on these data.
-    pub(super) limits: fn(&Cover, Place) -> Vec<[f64; 2]>,
+    /// Range of each shape parameter that is refined, the first of the shape, about a shape on these data.
+    pub(super) limits: fn(&Cover, Place, &[f64]) -> Vec<ShapeRange>,
     pub(super) columns: Columns,
     /// How many numbers it keeps from sample to sample, NaN at the begin of a stretch, where a column depends on samples
     /// before it.
@@ -33,6 +35,10 @@ pub struct Law {
     pub direction: Option<fn(&[f64], f64) -> f64>,
     /// Family and whether it is the same torque at rest, where these hang on the shape.
     pub varied: Option<Varied>,
+    /// Unit of the keys whose unit is the signal's, by the shape.
+    pub(super) signal_unit: Option<fn(&[f64]) -> Unit>,
+    /// Part of a shape by which it is moved for the slope of its torque.
+    pub slope_step: f64,
     /// Formulas of a user's own, in place of the functions above.
     pub formula: Option<&'static Formulas>,
     /// What it adds to generated code; formulas write their own.
@@ -76,11 +82,13 @@ impl Law {
             shape: &[],
             linear,
             starts: |_, _| Ok(vec![Vec::new()]),
-            limits: |_, _| Vec::new(),
+            limits: |_, _, _| Vec::new(),
             columns,
             memory: None,
             direction: None,
             varied: None,
+            signal_unit: None,
+            slope_step: 1e-4,
             formula: None,
             code: None,
             property: |_, _, _| None,
@@ -117,8 +125,12 @@ impl Law {
         if let Some(with) = &self.reparametrised {
             return (with.of_keys)(values);
         }
+        let value = |key: &&str| match self.entry.key(key).is_some_and(|key| key.optional) {
+            true => values.get_or(key, 0.0),
+            false => values.get(key),
+        };
         let [shape, linear]: [Result<_, _>; 2] =
-            [self.shape, self.linear].map(|keys| keys.iter().map(|key| values.get(key)).collect());
+            [self.shape, self.linear].map(|keys| keys.iter().map(value).collect());
         Ok([shape?, linear?])
     }
 

@@ -1,7 +1,7 @@
 //! `load-friction`: friction that grows with the load, (mu_c + mu_v |v|) |tau_l| tanh(w v)
 //! (Hamon, Gautier and Garrec 2010).
 
-use super::{CurveSignal, Entry, Family, Key, Law, Rule, Search, Unit};
+use super::{CurveSignal, Entry, Family, Key, Law, Limit, Number, Rule, Search, ShapeRange, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -13,8 +13,15 @@ pub static ENTRY: Entry = Entry {
         Key::shape("w", Unit::Slope),
     ],
     search: Search::Refined,
-    // mu_v may be negative: what it takes at speed is bounded by the power of all friction of the joint
-    must: &[Rule::not_negative("mu_c", LOADED)],
+    // mu_v may be negative as long as the load still rubs at top speed
+    must: &[
+        Rule::not_negative("mu_c", LOADED),
+        Rule::at_least(
+            Number::AtTopSpeed("mu_c", "mu_v"),
+            Limit::Is(0.0),
+            LOADED,
+        ),
+    ],
     otherwise: Some(CurveSignal::Load),
     friction: true,
     separate_by: "log the same path at the same speed with and without a known payload",
@@ -41,9 +48,9 @@ pub static LAW: Law = Law {
         let top = cover.reversing(place, 2, lack)?.fastest();
         Ok([10.0, 40.0, 200.0].map(|w| vec![w / top]).to_vec())
     },
-    limits: |cover, place| {
+    limits: |cover, place, _| {
         let top = cover.at(place).fastest();
-        vec![[4.0 / top, 2000.0 / top]]
+        vec![ShapeRange::of(4.0 / top, 2000.0 / top).open_above()]
     },
     code: Some(|to| {
         let (v, load) = (to.v(), to.load());

@@ -21,6 +21,7 @@ pub(crate) mod physics;
 pub(crate) mod place;
 mod sampled;
 mod scene;
+mod shape_range;
 mod signal;
 mod site;
 pub(crate) mod unit;
@@ -39,6 +40,7 @@ pub use physics::{Limit, Number, Rule, Seen};
 pub use place::{Place, Places};
 pub use sampled::Sampled;
 pub use scene::Scene;
+pub use shape_range::ShapeRange;
 pub use signal::CurveSignal;
 pub use unit::Unit;
 pub use values::{EffectError, Values};
@@ -67,6 +69,7 @@ catalogue! {
     torque_offset,
     gravity_tilt,
     gain,
+    gain_change,
     asymmetric_friction,
     stribeck,
     smooth_coulomb,
@@ -78,8 +81,11 @@ catalogue! {
     rigid_body_terms,
     presliding,
     backlash,
+    backlash_impact,
     ripple,
+    torque_ripple,
     position_friction,
+    pose_friction,
     weight,
     spring,
     counterbalance,
@@ -89,6 +95,7 @@ catalogue! {
     carried,
     warm_up,
     drift,
+    settling_drift,
     empirical,
 }
 
@@ -162,6 +169,8 @@ pub fn read_as(
     Ok(Added::new(law, place, shape, linear))
 }
 
+#[cfg(test)]
+mod recovered;
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,6 @@
 //! `nonlinear-viscous`: friction that bends with speed, c sgn(v) |v|^p.
 
-use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Search, Unit};
+use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Search, ShapeRange, Unit};
 use crate::number;
 use crate::robot::friction::sign;
 
@@ -40,7 +40,13 @@ pub static LAW: Law = Law {
         cover.reversing(place, 2, lack)?;
         Ok([0.35, 0.5, 0.7, 1.6, 2.0, 2.5].map(|p| vec![p]).to_vec())
     },
-    limits: |_, _| vec![[0.3, 3.0]],
+    // about 1 it is viscous friction, which every model declares
+    limits: |_, _, shape| {
+        vec![match shape[0] < 1.0 {
+            true => ShapeRange::of(0.3, 0.8),
+            false => ShapeRange::of(1.5, 3.0),
+        }]
+    },
     code: Some(|to| {
         let v = to.v();
         to.friction(format!(

@@ -1,11 +1,11 @@
 //! Orders of what repeats with position: waves per revolution or metre.
 
 use super::law::Starts;
-use super::{CodeSite, Cover, Instant, Place, exact};
+use super::{CodeSite, Cover, Instant, Place, ShapeRange, exact};
 use crate::robot::{JointKind, Robot};
 
 /// rad per rad or per metre of an order (1/rev or 1/m).
-fn wavenumber(robot: &Robot, j: usize, order: f64) -> f64 {
+pub(super) fn wavenumber(robot: &Robot, j: usize, order: f64) -> f64 {
     match robot.joint_kind(j) {
         JointKind::Revolute => order,
         JointKind::Prismatic => std::f64::consts::TAU * order,
@@ -60,9 +60,9 @@ pub fn is_whole(cover: &Cover, place: Place, order: f64) -> bool {
 const FULL_TURNS: f64 = 1.5;
 
 /// Orders between what the travel covers and what the position filter lets through.
-pub(super) fn order_limits(cover: &Cover, place: Place) -> Vec<[f64; 2]> {
+pub(super) fn order_limits(cover: &Cover, place: Place, _: &[f64]) -> Vec<ShapeRange> {
     let travel = cover.travel(place).max(f64::MIN_POSITIVE);
-    vec![[LEAST_WAVES / travel, MOST_ORDER]]
+    vec![ShapeRange::of(LEAST_WAVES / travel, MOST_ORDER).open_above()]
 }
 
 /// Waves that the travel must cover.

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use super::formula::{Definition, FormulaError, Formulas};
 use super::law::{Law, Starts};
-use super::{Cover, Entry, Family, Instant, Key, Place, Search, Unit};
+use super::{Cover, Entry, Family, Instant, Key, Place, Search, ShapeRange, Unit};
 use crate::robot::Robot;
 
 /// Laws that have been made: a definition is read for every command and every file, and is the same law.
@@ -88,11 +88,18 @@ impl Law {
         }
     }
 
-    /// Limits of each shape parameter that is refined, on these data.
-    pub fn limits_on(&self, cover: &Cover, place: Place) -> Vec<[f64; 2]> {
+    /// Range of each shape parameter that is refined, the first of the shape, about a shape on these data.
+    pub fn limits_on(&self, cover: &Cover, place: Place, shape: &[f64]) -> Vec<ShapeRange> {
         match &self.formula {
-            Some(formula) => formula.ranges.clone(),
-            None => (self.limits)(cover, place),
+            // the user's own ends: nothing is known of what lies beyond them
+            Some(formula) => {
+                let range = |[least, most]: &[f64; 2]| ShapeRange::of(*least, *most);
+                let ranges = formula.ranges.iter().map(range);
+                ranges
+                    .map(|range| range.open_below().open_above())
+                    .collect()
+            }
+            None => (self.limits)(cover, place, shape),
         }
     }
 

@@ -27,6 +27,8 @@ pub enum Number {
     Ratio(&'static str, &'static str),
     /// Root of the squares of two keys.
     Amplitude(&'static str, &'static str),
+    /// One key and the joint's top speed in the logs times another.
+    AtTopSpeed(&'static str, &'static str),
     /// 1 where gravity acts on the joint, else 0.
     Weight,
 }
@@ -111,6 +113,7 @@ impl Rule {
             Number::Size(name) => format!("|{name}|"),
             Number::Ratio(a, b) => format!("{a}/{b}"),
             Number::Amplitude(a, b) => format!("the amplitude of {a} and {b}"),
+            Number::AtTopSpeed(a, b) => format!("{a} + {b} |v| at top speed"),
             Number::Weight => return Some(self.why.to_owned()),
         };
         Some(format!("{name} = {} {held}: {}", short(number), self.why))
@@ -142,6 +145,7 @@ impl Number {
             Number::Size(name) => key(name).map(f64::abs),
             Number::Ratio(a, b) => Some(key(a)? / key(b)?),
             Number::Amplitude(a, b) => Some(key(a)?.hypot(key(b)?)),
+            Number::AtTopSpeed(a, b) => Some(key(a)? + seen.cover.fastest() * key(b)?),
             Number::Weight => Some(f64::from(u8::from(seen.weight))),
         }
     }
@@ -229,6 +233,7 @@ mod tests {
             ("smooth-coulomb vs=1.2 fc=9.0", false),
             ("load-friction mu_c=-0.044 mu_v=0.1 w=50.0", false),
             ("load-friction mu_c=0.05 mu_v=-0.01 w=50.0", true),
+            ("load-friction mu_c=0.0 mu_v=-0.5 w=50.0", false),
             ("drive-efficiency k=0.2", true),
             ("drive-efficiency k=0.9", false),
             ("drive-efficiency k=-0.1", false),
@@ -293,7 +298,9 @@ mod tests {
             for rule in entry.must {
                 let keys: &[&str] = match rule.of {
                     Number::Key(a) | Number::Size(a) => &[a],
-                    Number::Ratio(a, b) | Number::Amplitude(a, b) => &[a, b],
+                    Number::Ratio(a, b) | Number::Amplitude(a, b) | Number::AtTopSpeed(a, b) => {
+                        &[a, b]
+                    }
                     Number::Weight => &[],
                 };
                 assert!(keys.iter().all(|key| entry.key(key).is_some()), "{name}");

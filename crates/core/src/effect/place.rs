@@ -10,6 +10,8 @@ pub enum Place {
     Joint(usize),
     /// An actuator coordinate of the CFT robot: x_r (0) or y_r (1).
     Actuator(usize),
+    /// All of these together, with the same numbers: drives of one make.
+    Actuators,
     /// Joint `on`, from the motion of joint `of`.
     Pair { on: usize, of: usize },
     /// Joints `motor` and `other`, through a gear train that both turn.
@@ -27,9 +29,11 @@ pub enum Places {
     JointsOrAll,
     /// At a joint that follows another, or between two.
     Pairs,
-    /// At the actuators of the CFT robot.
+    /// At a joint that another one has a part in.
+    Others,
+    /// At the actuators of the CFT robot, all of them or one.
     Actuators,
-    /// At a joint or at an actuator.
+    /// At a joint, at all actuators or at one.
     JointsAndActuators,
     /// On the robot as a whole.
     Whole,
@@ -40,7 +44,7 @@ impl Place {
     pub fn joint(self) -> Option<usize> {
         match self {
             Place::Joint(j) | Place::Pair { on: j, .. } | Place::Geared { motor: j, .. } => Some(j),
-            Place::Actuator(_) | Place::All => None,
+            Place::Actuator(_) | Place::Actuators | Place::All => None,
         }
     }
 
@@ -59,12 +63,12 @@ impl Place {
             Place::Joint(i) | Place::Pair { on: i, .. } => i == j,
             Place::Geared { motor, other } => j == motor || j == other,
             // the pantograph's references move q4 and q5
-            Place::Actuator(_) => j == 2 || j == 3,
+            Place::Actuator(_) | Place::Actuators => j == 2 || j == 3,
             Place::All => true,
         }
     }
 
-    /// Name in results and files: the joint's, `x_r` or `y_r`; none for all joints.
+    /// Name in results and files: the joint's, `x_r` or `y_r`; none for all of them.
     pub fn name(self, robot: &Robot) -> Option<String> {
         match self {
             Place::Actuator(row) => {
@@ -75,11 +79,28 @@ impl Place {
         }
     }
 
+    /// Rows of the pantograph's Jacobian that it has.
+    pub(super) fn rows(self) -> std::ops::Range<usize> {
+        match self {
+            Place::Actuator(row) => row..row + 1,
+            Place::Actuators => 0..2,
+            _ => 0..0,
+        }
+    }
+
     /// Whether the coordinate slides or turns.
     pub fn kind(self, robot: &Robot) -> JointKind {
         match self {
-            Place::Actuator(_) => JointKind::Prismatic,
+            Place::Actuator(_) | Place::Actuators => JointKind::Prismatic,
             _ => robot.joint_kind(self.joint().unwrap_or(0)),
+        }
+    }
+
+    /// Its name in a sentence: `q1`, `x_r and y_r`, `all joints`.
+    pub(super) fn words(self, robot: &Robot) -> String {
+        match self {
+            Place::Actuators => robot.transmission().screws().join(" and "),
+            _ => self.name(robot).unwrap_or_else(|| "all joints".to_owned()),
         }
     }
 
@@ -89,7 +110,7 @@ impl Place {
         match self {
             Place::Pair { of, .. } => vec![("from", (of + 1) as f64)],
             Place::Geared { other, .. } => vec![("from", (other + 1) as f64), ("both", 1.0)],
-            Place::Joint(_) | Place::Actuator(_) | Place::All => Vec::new(),
+            Place::Joint(_) | Place::Actuator(_) | Place::Actuators | Place::All => Vec::new(),
         }
     }
 }
@@ -99,8 +120,10 @@ impl Places {
     pub fn on(self, robot: &Robot) -> Vec<Place> {
         let n = robot.joints();
         let joints = (0..n).map(Place::Joint);
-        let screws = 0..robot.transmission().screws().len();
-        let actuators = screws.map(Place::Actuator);
+        let screws = robot.transmission().screws().len();
+        // one number for several comes first: it is preferred to one for each
+        let together = (screws > 1).then_some(Place::Actuators);
+        let actuators = together.into_iter().chain((0..screws).map(Place::Actuator));
         match self {
             Places::Joints => joints.collect(),
             Places::JointsOrAll => {
@@ -108,6 +131,7 @@ impl Places {
                 all.into_iter().chain(joints).collect()
             }
             Places::Pairs => pairs(robot),
+            Places::Others => directed(n).collect(),
             Places::Actuators => actuators.collect(),
             Places::JointsAndActuators => joints.chain(actuators).collect(),
             Places::Whole => vec![Place::All],
@@ -131,6 +155,7 @@ impl Places {
         let Some(joint) = joint else {
             return match self {
                 Places::JointsOrAll | Places::Whole => Ok(Place::All),
+                _ if self.on(robot).contains(&Place::Actuators) => Ok(Place::Actuators),
                 _ => Err(nowhere()),
             };
         };
@@ -147,7 +172,7 @@ impl Places {
             known: names.join(", "),
         })?;
         match self {
-            Places::Pairs => pair(on, names.len(), values),
+            Places::Pairs | Places::Others => pair(on, names.len(), values),
             Places::Actuators | Places::Whole => Err(nowhere()),
             _ => Ok(Place::Joint(on)),
         }
@@ -163,10 +188,14 @@ fn pairs(robot: &Robot) -> Vec<Place> {
     let alike = |(a, b): &(usize, usize)| robot.joint_kind(*a) == robot.joint_kind(*b);
     let geared = geared.filter(alike);
     let geared = geared.map(|(motor, other)| Place::Geared { motor, other });
-    let pairs = (0..n).flat_map(|on| (0..n).map(move |of| (on, of)));
+    geared.chain(directed(n)).collect()
+}
+
+/// Each joint with each other that has a part in it.
+fn directed(n: usize) -> impl Iterator<Item = Place> {
+    let pairs = (0..n).flat_map(move |on| (0..n).map(move |of| (on, of)));
     let pairs = pairs.filter(|(on, of)| on != of);
-    let pairs = pairs.map(|(on, of)| Place::Pair { on, of });
-    geared.chain(pairs).collect()
+    pairs.map(|(on, of)| Place::Pair { on, of })
 }
 
 /// Joint `on` with the one that the key `from` numbers.

@@ -5,7 +5,7 @@
 
 use super::{
     CurveSignal, Entry, Family, Key, KeyValue, Ladder, Law, Limit, Number, Reparametrisation, Rule,
-    Search, Unit,
+    Search, ShapeRange, Unit,
 };
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
@@ -60,9 +60,9 @@ pub static LAW: Law = Law {
         let shares = [0.001, 0.003, 0.01, 0.02, 0.05, 0.1];
         Ok(shares.map(|s| vec![1.0 / (s * joint.range())]).to_vec())
     },
-    limits: |cover, place| {
+    limits: |cover, place, _| {
         let range = cover.at(place).range();
-        vec![[3.0 / range, 1e4 / range]]
+        vec![ShapeRange::of(3.0 / range, 1e4 / range)]
     },
     // sigma0 = fc rate
     reparametrised: Some(Reparametrisation {

@@ -23,9 +23,9 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     code: Some(|to| match to.place {
-        Place::Actuator(_) => {
+        Place::Actuator(_) | Place::Actuators => {
             let inertia = to.x(0);
-            to.of_screw(|_, acceleration| format!("{inertia} * {acceleration}"));
+            to.of_screws(|_, acceleration| format!("{inertia} * {acceleration}"));
         }
         _ => to.added(format!("{} * {}", to.x(0), to.a())),
     }),
@@ -36,15 +36,16 @@ pub static LAW: Law = Law {
     },
     ..Law::linear(&ENTRY, &["J"], |at, _, out| match at.place {
         Place::Joint(_) => out[0] = at.a(),
-        Place::Actuator(r) => {
+        place => {
             let [q, v, a] = at.state();
             let (jacobian, rate) = (reference_jacobian(&q), reference_jacobian_rate(&q, &v));
-            let acceleration = jacobian[r][0] * a[2]
-                + jacobian[r][1] * a[3]
-                + rate[r][0] * v[2]
-                + rate[r][1] * v[3];
-            out[0] = jacobian[r][at.joint - 2] * acceleration;
+            for r in place.rows() {
+                let acceleration = jacobian[r][0] * a[2]
+                    + jacobian[r][1] * a[3]
+                    + rate[r][0] * v[2]
+                    + rate[r][1] * v[3];
+                out[0] += jacobian[r][at.joint - 2] * acceleration;
+            }
         }
-        _ => {}
     })
 };

@@ -198,15 +198,18 @@ impl CodeSite<'_> {
         }
     }
 
-    /// Statements of a force in a screw of the CFT robot's pantograph, by its speed and acceleration:
-    /// its row of d(x_r, y_r)/d(q4, q5) carries it to the joints.
-    pub fn of_screw(&mut self, force: impl Fn(&str, &str) -> String) {
-        let Place::Actuator(row) = self.place else {
-            return;
-        };
+    /// Statements of a force in the screws of its place on the CFT robot's pantograph, by speed and acceleration.
+    pub fn of_screws(&mut self, force: impl Fn(&str, &str) -> String) {
+        for row in self.place.rows() {
+            self.of_screw(row, &force);
+        }
+    }
+
+    /// Those of one screw: its row of d(x_r, y_r)/d(q4, q5) carries the force to the joints.
+    fn of_screw(&mut self, row: usize, force: &impl Fn(&str, &str) -> String) {
         let l = exact(L4);
-        let [near, far, speed, pull, name] =
-            ["near", "far", "speed", "pull", "force"].map(|name| format!("{name}_{}", self.number));
+        let [near, far, speed, pull, name] = ["near", "far", "speed", "pull", "force"]
+            .map(|name| format!("{name}_{}_{row}", self.number));
         let w = "(v[2] + v[3])";
         let [of, rate, sign] = match row {
             0 => ["cos", "sin", ""],

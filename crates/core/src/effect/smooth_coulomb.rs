@@ -2,7 +2,7 @@
 //! fc tanh(v/vs) (Andersson, Soderberg and Bjorklund 2007, eq. 2).
 
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit,
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit,
     jumps_or_is_none,
 };
 use crate::robot::friction::sign;
@@ -51,9 +51,9 @@ pub static LAW: Law = Law {
         let shares = [0.2, 0.1, 0.05, 0.02, 0.01, 0.005];
         Ok(shares.map(|s| vec![s * top]).to_vec())
     },
-    limits: |cover, place| {
+    limits: |cover, place, _| {
         let top = cover.at(place).fastest();
-        vec![[1e-3 * top, 0.5 * top]]
+        vec![ShapeRange::of(1e-3 * top, 0.5 * top)]
     },
     direction: Some(|shape, v| (v / shape[0]).tanh()),
     code: Some(|to| {

@@ -1,6 +1,6 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3.
 
-use super::{Entry, Family, Key, Ladder, Law, Rule, Search, Unit};
+use super::{Entry, Family, Key, Ladder, Law, Rule, Search, ShapeRange, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "spring",
@@ -35,11 +35,12 @@ pub static LAW: Law = Law {
         let step = 0.25 * (high - low);
         Ok((-1..=5).map(|i| vec![low + f64::from(i) * step]).collect())
     },
-    limits: |cover, place| {
+    limits: |cover, place, _| {
         let [low, high] = cover.at(place).position;
         // a spring that is at rest far outside the travel is hardly more than an offset
         let beyond = 0.25 * (high - low);
-        vec![[low - beyond, high + beyond]]
+        let range = ShapeRange::of(low - beyond, high + beyond);
+        vec![range.open_below().open_above()]
     },
     code: Some(|to| {
         let way = format!("({} - {})", to.q(), to.s(0));

@@ -2,7 +2,7 @@
 //! Dupont and Canudas de Wit 1994), where the declared law has no such term.
 
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit,
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit,
     jumps_or_is_none,
 };
 use crate::robot::friction::sign;
@@ -55,9 +55,9 @@ pub static LAW: Law = Law {
         let shares = [0.5, 0.3, 0.2, 0.13, 0.08, 0.04, 0.02, 0.01];
         Ok(shares.map(|s| vec![s * top]).to_vec())
     },
-    limits: |cover, place| {
+    limits: |cover, place, _| {
         let top = cover.at(place).fastest();
-        vec![[0.003 * top, 0.8 * top]]
+        vec![ShapeRange::of(0.003 * top, 0.8 * top)]
     },
     code: Some(|to| {
         let v = to.v();

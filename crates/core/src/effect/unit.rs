@@ -21,6 +21,8 @@ pub enum Unit {
     Speed,
     /// Waves per metre or per revolution.
     Order,
+    /// Waves per metre or per revolution of the joint `from`.
+    OtherOrder,
     /// N s/m or Nm s/rad.
     Viscous,
     /// Torque per speed to the power of the key `p`.
@@ -59,6 +61,7 @@ impl Unit {
             Self::Speed => format!("{position}/s"),
             Self::Order if kind == Revolute => "1/rev".to_owned(),
             Self::Order => "1/m".to_owned(),
+            Self::OtherOrder => Self::Order.text(from, from, torque),
             Self::Viscous => format!("{torque} s/{position}"),
             Self::Power => format!("{torque} (s/{position})^p"),
             Self::Slope => format!("s/{position}"),

@@ -1,6 +1,6 @@
 //! `warm-up`: friction times 1 + k (1 - exp(-t/T)), t since the begin of the log.
 
-use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit};
+use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -59,7 +59,10 @@ pub static LAW: Law = Law {
         let shares = [0.1, 0.3, 1.0, 3.0];
         Ok(shares.map(|s| vec![s * cover.duration_s]).to_vec())
     },
-    limits: |cover, _| vec![[0.03 * cover.duration_s, 10.0 * cover.duration_s]],
+    limits: |cover, _, _| {
+        let range = ShapeRange::of(0.03 * cover.duration_s, 10.0 * cover.duration_s);
+        vec![range]
+    },
     code: Some(|to| {
         to.step(format!(
             "{} * (({}) * -expm1(-state.t / {}))",

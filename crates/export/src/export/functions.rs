@@ -44,7 +44,7 @@ const METHODS: [(&str, &str, &str); 30] = [
     ("fmod", "x: f64, y: f64", "x % y"),
 ];
 
-const FUNCTIONS: [Function; 8] = [
+const FUNCTIONS: [Function; 9] = [
     Function {
         name: "sign(",
         c: "\
@@ -192,6 +192,74 @@ fn spline(x: f64, m1: f64, m2: f64, m3: f64, m4: f64, m5: f64, m6: f64) -> f64 {
         + m[piece + 1] * ((3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0)
         + m[piece + 2] * ((3.0 * w * w * w - 6.0 * w * w + 4.0) / 6.0)
         + m[piece + 3] * (u * u * u / 6.0)
+}
+",
+    },
+    Function {
+        name: "loose(",
+        c: "\
+/* Acceleration over the motor's of a load behind a play of 2 half, with what takes its speed where it lands. s: side on
+ * which the motor pushes, position and speed over the motor's, 1 in contact and 2 in flight; s[9] the inertia. */
+static inline double @name@_loose(double half, double dt, double load, double *s)
+{
+    double pull, out = 0.0;
+    if (!(s[9] > 0.0)) return 0.0;
+    pull = load / s[9];
+    if (s[3] == 0.0) {
+        s[0] = pull < 0.0 ? -1.0 : 1.0;
+        s[1] = -s[0] * half;
+        s[3] = 1.0;
+    }
+    if (s[3] == 1.0 && s[0] * pull < 0.0) {
+        s[2] = 0.0;
+        s[3] = 2.0;
+    }
+    if (s[3] == 2.0) {
+        s[2] -= pull * dt;
+        s[1] += s[2] * dt;
+        out = -pull;
+        if (fabs(s[1]) >= half) {
+            s[0] = s[1] > 0.0 ? -1.0 : 1.0;
+            out -= s[2] / dt;
+            s[1] = -s[0] * half;
+            s[2] = 0.0;
+            s[3] = 1.0;
+        }
+    }
+    return out;
+}
+",
+        rust: "\
+/// Acceleration over the motor's of a load behind a play of 2 half, with what takes its speed where it lands. s: side on
+/// which the motor pushes, position and speed over the motor's, 1 in contact and 2 in flight; s[9] the inertia.
+fn loose(half: f64, dt: f64, load: f64, s: &mut [f64; 10]) -> f64 {
+    if s[9].is_nan() || s[9] <= 0.0 {
+        return 0.0;
+    }
+    let pull = load / s[9];
+    if s[3] == 0.0 {
+        s[0] = if pull < 0.0 { -1.0 } else { 1.0 };
+        s[1] = -s[0] * half;
+        s[3] = 1.0;
+    }
+    if s[3] == 1.0 && s[0] * pull < 0.0 {
+        s[2] = 0.0;
+        s[3] = 2.0;
+    }
+    if s[3] != 2.0 {
+        return 0.0;
+    }
+    s[2] -= pull * dt;
+    s[1] += s[2] * dt;
+    let mut out = -pull;
+    if s[1].abs() >= half {
+        s[0] = if s[1] > 0.0 { -1.0 } else { 1.0 };
+        out -= s[2] / dt;
+        s[1] = -s[0] * half;
+        s[2] = 0.0;
+        s[3] = 1.0;
+    }
+    out
 }
 ",
     },

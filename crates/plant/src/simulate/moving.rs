@@ -58,13 +58,13 @@ impl<const J: usize> Moving<'_, J> {
             friction: &friction[..n],
             ..seen(n, t, [&q, &v], z)
         };
+        let torque = self.plant.mechanism.torque(&q, &self.volts);
         let (mut added, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
         self.effects.each(&motion, |effect, m| {
-            effect.drive(&mut acting);
+            effect.drive(m, &torque, &mut acting);
             effect.torque(m, &mut added);
             effect.load(m, &mut share);
         });
-        let torque = self.plant.mechanism.torque(&q, &self.volts);
         let (mass, bias) = self.body(t, link, speed, z);
         let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
         // net torque, load and acceleration, when more torque is taken
@@ -179,9 +179,8 @@ impl<const J: usize> Moving<'_, J> {
             friction: &friction[..n],
             ..seen(n, t, [q, v], z)
         };
-        let (mut torque, mut acting, mut share) = (self.plant.offset, [1.0; J], [[0.0; 2]; J]);
+        let (mut torque, mut share) = (self.plant.offset, [[0.0; 2]; J]);
         self.effects.each(&motion, |effect, m| {
-            effect.drive(&mut acting);
             effect.torque(m, &mut torque);
             effect.load(m, &mut share);
         });
@@ -193,10 +192,24 @@ impl<const J: usize> Moving<'_, J> {
         };
         let each = |effect: &dyn Effect, m: &PlantState| effect.implicit(m, &mut torque);
         self.effects.each(&at_rest, each);
-        std::array::from_fn(|i| {
+        let needed: [f64; J] = std::array::from_fn(|i| {
             let beside = load[i] * side(share[i], load[i]);
-            (load[i] + beside + friction[i] + torque[i]) / acting[i]
-        })
+            load[i] + beside + friction[i] + torque[i]
+        });
+        // what acts may hang on what is logged: each turn leaves a small part of the change before it
+        const TURNS: usize = 40;
+        let mut logged = needed;
+        for _ in 0..TURNS {
+            let mut acting = [1.0; J];
+            let each = |effect: &dyn Effect, m: &PlantState| effect.drive(m, &logged, &mut acting);
+            self.effects.each(&motion, each);
+            let next = std::array::from_fn(|i| needed[i] / acting[i]);
+            if next == logged {
+                break;
+            }
+            logged = next;
+        }
+        logged
     }
 }
 

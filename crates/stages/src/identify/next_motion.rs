@@ -15,7 +15,7 @@ pub fn separating_command(effect: &Added, robot: &Robot, model: &str) -> Option<
         // the other joint alone
         Place::Pair { of, .. } | Place::Geared { other: of, .. } => of,
         Place::Joint(j) => j,
-        Place::Actuator(_) | Place::All => return None,
+        Place::Actuator(_) | Place::Actuators | Place::All => return None,
     };
     let aim = format!("{}:{}", effect.name(), robot.joint_names().get(joint)?);
     Some(command(model, &aim))

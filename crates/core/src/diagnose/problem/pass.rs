@@ -28,9 +28,6 @@ const TOGETHER: usize = 4;
 /// Rows that are summed of all logs, about.
 const MOST_ROWS: usize = 40_000;
 
-/// Part of a shape by which it is moved for a slope.
-const LITTLE: f64 = 1e-4;
-
 /// Rows and what each of them counts.
 #[derive(Clone, Copy)]
 pub struct Data<'a> {
@@ -56,9 +53,10 @@ impl Candidate {
         let mut out = self.effect.columns(scene, joint);
         out.truncate(self.bounds.len());
         for (k, _) in &self.slopes {
+            let little = self.effect.law.slope_step;
             let by = match self.effect.shape[*k] {
-                0.0 => LITTLE,
-                p => LITTLE * p.abs(),
+                0.0 => little,
+                p => little * p.abs(),
             };
             let at = |by: f64| {
                 let mut moved = self.effect.clone();

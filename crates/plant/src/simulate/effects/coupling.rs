@@ -1,4 +1,5 @@
-//! `coupling`: a torque that follows another joint j, viscous v_j + coulomb sgn(v_i + r v_j) + inertia a_j.
+//! `coupling`: a torque that follows another joint j, viscous v_j + coulomb_from sgn(v_j) + inertia a_j, turned
+//! about where r is negative, and coulomb sgn(v_i + r v_j).
 //!
 //! `from` is the number of joint j, counted from one. The torque acts on joint i alone: M is then no longer
 //! symmetric, and the plant solves it by elimination.
@@ -15,7 +16,7 @@ pub static LAW: PlantLaw = PlantLaw {
             0 => 2.0,
             joint => joint as f64,
         };
-        vec![from, 0.2 * site.scale / site.speed, 0.0, 0.0, 1.0]
+        vec![from, 0.2 * site.scale / site.speed, 0.0, 0.0, 0.0, 1.0]
     },
     build: |site, machine, values| {
         if machine.joints() < 2 {
@@ -26,13 +27,16 @@ pub static LAW: PlantLaw = PlantLaw {
             let rule = format!("must be the number of another joint, 1 to {known}");
             return Err(SimulateError::number(ENTRY.name, "from", values[0], rule));
         };
+        let ratio = values[5];
+        let way = if ratio < 0.0 { -1.0 } else { 1.0 };
         Built::plant(Coupling {
             joint: site.joint(),
             from,
-            viscous: values[1],
+            viscous: way * values[1],
             coulomb: values[2],
-            inertia: values[3],
-            ratio: values[4],
+            inertia: way * values[3],
+            alone: way * values[4],
+            ratio,
             slope: site.slope(),
         })
     },
@@ -44,6 +48,8 @@ struct Coupling {
     viscous: f64,
     coulomb: f64,
     inertia: f64,
+    /// By the other joint's direction alone.
+    alone: f64,
     ratio: f64,
     slope: f64,
 }
@@ -52,7 +58,9 @@ impl Effect for Coupling {
     fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let other = motion.v[self.from];
         let together = motion.v[self.joint] + self.ratio * other;
-        torque[self.joint] += self.viscous * other + self.coulomb * sign(self.slope, together);
+        torque[self.joint] += self.viscous * other
+            + self.alone * sign(self.slope, other)
+            + self.coulomb * sign(self.slope, together);
     }
 
     fn inertia(&self, motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {

@@ -22,17 +22,12 @@ pub static LAW: PlantLaw = PlantLaw {
     },
     build: |site, _, values| {
         let (stiffness, inertia, damping) = (values[0], values[1], values[2]);
-        let rotor = site.inertia - inertia;
-        if rotor <= 0.0 || inertia <= 0.0 || rotor >= site.least_inertia {
+        let sides = TwoSides::of(site, stiffness, inertia, damping);
+        if !sides.can_be(site, inertia) {
             let rule = "must be below the joint's, and leave the motor less than the joint's least";
             return Err(SimulateError::number(ENTRY.name, "inertia", inertia, rule));
         }
-        Built::plant(Elasticity {
-            joint: site.joint(),
-            stiffness,
-            damping: 2.0 * damping * (stiffness * inertia).sqrt(),
-            rotor,
-        })
+        Built::plant(sides)
     },
 };
 
@@ -46,18 +41,52 @@ const ROTOR_AT_MOST: f64 = 0.3;
 const DAMPING: f64 = 0.025;
 
 /// Default inertia on the motor's side, kg or kg m^2.
-fn rotor(site: &Site) -> f64 {
+pub(super) fn rotor(site: &Site) -> f64 {
     (ROTOR * site.inertia).min(ROTOR_AT_MOST * site.least_inertia)
 }
 
-struct Elasticity {
+/// Motor and link with a spring between them, which pushes beyond a gap where there is one.
+pub(super) struct TwoSides {
     joint: usize,
     stiffness: f64,
     damping: f64,
     rotor: f64,
+    pub(super) gap: f64,
 }
 
-impl Effect for Elasticity {
+impl TwoSides {
+    /// Without a gap; `damping` is the ratio of the link on its spring.
+    pub(super) fn of(site: &Site, stiffness: f64, inertia: f64, damping: f64) -> Self {
+        Self {
+            joint: site.joint(),
+            stiffness,
+            damping: 2.0 * damping * (stiffness * inertia).sqrt(),
+            rotor: site.inertia - inertia,
+            gap: 0.0,
+        }
+    }
+
+    /// Whether both sides have an inertia in every pose.
+    pub(super) fn can_be(&self, site: &Site, inertia: f64) -> bool {
+        self.rotor > 0.0 && inertia > 0.0 && self.rotor < site.least_inertia
+    }
+
+    /// What the spring passes on.
+    fn passed(&self, deflection: f64, rate: f64) -> f64 {
+        let half = 0.5 * self.gap;
+        let within = deflection.clamp(-half, half);
+        let pull = self.stiffness * (deflection - within) + self.damping * rate;
+        match self.gap > 0.0 {
+            // an end of a gap pushes and does not pull
+            true if deflection > half => pull.max(0.0),
+            true if deflection < -half => pull.min(0.0),
+            true => 0.0,
+            false => pull,
+        }
+    }
+}
+
+impl Effect for TwoSides {
     fn states(&self) -> usize {
         2
     }
@@ -74,7 +103,7 @@ impl Effect for Elasticity {
             joint: self.joint,
             deflection,
             rate,
-            torque: self.stiffness * deflection + self.damping * rate,
+            torque: self.passed(deflection, rate),
         })
     }
 
@@ -82,14 +111,15 @@ impl Effect for Elasticity {
         let (&[deflection, rate], [speed, acceleration]) = (motion.z, dz) else {
             return;
         };
-        let passed = self.stiffness * deflection + self.damping * rate;
+        let passed = self.passed(deflection, rate);
         *speed = rate;
         *acceleration = (motion.net[self.joint] - passed) / self.rotor - motion.a[self.joint];
     }
 
     fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
         if let ([deflection, _], Some(load)) = (z, beginning.load.get(self.joint)) {
-            *deflection = load / self.stiffness;
+            let side = if *load < 0.0 { -0.5 } else { 0.5 };
+            *deflection = load / self.stiffness + side * self.gap;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `gain`: a wrong torque constant or gear, so that the logged torque is (1 + k) times the acting one.
 
-use super::{Built, Effect, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::gain::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -20,7 +20,7 @@ struct Gain {
 }
 
 impl Effect for Gain {
-    fn drive(&self, acting: &mut [f64]) {
+    fn drive(&self, _motion: &PlantState, _logged: &[f64], acting: &mut [f64]) {
         acting[self.joint] *= self.acting;
     }
 }

@@ -99,8 +99,8 @@ pub trait Effect: Send {
     /// tau_l = M a + C v + G.
     fn load(&self, _motion: &PlantState, _share: &mut [[f64; 2]]) {}
 
-    /// Multiplies, per joint, the torque that acts per unit of logged torque.
-    fn drive(&self, _acting: &mut [f64]) {}
+    /// Multiplies, per joint, the torque that acts per unit of the logged torque, N or N m.
+    fn drive(&self, _motion: &PlantState, _logged: &[f64], _acting: &mut [f64]) {}
 
     /// The spring that the effect puts between a motor and its link.
     fn twist(&self, _z: &[f64]) -> Option<Twist> {
@@ -138,12 +138,16 @@ catalogue! {
     load_friction,
     drive_efficiency,
     gain,
+    gain_change,
     position_friction,
+    pose_friction,
     ripple,
+    torque_ripple,
     weight,
     spring,
     counterbalance,
     backlash,
+    backlash_impact,
     presliding,
     delay,
     elasticity,
@@ -153,6 +157,7 @@ catalogue! {
     coupling,
     warm_up,
     drift,
+    settling_drift,
     empirical,
     disturbance,
     saturation,

@@ -120,7 +120,9 @@ impl EffectSpec {
             None => SimulateError::unknown_joint("", &[]),
         };
         let (joints, screws): (&[Site], &[Site]) = match places {
-            Places::Joints | Places::JointsOrAll | Places::Pairs => (&sites.joints, &[]),
+            Places::Joints | Places::JointsOrAll | Places::Pairs | Places::Others => {
+                (&sites.joints, &[])
+            }
             Places::Actuators if sites.screws.is_empty() => {
                 return Err(refuse(ErrorText::new("it sits at the screws of the CFT robot, x_r and y_r").remedy("a single joint's own friction is `nonlinear-viscous`, `asymmetric-friction` or `stribeck`")));
             }
@@ -189,7 +191,8 @@ impl EffectValue {
             false => JointKind::Prismatic,
         };
         // Joints are counted from one; `from` is a joint where units follow it.
-        let from = pairs().find(|(key, _)| entry.places == Places::Pairs && key.name == "from");
+        let of_two = matches!(entry.places, Places::Pairs | Places::Others);
+        let from = pairs().find(|(key, _)| of_two && key.name == "from");
         let joint = |(_, number): (_, &f64)| (*number - 1.0).max(0.0) as usize;
         let from = from.map_or(own, |pair| machine.robot.joint_kind(joint(pair)));
         let torque = if site.turns { "Nm" } else { "N" };

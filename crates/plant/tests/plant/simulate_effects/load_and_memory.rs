@@ -4,7 +4,7 @@ use cft_ident_core::robot::cft::Setup;
 use cft_ident_plant::simulate::effects::Sites;
 use cft_ident_plant::simulate::{CftTruth, SimulatedRun};
 
-use super::missing::{assert_missing, axis, friction, missing, pushed, rigid, row, table_3};
+use super::missing::{Row, assert_missing, axis, friction, missing, pushed, rigid, row, table_3};
 
 fn at(joint: usize, torque: f64) -> [f64; 4] {
     std::array::from_fn(|i| if i == joint { torque } else { 0.0 })
@@ -32,9 +32,60 @@ fn load_effects_take_their_share_of_the_rigid_body_torque() {
             },
         )
     });
+    let acting = |state: &Row, joint: usize| rigid(state)[joint] + friction(&state.1)[joint];
     assert_missing("gain:q2:k=-0.15", 0.0, 1e-10, |_, state| {
-        at(1, -0.15 * (rigid(state)[1] + friction(&state.1)[1]))
+        at(1, -0.15 * acting(state, 1))
     });
+    assert_missing(
+        "gain-change:q2:signal=1,scale=2,k=0.2",
+        0.0,
+        1e-10,
+        |t, state| at(1, 0.2 * (1.0 - (-t / 2.0).exp()) * acting(state, 1)),
+    );
+    assert_missing(
+        "gain-change:q4:signal=2,scale=9,k=0.3",
+        0.0,
+        1e-9,
+        |_, state| {
+            let torque = acting(state, 2);
+            at(2, 0.3 * (1.0 - (-torque.abs() / 9.0).exp()) * torque)
+        },
+    );
+    assert_missing(
+        "torque-ripple:q5:order=7,sin=0.06,cos=-0.02",
+        0.0,
+        1e-9,
+        |_, state| {
+            let angle = 7.0 * state.0[3];
+            at(
+                3,
+                (0.06 * angle.sin() - 0.02 * angle.cos()) * acting(state, 3),
+            )
+        },
+    );
+}
+
+#[test]
+fn a_load_behind_a_play_is_pushed_at_its_ends_and_flies_between_them() {
+    // the motor alone is felt in flight; over the whole run the load is carried along
+    let recording = table_3(&["backlash-impact:q5:gap=0.02"]);
+    let own = (0..recording.rows()).map(|k| missing(&recording, k)[3]);
+    let own: Vec<f64> = own.collect();
+    let acting = (0..recording.rows()).map(|k| {
+        let state = row(&recording, k);
+        rigid(&state)[3]
+    });
+    let (mut flying, mut pushed, mut landed) = (0, 0, 0);
+    for (missing, load) in own.iter().zip(acting) {
+        match missing / load {
+            share if (share + 0.8).abs() < 0.3 => flying += 1,
+            share if share.abs() < 0.1 => pushed += 1,
+            share if share > 1.0 => landed += 1,
+            _ => {}
+        }
+    }
+    println!("{flying} rows in flight, {pushed} pushed, {landed} landing");
+    assert!(pushed > 1000 && flying > 20 && landed > 2);
 }
 
 #[test]

@@ -207,6 +207,7 @@ fn units_follow_the_joint() {
     for (of, slides, turns) in [
         (Unit::Torque, "N", "Nm"),
         (Unit::Order, "1/m", "1/rev"),
+        (Unit::OtherOrder, "1/rev", "1/rev"),
         (Unit::Viscous, "N s/m", "Nm s/rad"),
         (Unit::Inertia, "kg", "kg m^2"),
         (Unit::Fixed("Hz"), "Hz", "Hz"),
@@ -370,7 +371,7 @@ fn the_page_of_effects_says_what_the_simulator_takes() {
             .collect();
         assert_eq!(cells[2], keys.join("; "), "{}", kind.name);
         let cft = match kind.places {
-            Places::Joints | Places::JointsOrAll | Places::Pairs => "joints",
+            Places::Joints | Places::JointsOrAll | Places::Pairs | Places::Others => "joints",
             Places::Actuators => "x_r, y_r",
             Places::JointsAndActuators => "joints, x_r, y_r",
             Places::Whole => "whole",

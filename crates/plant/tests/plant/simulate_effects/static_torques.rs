@@ -112,6 +112,26 @@ fn friction_beyond_the_declared_law_follows_its_formula_where_the_joint_moves() 
 }
 
 #[test]
+fn friction_that_another_pose_sets_follows_the_other_position_and_its_own_direction() {
+    assert_missing(
+        "pose-friction:q4:from=2,order=2,sin=0.8,cos=-0.5",
+        MOVING,
+        SIGN,
+        |_, (q, v, _)| {
+            let angle = 2.0 * q[1];
+            at(2, v[2].signum() * (0.8 * angle.sin() - 0.5 * angle.cos()))
+        },
+    );
+    // of a slide the order is per metre
+    assert_missing(
+        "pose-friction:q2:from=1,order=1.5,sin=0.8",
+        MOVING,
+        SIGN,
+        |_, (q, v, _)| at(1, v[1].signum() * 0.8 * (1.5 * TAU * q[0]).sin()),
+    );
+}
+
+#[test]
 fn friction_at_a_screw_is_its_force_times_the_slope_of_the_screw_position() {
     let screw = |q: &[f64; 4], row: usize| {
         let (x, y) = references_of_joints(q[2], q[3]);
@@ -140,6 +160,9 @@ fn time_dependent_torques_follow_their_formulas() {
     assert_missing("warm-up:q1:k=-0.3,T=2", 0.0, EXACT, |t, (_, v, _)| {
         let law = CftTruth::synthetic(Setup::Tuedacs).friction[0];
         at(0, -0.3 * (1.0 - (-t / 2.0).exp()) * law.torque(v[0]))
+    });
+    assert_missing("settling-drift:q4:level=2,T=1.3", 0.0, EXACT, |t, _| {
+        at(2, 2.0 * (1.0 - (-t / 1.3).exp()))
     });
     assert_missing(
         "disturbance:q2:at=1.2345,seconds=0.5,c=4",
@@ -193,6 +216,20 @@ fn a_coupling_acts_on_its_own_joint_and_follows_the_other() {
                 together.signum()
             };
             at(2, 1.5 * v[3] + 0.6 * sign + 0.03 * a[3])
+        },
+    );
+    // wired the other way about, all of it turns with r
+    assert_missing(
+        "coupling:q4:from=4,viscous=1.5,inertia=0.03,coulomb_from=0.4,r=-1",
+        MOVING,
+        1e-4,
+        |_, (_, v, a)| {
+            let sign = if v[3].abs() < 0.05 {
+                f64::NAN
+            } else {
+                v[3].signum()
+            };
+            at(2, -1.5 * v[3] - 0.4 * sign - 0.03 * a[3])
         },
     );
 }
