@@ -47,7 +47,9 @@ fn every_effect_changes_the_log_of_the_cft_robot_at_its_defaults() {
     let sound = ordered(&robot, &[], 1);
     for kind in LAWS.iter().map(|law| law.entry) {
         let expected = match kind.places {
-            Places::Joints | Places::JointsOrAll | Places::Pairs => vec![Some("q4")],
+            Places::Joints | Places::JointsOrAll | Places::Pairs | Places::Others => {
+                vec![Some("q4")]
+            }
             Places::Actuators | Places::JointsAndActuators => vec![Some("x_r"), Some("y_r")],
             Places::Whole => vec![None],
         };
