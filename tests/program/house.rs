@@ -33,7 +33,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("diagnose", "explain math robot block motion effect judge"),
     ("validate", "math robot block motion verdict"),
     ("inspect", "math number block log"),
-    ("setup", "math robot motion inertia judge"),
+    ("setup", "math number robot motion inertia judge"),
     ("mapping", "explain robot log inspect"),
     ("simulate", "explain math number robot log config effect"),
     (

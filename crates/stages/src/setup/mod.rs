@@ -12,6 +12,7 @@
 //! Blocks, parts and what counts as sure are those of the judge ([`cft_ident_core::judge`]).
 
 mod channels;
+mod condition;
 mod correction;
 mod estimate;
 mod finding;
@@ -26,6 +27,7 @@ mod undecided;
 mod weight;
 
 pub(crate) use channels::{Channels, Drive};
+pub use condition::{Criterion, DecidedBy};
 pub(crate) use correction::{Change, Correction};
 pub(crate) use estimate::SetupEstimate;
 pub use finding::{
