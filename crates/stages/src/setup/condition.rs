@@ -4,14 +4,13 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::LIMITS;
-use super::found::Found;
 use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::number::{percent, significant};
 
 /// What is asked of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Criterion {
+pub enum SetupCriterion {
     /// A joint misses more of its torque than a machine does.
     Missed,
     /// With the reading it misses as little as sound machines do.
@@ -34,8 +33,8 @@ pub enum Criterion {
 
 /// One condition of a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Condition {
-    pub criterion: Criterion,
+pub struct SetupCondition {
+    pub criterion: SetupCriterion,
     /// Joint that it is about; none for all of them.
     pub joint: Option<usize>,
     /// What was found: an error as a share of the torque, an agreement 0..1, or a number of readings or joints.
@@ -48,7 +47,7 @@ pub struct Condition {
 /// The same as it is reported.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct DecidedBy {
-    pub criterion: Criterion,
+    pub criterion: SetupCriterion,
     /// Null for all joints.
     pub joint: Option<String>,
     /// Null where it could not be computed.
@@ -59,9 +58,9 @@ pub struct DecidedBy {
     pub text: String,
 }
 
-impl Condition {
+impl SetupCondition {
     pub(super) fn new(
-        criterion: Criterion,
+        criterion: SetupCriterion,
         joint: Option<usize>,
         [value, limit]: [f64; 2],
         holds: bool,
@@ -82,9 +81,9 @@ impl Condition {
             let missed = [before[*j], LIMITS.unexplained];
             let repaired = [after[*j], LIMITS.sound];
             [
-                Self::new(Criterion::Missed, joint, missed, true),
+                Self::new(SetupCriterion::Missed, joint, missed, true),
                 Self::new(
-                    Criterion::Repaired,
+                    SetupCriterion::Repaired,
                     joint,
                     repaired,
                     after[*j] <= LIMITS.sound,
@@ -95,7 +94,7 @@ impl Condition {
     }
 
     /// That as many as there are of something are none.
-    pub(super) fn none_of(criterion: Criterion, joint: Option<usize>, count: usize) -> Self {
+    pub(super) fn none_of(criterion: SetupCriterion, joint: Option<usize>, count: usize) -> Self {
         Self::new(criterion, joint, [count as f64, 0.0], count == 0)
     }
 
@@ -103,11 +102,16 @@ impl Condition {
     pub(super) fn agreement(agreed: f64) -> Self {
         let holds = agreed >= NUMBERS.confirmed;
         Self::new(
-            Criterion::PartsAgree,
+            SetupCriterion::PartsAgree,
             None,
             [agreed, NUMBERS.confirmed],
             holds,
         )
+    }
+
+    /// Whether all of these hold.
+    pub(super) fn all_hold(conditions: &[Self]) -> bool {
+        conditions.iter().all(|condition| condition.holds)
     }
 
     fn text(&self, name: &str) -> String {
@@ -117,36 +121,38 @@ impl Condition {
             x => format!("{x} {many}"),
         };
         match (self.criterion, self.holds) {
-            (Criterion::Missed, _) if !self.value.is_finite() => {
+            (SetupCriterion::Missed, _) if !self.value.is_finite() => {
                 format!("{name} has positions that belong to no pose")
             }
-            (Criterion::Missed, _) => format!("{name} {value} > {limit}"),
-            (Criterion::Repaired, true) => format!("after the repair {value} <= {limit}"),
-            (Criterion::Repaired, false) => format!("after the repair still {value} > {limit}"),
-            (Criterion::Driven, _) => format!("friction or inertia of {name} cannot be"),
-            (Criterion::NotDriven, true) => {
+            (SetupCriterion::Missed, _) => format!("{name} {value} > {limit}"),
+            (SetupCriterion::Repaired, true) => format!("after the repair {value} <= {limit}"),
+            (SetupCriterion::Repaired, false) => {
+                format!("after the repair still {value} > {limit}")
+            }
+            (SetupCriterion::Driven, _) => format!("friction or inertia of {name} cannot be"),
+            (SetupCriterion::NotDriven, true) => {
                 "after the repair all friction and inertia can be".to_owned()
             }
-            (Criterion::NotDriven, false) => {
+            (SetupCriterion::NotDriven, false) => {
                 "after the repair some friction or inertia still cannot be".to_owned()
             }
-            (Criterion::PartsAgree, true) => "parts agree".to_owned(),
-            (Criterion::PartsAgree, false) => {
+            (SetupCriterion::PartsAgree, true) => "parts agree".to_owned(),
+            (SetupCriterion::PartsAgree, false) => {
                 let [s, least] = [self.value, self.limit].map(|x| significant(x, 2));
                 format!("parts do not agree ({s} < {least})")
             }
-            (Criterion::NoOther, true) => "no other reading fits alike".to_owned(),
-            (Criterion::NoOther, false) => {
+            (SetupCriterion::NoOther, true) => "no other reading fits alike".to_owned(),
+            (SetupCriterion::NoOther, false) => {
                 counted("another reading fits alike", "other readings fit alike")
             }
-            (Criterion::NoValueBeside, true) => "no other value fits as well".to_owned(),
-            (Criterion::NoValueBeside, false) => "a value on no list fits as well".to_owned(),
-            (Criterion::MovesApart, true) => "the joints move apart".to_owned(),
-            (Criterion::MovesApart, false) => {
+            (SetupCriterion::NoValueBeside, true) => "no other value fits as well".to_owned(),
+            (SetupCriterion::NoValueBeside, false) => "a value on no list fits as well".to_owned(),
+            (SetupCriterion::MovesApart, true) => "the joints move apart".to_owned(),
+            (SetupCriterion::MovesApart, false) => {
                 format!("{name} moves in proportion to another joint")
             }
-            (Criterion::HasALine, true) => "a line of the robot file mends it".to_owned(),
-            (Criterion::HasALine, false) => "no line of the robot file mends it".to_owned(),
+            (SetupCriterion::HasALine, true) => "a line of the robot file mends it".to_owned(),
+            (SetupCriterion::HasALine, false) => "no line of the robot file mends it".to_owned(),
         }
     }
 
@@ -164,13 +170,6 @@ impl Condition {
     }
 }
 
-impl Found {
-    /// Whether all of its conditions hold.
-    pub(super) fn is_sure(conditions: &[Condition]) -> bool {
-        conditions.iter().all(|condition| condition.holds)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,9 +177,9 @@ mod tests {
     #[test]
     fn conditions_name_the_numbers_that_decide() {
         let names = ["q1", "q2"].map(str::to_owned);
-        let mut all = Condition::of_errors(&[1], [&[0.1, 0.66], &[0.1, 0.045]]);
-        all.push(Condition::agreement(0.9));
-        let text = |all: &[Condition]| -> Vec<String> {
+        let mut all = SetupCondition::of_errors(&[1], [&[0.1, 0.66], &[0.1, 0.045]]);
+        all.push(SetupCondition::agreement(0.9));
+        let text = |all: &[SetupCondition]| -> Vec<String> {
             all.iter().map(|c| c.reported(&names).text).collect()
         };
         let expected = [
@@ -189,12 +188,12 @@ mod tests {
             "parts agree",
         ];
         assert_eq!(text(&all), expected);
-        assert!(Found::is_sure(&all));
-        all.push(Condition::none_of(Criterion::NoOther, None, 2));
+        assert!(SetupCondition::all_hold(&all));
+        all.push(SetupCondition::none_of(SetupCriterion::NoOther, None, 2));
         assert_eq!(text(&all)[3], "2 other readings fit alike");
-        assert!(!Found::is_sure(&all));
-        let unknown = Condition::of_errors(&[0], [&[f64::NAN, 0.0], &[0.3, 0.0]]);
+        assert!(!SetupCondition::all_hold(&all));
+        let unknown = SetupCondition::of_errors(&[0], [&[f64::NAN, 0.0], &[0.3, 0.0]]);
         assert_eq!(unknown[0].reported(&names).value, None);
-        assert!(!Found::is_sure(&unknown));
+        assert!(!SetupCondition::all_hold(&unknown));
     }
 }

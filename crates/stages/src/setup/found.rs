@@ -1,6 +1,6 @@
 //! What a search of the set-up comes to.
 
-use super::condition::Condition;
+use super::condition::SetupCondition;
 use super::correction::{Change, Correction};
 use super::estimate::SetupEstimate;
 use super::physics::Driven;
@@ -16,7 +16,7 @@ pub struct Found {
     /// Beyond doubt, all conditions hold: a fit refuses the logs.
     pub sure: bool,
     /// By what that is decided.
-    pub conditions: Vec<Condition>,
+    pub conditions: Vec<SetupCondition>,
     /// Readings that fit alike are of other joints: these data cannot tell.
     pub open: bool,
     /// Other readings that these data do not distinguish from it.

@@ -14,6 +14,7 @@
 mod channels;
 mod condition;
 mod correction;
+mod decide;
 mod estimate;
 mod finding;
 mod found;
@@ -27,7 +28,7 @@ mod undecided;
 mod weight;
 
 pub(crate) use channels::{Channels, Drive};
-pub use condition::{Criterion, DecidedBy};
+pub use condition::{DecidedBy, SetupCriterion};
 pub(crate) use correction::{Change, Correction};
 pub(crate) use estimate::SetupEstimate;
 pub use finding::{

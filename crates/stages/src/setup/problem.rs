@@ -59,12 +59,12 @@ pub(super) struct Rows {
 const LOOKS: [f64; 2] = [0.25, 0.5];
 
 /// The sums of products of the rows that are made so far, by joint.
-pub(super) struct Part {
+pub(super) struct RowsSoFar {
     pub terms: Vec<Term>,
     pub sums: Vec<DMatrix<f64>>,
 }
 
-impl Part {
+impl RowsSoFar {
     fn none(terms: &[Term], joints: &[JointRows]) -> Self {
         let zeros = |rows: &JointRows| DMatrix::zeros(rows.columns, rows.columns);
         Self {
@@ -204,7 +204,7 @@ impl<'a> Problem<'a> {
         robot: &Robot,
         by: &Correction,
         (every, order): (usize, &[usize]),
-        is_hopeless: &mut dyn FnMut(&Part) -> bool,
+        is_hopeless: &mut dyn FnMut(&RowsSoFar) -> bool,
     ) -> Option<Rows> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let places = self.places_of(robot);
@@ -229,7 +229,7 @@ impl<'a> Problem<'a> {
         let mut y = vec![0.0; n * p];
         let mut of_blocks = vec![0..0; self.blocks.list.len()];
         let (mut good, mut all) = (0, 0);
-        let (mut summed, mut part) = (0, Part::none(&terms, &joints));
+        let (mut summed, mut part) = (0, RowsSoFar::none(&terms, &joints));
         let mut shares = LOOKS.iter().peekable();
         for &b in order {
             let first = good;

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
-use super::problem::{Part, Problem, Rows};
+use super::problem::{Problem, Rows, RowsSoFar};
 use cft_ident_core::judge::{
     ErrorGain, FitToAll, NUMBERS, Term, Terms, agreement_on_share, compare,
 };
@@ -62,7 +62,7 @@ impl Mixed {
                 let first = same.first().filter(|_| joints && most.is_finite());
                 let weights = first.map(|same| weights(problem, &same.rows.total, &mix));
                 let mut expected = 0.0;
-                let mut is_hopeless = |part: &Part| {
+                let mut is_hopeless = |part: &RowsSoFar| {
                     let Some(weights) = &weights else {
                         return false;
                     };
