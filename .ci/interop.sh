@@ -42,10 +42,6 @@ tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/simulated.m
   exit 1
 "$work/venv/bin/python" fixtures/logs/read.py "$work/sim.csv" \
   "$work/converted.mcap" "$work/simulated.mcap" || exit 1
-tool excite -q --check configs/table3.toml --rate 50 --samples "$work/motion.csv" \
-  --trajectory-message "$work/motion.mcap" > /dev/null || exit 1
-"$work/venv/bin/python" fixtures/logs/read_trajectory.py "$work/motion.csv" "$work/motion.mcap" ||
-  exit 1
 
 # What Rerun and PlotJuggler show of it: joints by their names, residuals beside the torques.
 timeout 600 "$work/venv/bin/pip" install --quiet --disable-pip-version-check rerun-sdk > "$work/pip.log" 2>&1 ||

@@ -30,10 +30,7 @@ one() {
     case $seen in *"|$line|"*) continue ;; esac
     seen+="|$line|"
     run=$((run + 1))
-    # a search that is long is cut short; the motion need not be the best
-    local more=
-    case $line in *" excite "*" --for weak "*) more="--starts 1 --evaluations 40" ;; esac
-    if ! PATH=$work/bin:$PATH bash -c "$line $more" > said 2> warned; then
+    if ! PATH=$work/bin:$PATH bash -c "$line" > said 2> warned; then
       echo "== next: $name: FAILED: $line"
       tail -n 3 warned
       failed=$((failed + 1))

@@ -419,10 +419,9 @@ def validate(model: Model | PathLike, logs: LogLike | Iterable[LogLike]) -> Resu
 
 
 def diagnose(model: Model | PathLike, logs: LogLike | Iterable[LogLike], *,
-             veto: LogLike | Iterable[LogLike] = (), holdout: LogLike | Iterable[LogLike] = (),
-             keep: bool = False) -> Diagnosis:
+             holdout: LogLike | Iterable[LogLike] = (), keep: bool = False) -> Diagnosis:
     """Effects that the model lacks; ``.model`` is the refined one, ``None`` where the data are at fault."""
-    told, found = _native.diagnose(_given(model), _logs(logs), _logs(veto), _logs(holdout), keep)
+    told, found = _native.diagnose(_given(model), _logs(logs), _logs(holdout), keep)
     return Diagnosis(*told, None if found is None else Model(found))
 
 

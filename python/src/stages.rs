@@ -236,17 +236,14 @@ pub fn diagnose(
     py: Python<'_>,
     model: PyRef<'_, Model>,
     logs: Vec<PyRef<'_, Log>>,
-    veto: Vec<PyRef<'_, Log>>,
     holdout: Vec<PyRef<'_, Log>>,
     keep: bool,
 ) -> PyResult<(Shown, Option<Model>)> {
     let (of, given) = (model.given.clone(), model.provenance());
-    let (train, veto, holdout) = (all(&logs), all(&veto), all(&holdout));
+    let (train, holdout) = (all(&logs), all(&holdout));
     work::run(py, move |control, _| {
         let (machine, file) = (of.machine(), &of.file);
-        let data = Dataset::new(&machine, &train)
-            .with_veto(&veto)
-            .with_held_out(&holdout);
+        let data = Dataset::new(&machine, &train).with_held_out(&holdout);
         let settings = DiagnoseSettings {
             keep,
             ..DiagnoseSettings::of(&of)

@@ -1,42 +1,33 @@
-//! `cft-ident compare`: two models of one robot beside each other, and on the same logs; or two runs.
+//! `cft-ident compare`: two models of one robot beside each other, and on the same logs.
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use super::{
-    CliError, Context, Outcome, arguments, file_name, files, logs_of, names_of, outputs, paths_of,
-    pictures,
+    CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, paths_of, pictures,
 };
-use cft_ident_files::config::{self, Wanted};
-use cft_ident_logs::log::{LogSpec, Provenance, escape};
+use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
-use cft_ident_stages::compare::runs;
 use cft_ident_stages::identify;
 use cft_ident_stages::replay::ReplayedPair;
 
 const EXAMPLE: &str = "\
 Example:
   cft-ident compare model.toml refined.toml
-  cft-ident compare model.toml refined.toml unseen.csv --report compare.html
-  cft-ident compare before.json after.json";
+  cft-ident compare model.toml refined.toml unseen.csv --report compare.html";
 
-/// Set two models of one robot, or two runs of one command, side by side.
+/// Set two models of one robot side by side.
 ///
-/// Models: differences of parameters are given in standard deviations; errors on the logs with an interval of
-/// their difference. Both models are judged with the log mapping and the filter of the first.
-///
-/// Runs: the JSON documents of `friction`, `lsq`, `validate`, `diagnose` or `identify`. Parameters are compared in
-/// standard deviations of their difference, errors stand beside each other, changed verdicts are listed.
+/// Differences of parameters are given in standard deviations; errors on the logs with an interval of their
+/// difference. Both models are judged with the log mapping and the filter of the first.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// First model file, or first JSON document
-    #[arg(value_name = "A.toml|A.json")]
+    /// First model file
+    #[arg(value_name = "A.toml")]
     pub a: PathBuf,
-    /// Second model file, or second JSON document
-    #[arg(value_name = "B.toml|B.json")]
+    /// Second model file
+    #[arg(value_name = "B.toml")]
     pub b: PathBuf,
     /// Logs that both models are tried on; a span is chosen by LOG@0..70%
     #[arg(value_name = "LOG")]
@@ -54,25 +45,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let drawn = args.report.is_some() || !args.plot.is_empty();
     let outputs = outputs::listed(None, &args.plot, args.report.as_deref());
     context.check_outputs(paths_of(&args.logs).chain(both), outputs)?;
-    let is_document = |path: &&Path| path.extension().is_some_and(|end| end == "json");
-    let documents: Vec<&Path> = both.into_iter().filter(is_document).collect();
-    match documents[..] {
-        [] => {}
-        [one] => {
-            let what = format!(
-                "{} is a JSON document, the other a model: they cannot be compared",
-                one.display()
-            );
-            return Err(CliError::usage(what)
-                .hint("give two model files (.toml), or two documents that --json wrote (.json)"));
-        }
-        _ if !args.logs.is_empty() || drawn => {
-            return Err(CliError::usage(
-                "documents are compared without logs, --plot and --report",
-            )
-            .hint("give the model files (.toml) to compare models on logs"));
-        }
-        _ => return of_runs(both, context),
+    let document = |path: &&Path| path.extension().is_some_and(|end| end == "json");
+    if let Some(document) = both.into_iter().find(document) {
+        let what = format!("{} is a JSON document", document.display());
+        return Err(CliError::usage(what).hint(
+            "give two model files (.toml); documents are plain JSON, which `jq` or `diff` compares",
+        ));
     }
     let a = files::model(&args.a, context)?;
     let b = files::model(&args.b, context)?;
@@ -111,27 +89,4 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_picture(path, &figure.svg())?;
     }
     Ok(Outcome::new(report.text_for(context.detail), document))
-}
-
-/// Lists what differs between two documents.
-fn of_runs([a, b]: [&Path; 2], context: &Context) -> Result<Outcome, CliError> {
-    let (a, b) = (read(a)?, read(b)?);
-    let names = [&a, &b].map(|(name, ..)| name.clone());
-    let found = runs((&names[0], &a.1), (&names[1], &b.1)).map_err(CliError::input)?;
-    let report = stages::diff::diff(&found, &names);
-    Ok(Outcome::new(
-        report.text_for(context.detail),
-        Document::new("diff", &[a.2, b.2], &[], &found)?,
-    ))
-}
-
-fn read(path: &Path) -> Result<(String, Value, Provenance), CliError> {
-    let name = escape(&path.to_string_lossy());
-    let text = config::text_of_kind(path, Wanted::Own)?;
-    let value = serde_json::from_str(&text).map_err(|error| {
-        CliError::input(format!("{name}:{}: no JSON: {error}", error.line()))
-            .hint("give documents that a command wrote with --json FILE")
-    })?;
-    let provenance = Provenance::of_text(&file_name(path), &text);
-    Ok((name, value, provenance))
 }

@@ -48,6 +48,6 @@ pub(super) fn ros2_control(
 }
 
 /// What the controller calls a joint, where it calls it otherwise.
-pub(super) fn name_in_controller<'a>(robot: &'a RobotFile, joint: &str) -> Option<&'a String> {
+fn name_in_controller<'a>(robot: &'a RobotFile, joint: &str) -> Option<&'a String> {
     robot.log.joint.get(joint)?.name.as_ref()
 }

@@ -35,10 +35,7 @@ pub struct Args {
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// Log that judges what is added and is never fitted; may be given more than once
-    #[arg(hide_short_help = true, long, value_name = "LOG")]
-    pub veto: Vec<LogSpec>,
-    /// Log that is evaluated once, after everything is decided; may be given more than once
+    /// Log that is never fitted and judges what is added; may be given more than once
     #[arg(long, value_name = "LOG")]
     pub holdout: Vec<LogSpec>,
     /// Effects of your own to try beside the known ones: [[candidate]] tables with formulas in q, v, a, load and t
@@ -71,7 +68,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
+    let specs = args.logs.iter().chain(&args.holdout);
     let files = [args.model.as_path()]
         .into_iter()
         .chain(args.candidates.as_deref());
@@ -85,7 +82,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         machine = machine.as_declared();
     }
     let data = Dataset::new(&machine, &logs_of(&args.leave_out.of(&args.logs)))
-        .with_veto(&logs_of(&args.veto))
         .with_held_out(&logs_of(&args.holdout));
     let own = args.candidates.as_deref();
     let own = own.map(files::candidates).transpose()?;

@@ -50,9 +50,6 @@ pub struct Args {
     /// The plain fit alone: no physically consistent parameters beside it, which torques are computed with
     #[arg(hide_short_help = true, long)]
     pub unconstrained: bool,
-    /// Accepted and without effect: physically consistent parameters are always there
-    #[arg(long, hide = true)]
-    pub feasible: bool,
     /// Then fit a single axis to the motion that its torques make, in windows of so many seconds that begin
     /// at measured states [default: blocks set aside choose the length]
     #[arg(hide_short_help = true, long, value_name = "SECONDS", num_args = 0..=1, require_equals = true,

@@ -33,6 +33,7 @@ mod outputs;
 mod payload;
 mod pictures;
 mod reduce;
+mod removed;
 mod setup;
 mod show;
 mod simulate;
@@ -257,7 +258,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(answer) => {
-            if let Some(error) = removed(&answer) {
+            if let Some(error) = removed::named(&answer, &arguments) {
                 error::to_stderr(&mut std::io::stderr(), &error.to_string());
                 return error.exit();
             }
@@ -282,23 +283,6 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
             error.exit()
         }
     }
-}
-
-/// What stands for a command that an older version had.
-fn removed(answer: &clap::Error) -> Option<CliError> {
-    let named = answer.get(clap::error::ContextKind::InvalidSubcommand)?;
-    let clap::error::ContextValue::String(name) = named else {
-        return None;
-    };
-    let now = match name.as_str() {
-        "schema" => "generate schema KIND",
-        "completions" => "generate completions SHELL",
-        "man" => "generate man DIR",
-        "diff" => "compare A.json B.json",
-        _ => return None,
-    };
-    let error = CliError::usage(format!("there is no command `{name}` any more"));
-    Some(error.hint(format!("write `cft-ident {now}`")))
 }
 
 /// Runs one command line, the program's name first, and gives its result instead of showing it; the files that it

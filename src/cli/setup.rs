@@ -145,6 +145,9 @@ fn refused(robot: &Path, refusals: &[&Finding]) -> CliError {
     for finding in refusals {
         error = error.hint(format!("write {}", finding.remedy));
     }
+    if let Some(decided) = refusals.first().and_then(|finding| finding.decided()) {
+        error = error.hint(format!("decided by: {decided}"));
+    }
     for tie in refusals.iter().flat_map(|f| &f.tied_with).take(2) {
         if !tie.remedy.is_empty() {
             error = error.hint(format!("these data say as well: write {}", tie.remedy));

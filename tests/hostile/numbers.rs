@@ -88,7 +88,6 @@ fn a_joint_that_stands_still_all_the_time_is_reported_and_ends_no_command_in_a_p
     bench.file("still.csv", slide_log(2000, |_, q, _| *q = 0.1));
     for line in [
         "diagnose still.csv -m model.toml",
-        "diagnose good.csv -m model.toml --veto still.csv",
         "diagnose good.csv -m model.toml --holdout still.csv",
         "diagnose still.csv -m model.toml --keep",
         "lsq still.csv -r slide.toml -o out.toml",

@@ -17,14 +17,14 @@ fn a_log_that_is_given_twice_is_refused_by_everything_that_fits() {
         "diagnose good.csv good.csv -m model.toml -o out.toml",
         "diagnose good.csv -m model.toml --holdout copy.csv",
         "diagnose good.csv@0..60% -m model.toml --holdout good.csv@50..100%",
-        "diagnose good.csv@0..60% -m model.toml --veto good.csv@60..80% --holdout good.csv@70..100%",
-        "diagnose good.csv -m model.toml --veto other.csv --holdout other.csv",
+        "diagnose good.csv@0..60% -m model.toml --holdout good.csv@60..80% --holdout good.csv@70..100%",
+        "diagnose good.csv -m model.toml --holdout other.csv --holdout other.csv",
     ] {
         bench.refuses(line, 3, &["holds rows that", "give each row once"]);
     }
     let parts = "lsq good.csv@0..50% copy.csv@50..100% -r slide.toml -o parts.toml";
     assert_eq!(bench.run(parts).status, Some(0));
-    let parts = "diagnose good.csv@0..60% -m model.toml --veto good.csv@60..80% --holdout good.csv@80..100%";
+    let parts = "diagnose good.csv@0..60% -m model.toml --holdout good.csv@60..80% --holdout good.csv@80..100%";
     assert_eq!(bench.run(parts).status, Some(0));
 }
 

@@ -58,11 +58,12 @@ fn a_log_and_a_model_that_were_exchanged_cost_no_memory() {
 fn meshes_without_end_and_without_number_leave_links_without_capsules_and_memory_bounded() {
     let bench = Bench::new();
     symlink("/dev/zero", bench.path("zero.stl")).unwrap();
-    let huge = File::create(bench.path("huge.obj")).unwrap();
+    let huge = File::create(bench.path("huge.stl")).unwrap();
     huge.set_len(2 << 30).unwrap();
     // 56 MB of vertices and blanks, named again and again
-    let line = format!("v 1 2 3{}\n", " ".repeat(120));
-    bench.file("dense.obj", line.repeat(56 << 13));
+    let line = format!("vertex 1 2 3{}\n", " ".repeat(115));
+    let lines = line.repeat(3 * (56 << 13) / 3);
+    bench.file("dense.stl", format!("solid\n{lines}endsolid\n"));
     let shown = |files: &[&str]| {
         let shape = |file| {
             format!("<collision><geometry><mesh filename=\"{file}\"/></geometry></collision>")
@@ -78,11 +79,11 @@ fn meshes_without_end_and_without_number_leave_links_without_capsules_and_memory
         std::fs::remove_file(bench.path("arm.toml")).unwrap();
         ended.stderr
     };
-    let odd = shown(&["zero.stl", "huge.obj"]);
+    let odd = shown(&["zero.stl", "huge.stl"]);
     assert!(odd.contains("there is no file zero.stl"), "{odd}");
-    assert!(odd.contains("huge.obj: more than 64 MB"), "{odd}");
-    let many = shown(&["dense.obj"; 1000]);
-    let too_much = "dense.obj: the meshes of this URDF have more than 128 MB";
+    assert!(odd.contains("huge.stl: more than 64 MB"), "{odd}");
+    let many = shown(&["dense.stl"; 1000]);
+    let too_much = "dense.stl: the meshes of this URDF have more than 128 MB";
     assert!(
         many.contains(too_much) && many.contains("and 996 more of the kind"),
         "{many}"

@@ -12,7 +12,7 @@ use serde_json::Value;
 use excite_support::excite;
 
 /// Options of a search that takes a moment.
-const QUICK: &str = "--starts 2 --evaluations 60";
+const QUICK: &str = "--harmonics 2";
 
 #[test]
 fn table_3_keeps_the_limits_of_tuedacs_and_breaks_those_of_dspace() {
@@ -70,35 +70,13 @@ fn a_design_is_written_with_its_samples_and_its_picture_and_passes_its_own_check
             .contains("<title>d.toml</title>")
     );
     let document: Value = serde_json::from_slice(&fs::read(path("d.json")).unwrap()).unwrap();
-    assert!(document["evaluations"].as_u64().unwrap() <= 240);
+    assert!(document["evaluations"].as_u64().unwrap() > 0);
     excite(folder.path(), "--check d.toml").assert().code(0);
 }
 
 #[test]
-fn a_motion_is_written_as_controllers_take_it_and_says_first_what_nobody_checked() {
+fn a_program_of_a_controller_needs_six_joints_that_turn() {
     let folder = tempfile::tempdir().unwrap();
-    let line = "--check configs/table3.toml --rate 50 --samples m.csv --trajectory-message m.yaml";
-    excite(folder.path(), line)
-        .assert()
-        .code(0)
-        .stdout(contains("written: m.yaml"));
-    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-    let yaml = read("m.yaml");
-    assert!(yaml.starts_with("# NOT CHECKED: collisions"), "{yaml}");
-    assert!(yaml.contains("# Checked: the limits of cft.toml along the whole motion."));
-    assert!(yaml.contains("joint_names:\n  - \"q1\"\n  - \"q2\"\n"));
-    // the points are those of the samples
-    let samples = read("m.csv");
-    let rows: Vec<&str> = samples.lines().skip(1).collect();
-    assert_eq!(yaml.matches("  - positions: [").count(), rows.len());
-    let last: Vec<&str> = rows[rows.len() - 1].split(',').collect();
-    let numbers = last[1..5]
-        .iter()
-        .map(|x| format!("{:?}", x.parse::<f64>().unwrap()));
-    let numbers: Vec<String> = numbers.collect();
-    assert!(yaml.contains(&format!("  - positions: [{}]", numbers.join(", "))));
-
-    // a program needs six joints that turn
     excite(
         folder.path(),
         "--check configs/table3.toml --urscript m.script",
@@ -106,12 +84,31 @@ fn a_motion_is_written_as_controllers_take_it_and_says_first_what_nobody_checked
     .assert()
     .code(2)
     .stderr(contains("the joints q1, q2, q4, q5"));
-    // and what breaks limits says so
-    let line = "--check configs/table3.toml -r configs/cft-dspace.toml --rate 50 --trajectory-message b.mcap";
-    excite(folder.path(), line).assert().code(1);
-    let bytes = fs::read(folder.path().join("b.mcap")).unwrap();
-    assert!(String::from_utf8_lossy(&bytes).contains("BREAKS LIMITS: position of x_c4"));
     assert!(!folder.path().join("m.script").exists());
+}
+
+#[test]
+fn an_option_that_went_says_what_stands_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for (line, now) in [
+        ("excite --starts 3 -o m.toml", "takes as many as it needs"),
+        (
+            "excite --evaluations=9 -o m.toml",
+            "takes as many as it needs",
+        ),
+        ("excite --offsets a.toml -o m.toml", "chooses the offsets"),
+        ("excite --trajectory-message m.yaml -o m.toml", "--samples"),
+        ("diagnose a.csv -m m.toml --cautious", "leave it out"),
+        ("diagnose a.csv -m m.toml --veto b.csv", "--holdout"),
+        ("lsq a.csv -r r.toml -o m.toml --feasible", "always there"),
+        ("fit a.csv -r r.toml -o m.toml --feasible", "always there"),
+    ] {
+        let mut command = Command::cargo_bin("cft-ident").unwrap();
+        command.current_dir(folder.path()).args(line.split(' '));
+        let run = command.assert().code(2);
+        let run = run.stderr(contains("any more")).stderr(contains(now));
+        run.stdout(is_empty());
+    }
 }
 
 #[test]
@@ -191,8 +188,6 @@ fn lines_and_files_that_cannot_be_used_are_reported() {
     code("--parameter theta_6 -o a.toml", 2, "a-optimal");
     let line = "--criterion a-optimal --parameter theta_66 -o a.toml";
     code(line, 2, "theta_12");
-    let line = "-r configs/cft-dspace.toml --offsets configs/table3.toml -o a.toml";
-    code(line, 3, "offset 0.0869 of x_c4");
     code("-r configs/emps.toml -o a.toml", 3, "[limits.q1]");
     code("--check nothing.toml", 3, "nothing.toml");
     let weak = "[robot]\nmodel = \"cft\"\nsetup = \"tuedacs\"\n[limits.x_c1]\nvolts = 0.2\n";

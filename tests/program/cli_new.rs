@@ -337,7 +337,7 @@ fn a_command_that_went_says_which_one_stands_for_it() {
         ("schema robot", "generate schema"),
         ("completions bash", "generate completions"),
         ("man .", "generate man"),
-        ("diff a.json b.json", "compare A.json B.json"),
+        ("diff a.json b.json", "compare A.toml B.toml"),
     ] {
         command(folder.path())
             .args(old.split(' '))

@@ -73,17 +73,15 @@ fn the_way_from_a_given_pose_is_held_against_every_limit() {
     let text = format!("{ARM}{}{CAPSULES}", FLOOR.replace("0.05", "0.0"));
     fs::write(folder.path().join("arm.toml"), text).unwrap();
     fs::write(folder.path().join("nod.toml"), NOD).unwrap();
-    let check = "-r arm.toml --check nod.toml --rate 50 --trajectory-message m.yaml";
+    let check = "-r arm.toml --check nod.toml --rate 50 --samples m.csv";
     let near = format!("{check} --from -0.5,0.4");
     let shown = "NOT CHECKED: what stands around the robot, but for floor at tip.";
     excite(folder.path(), &near)
         .assert()
         .code(0)
         .stdout(contains(shown));
-    let yaml = fs::read_to_string(folder.path().join("m.yaml")).unwrap();
-    assert!(yaml.starts_with("# TORQUES ARE NOT FORESEEN"), "{yaml}");
-    assert!(yaml.contains(&format!("\n# {shown}\n")), "{yaml}");
-    assert!(yaml.contains("motion and on the straight way from the given pose."));
+    let text = fs::read_to_string(folder.path().join("m.csv")).unwrap();
+    assert!(text.contains("TORQUES ARE NOT FORESEEN"), "{text}");
     // from below the floor: the pose itself is the farthest
     let lowest = 0.5 - 1.0_f64.sin() - 0.5 * 0.8_f64.sin();
     let below = format!("{check} --from 1.0,-0.2 --json -");
@@ -116,7 +114,7 @@ fn a_design_keeps_floor_and_links_apart_and_its_own_check_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let text = format!("{ARM}{FLOOR}{CAPSULES}");
     fs::write(folder.path().join("arm.toml"), &text).unwrap();
-    let line = "-r arm.toml --starts 1 --evaluations 20 --harmonics 2 --frequency 0.2 --from -0.8,0.5 -o d.toml --json -";
+    let line = "-r arm.toml --harmonics 2 --frequency 0.2 --from -0.8,0.5 -o d.toml --json -";
     let run = excite(folder.path(), line).assert().code(0);
     let document: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
     for list in ["limits", "way"] {

@@ -125,7 +125,7 @@ fn a_run_that_computes_for_long_ends_within_seconds() {
 fn a_design_that_is_interrupted_leaves_the_best_motion_so_far() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let run = tool(path, "excite --starts 10000 -o best.toml --json out.json");
+    let run = tool(path, "excite --harmonics 32 -o best.toml --json out.json");
     let begun = Instant::now();
     interrupt(run, "INT", || begun.elapsed() > Duration::from_secs(2));
     assert_eq!(names(path), ["best.toml"]);

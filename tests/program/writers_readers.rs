@@ -46,7 +46,7 @@ const READERS: [&str; 17] = [
     "compare fit.toml MODEL HELD",
     "diagnose FIT -m MODEL -o again.toml",
     "payload FIT -m MODEL -o loaded.toml",
-    "excite -m MODEL --for weak --starts 1 --evaluations 20 --periods 2 -o motion.toml --samples motion.csv",
+    "excite -m MODEL --for weak --harmonics 2 --periods 2 -o motion.toml --samples motion.csv",
     "simulate -r ROBOT -m MODEL --seconds 4 -o simulated.csv",
     "export -m MODEL --c x.h --observer 200",
     "export -m MODEL --rust x.rs",

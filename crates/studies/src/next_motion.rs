@@ -69,7 +69,7 @@ impl Cell {
         let Some(before) = fitted(&lab, tool, folder, &["first.csv"])? else {
             return Ok(json!({ "said": "the first log gave no model" }));
         };
-        let words = "excite -m model.toml --for weak --starts 6 --rate 1000 -o next.toml --samples next.csv";
+        let words = "excite -m model.toml --for weak --rate 1000 -o next.toml --samples next.csv";
         let words: Vec<&str> = words.split(' ').collect();
         let answer = tool.run(folder, &words)?;
         if answer.exit != 0 {

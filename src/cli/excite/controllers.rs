@@ -1,62 +1,42 @@
-//! A motion as controllers take it: messages of ROS 2 and programs in URScript.
+//! A motion as a controller takes it: a program in URScript.
 
 use std::path::Path;
 
-use super::{Bench, Names, samples};
+use super::{Bench, samples};
 use crate::cli::CliError;
-use crate::cli::controller::name_in_controller;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
 use cft_ident_logs::log::{escape, escape_whole};
 use cft_ident_logs::output::JointTrajectory;
 use cft_ident_plant::excite::{ExciteError, Judgement, Motion};
 
-/// Most points of a message or lines of a program: controllers hold them in memory.
+/// Most lines of a program: controllers hold them in memory.
 const MOST_POINTS: f64 = 1e6;
 
 /// Joints of an arm that speaks URScript.
 const OF_UR: usize = 6;
 
-/// Writes the files for controllers that are asked for; their paths.
-pub(super) fn write<'a>(
+/// Writes the program that is asked for.
+pub(super) fn write(
     bench: &Bench,
     motion: &Motion,
     judged: &Judgement,
-    names: &'a Names,
-) -> Result<Vec<&'a Path>, CliError> {
-    let mut written = Vec::new();
-    if names.message.is_none() && names.urscript.is_none() {
-        return Ok(written);
+    path: &Path,
+) -> Result<(), CliError> {
+    let robot = &bench.machine.model.robot;
+    let turns = (0..robot.joints()).all(|j| robot.joint_kind(j) == JointKind::Revolute);
+    if robot.joints() != OF_UR || !turns {
+        let joints = escape(&robot.joint_names().join(", "));
+        let text = format!("--urscript is for arms of {OF_UR} joints that turn");
+        return Err(CliError::usage(text)
+            .hint(format!("this robot has the joints {joints}"))
+            .hint("--samples writes the motion of any robot"));
     }
     let trajectory = sampled(bench, motion, judged)?;
-    if let Some(path) = &names.message {
-        let end = path.extension();
-        if end.is_some_and(|end| end.eq_ignore_ascii_case("mcap")) {
-            let failed = |error| CliError::input(format!("{}: {error}", path.display()));
-            let bytes = trajectory.mcap().map_err(failed)?;
-            bench.context.files.write(path, &bytes)?;
-        } else {
-            bench.context.write_text(path, &trajectory.yaml())?;
-        }
-        written.push(path.as_path());
-    }
-    if let Some(path) = &names.urscript {
-        let robot = &bench.machine.model.robot;
-        let turns = (0..robot.joints()).all(|j| robot.joint_kind(j) == JointKind::Revolute);
-        if robot.joints() != OF_UR || !turns {
-            let joints = escape(&robot.joint_names().join(", "));
-            let text = format!("--urscript is for arms of {OF_UR} joints that turn");
-            return Err(CliError::usage(text)
-                .hint(format!("this robot has the joints {joints}"))
-                .hint("--samples and --trajectory-message write the motion of any robot"));
-        }
-        bench.context.write_text(path, &trajectory.urscript())?;
-        written.push(path.as_path());
-    }
-    Ok(written)
+    bench.context.write_text(path, &trajectory.urscript())
 }
 
-/// The motion at the rate of the run, its joints named as their controller names them.
+/// The motion at the rate of the run.
 fn sampled(
     bench: &Bench,
     motion: &Motion,
@@ -72,16 +52,9 @@ fn sampled(
         }
         let at = motion.at(k as f64 / bench.rate_hz);
         let state = machine.joints(&at).map_err(ExciteError::Robot)?;
-        points.push([state.q, state.v, state.a].map(|x| x[..n].to_vec()));
+        points.push(state.q[..n].to_vec());
     }
-    let named = machine.model.robot.joint_names().iter();
-    let named = named.map(|joint| {
-        name_in_controller(&bench.file, joint)
-            .unwrap_or(joint)
-            .clone()
-    });
     Ok(JointTrajectory {
-        names: named.collect(),
         notes: notes(bench, judged),
         rate_hz: bench.rate_hz,
         points,

@@ -72,7 +72,7 @@ pub struct Args {
     #[arg(long, value_name = "TRAJECTORY.toml", conflicts_with_all = ["output", "with", "trajectories"])]
     pub check: Option<PathBuf>,
     /// Design the ladder of speeds of a one-joint experiment instead, for the friction of this joint
-    #[arg(long, value_name = "JOINT", conflicts_with_all = ["check", "with", "trajectories", "offsets"])]
+    #[arg(long, value_name = "JOINT", conflicts_with_all = ["check", "with", "trajectories"])]
     pub joint: Option<String>,
     /// What the motion is to make small
     #[arg(hide_short_help = true, long, value_enum, default_value_t = CriterionName::Condition)]
@@ -89,9 +89,6 @@ pub struct Args {
     /// Whole periods between the ends
     #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub periods: u32,
-    /// Keep the offsets of this trajectory, such as configs/table3.toml
-    #[arg(hide_short_help = true, long, value_name = "TRAJECTORY.toml")]
-    pub offsets: Option<PathBuf>,
     /// Share of every limit that the design leaves free, for what a controller strays
     #[arg(hide_short_help = true, long, value_name = "SHARE", default_value_t = 0.05, value_parser = share)]
     pub margin: f64,
@@ -105,12 +102,6 @@ pub struct Args {
     /// Motions to design, each to complement those before it; written as TRAJECTORY-1.toml, ...
     #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub trajectories: u16,
-    /// Random starts of the search
-    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=10_000))]
-    pub starts: u16,
-    /// Evaluations that each start may take [default: up to 1180]
-    #[arg(hide_short_help = true, long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub evaluations: Option<u64>,
     /// Seed of the starts
     #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -125,9 +116,6 @@ pub struct Args {
     /// Write the motion sample by sample, positions, speeds and accelerations
     #[arg(hide_short_help = true, long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
     pub samples: Option<PathBuf>,
-    /// Write the motion for ROS 2, as trajectory_msgs/msg/JointTrajectory
-    #[arg(hide_short_help = true, long, value_name = "FILE.yaml|.mcap", value_parser = arguments::ends_in(["yaml", "mcap"]))]
-    pub trajectory_message: Option<PathBuf>,
     /// Write the motion as a program for a controller of Universal Robots
     #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::ends_in(["script"]))]
     pub urscript: Option<PathBuf>,
@@ -209,7 +197,7 @@ struct Bench<'a> {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all = Names::of(args);
-    let read = [&args.robot, &args.model, &args.check, &args.offsets];
+    let read = [&args.robot, &args.model, &args.check];
     let read = read.into_iter().filter_map(|path| path.as_deref());
     let read = read.chain(args.with.iter().map(Path::new));
     context.check_outputs(read, all.iter().flat_map(Names::paths))?;
@@ -397,7 +385,8 @@ fn written(
         samples::write(bench, motion, path)?;
         cli::written(&mut report, path);
     }
-    for path in controllers::write(bench, motion, judged, names)? {
+    if let Some(path) = &names.urscript {
+        controllers::write(bench, motion, judged, path)?;
         cli::written(&mut report, path);
     }
     if let (Some(path), Some(trajectory)) = (&names.trajectory, trajectory) {

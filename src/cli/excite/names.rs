@@ -7,7 +7,6 @@ use super::Args;
 pub(super) struct Names {
     pub trajectory: Option<PathBuf>,
     pub samples: Option<PathBuf>,
-    pub message: Option<PathBuf>,
     pub urscript: Option<PathBuf>,
     pub plot: Option<PathBuf>,
     pub report: Option<PathBuf>,
@@ -23,7 +22,6 @@ impl Names {
         let names = |k: u16| Self {
             trajectory: numbered(&args.output, k),
             samples: numbered(&args.samples, k),
-            message: numbered(&args.trajectory_message, k),
             urscript: numbered(&args.urscript, k),
             plot: numbered(&args.plot, k),
             report: numbered(&args.report, k),
@@ -38,11 +36,14 @@ impl Names {
     }
 
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        let all = [&self.trajectory, &self.samples, &self.message];
-        let all = all
-            .into_iter()
-            .chain([&self.urscript, &self.plot, &self.report]);
-        all.filter_map(|path| path.as_deref())
+        let all = [
+            &self.trajectory,
+            &self.samples,
+            &self.urscript,
+            &self.plot,
+            &self.report,
+        ];
+        all.into_iter().filter_map(|path| path.as_deref())
     }
 }
 

@@ -3,26 +3,28 @@
 use super::Bench;
 use super::criterion::criterion;
 use crate::cli::error::CliError;
-use crate::cli::files;
-use cft_ident_files::config::Trajectory;
 use cft_ident_files::config::trajectory::FourierSection;
 use cft_ident_plant::excite::blend::Blend;
 use cft_ident_plant::excite::search::{FoundMotion, Task, design};
 use cft_ident_plant::excite::series::Series;
-use cft_ident_plant::excite::{Motion, series_of, trajectory};
+use cft_ident_plant::excite::{Motion, trajectory};
+
+/// Random starts of a search. Half: seeds differ by some percent in the criterion; twice: twice the time for less than
+/// one.
+const STARTS: usize = 16;
 
 /// What the command line asks for, with nothing known before.
-pub(super) fn task(bench: &mut Bench) -> Result<Task, CliError> {
+pub(super) fn task(bench: &Bench) -> Result<Task, CliError> {
     let args = bench.args;
     Ok(Task {
         criterion: criterion(bench)?,
         fundamental_hz: bench.frequency_hz,
         harmonics: usize::from(args.harmonics),
-        offsets: offsets(bench)?,
+        offsets: vec![None; bench.machine.coordinates()],
         reserve: args.margin,
         prior: None,
-        starts: usize::from(args.starts),
-        evaluations: args.evaluations,
+        starts: STARTS,
+        evaluations: None,
         seed: args.seed,
     })
 }
@@ -51,26 +53,4 @@ pub(super) fn blended(bench: &Bench, series: Series) -> Result<(Motion, FourierS
         ..trajectory(machine, &series)
     };
     Ok((Motion::Periodic { series, blend }, fourier))
-}
-
-fn offsets(bench: &mut Bench) -> Result<Vec<Option<f64>>, CliError> {
-    let n = bench.machine.coordinates();
-    let Some(path) = &bench.args.offsets else {
-        return Ok(vec![None; n]);
-    };
-    let given = files::trajectory(path)?;
-    bench.inputs.push(given.provenance);
-    let Trajectory::Fourier(file) = &given.value else {
-        return Err(
-            CliError::input(format!("{} is no Fourier series", given.name))
-                .hint("give a trajectory of kind \"fourier\" for --offsets"),
-        );
-    };
-    let series = series_of(&bench.machine, file)?;
-    let names = bench.machine.coordinate_names();
-    let offset = |i: usize| {
-        let named = file.series.iter().any(|c| c.name == names[i]);
-        named.then_some(series.offset[i])
-    };
-    Ok((0..n).map(offset).collect())
 }

@@ -10,7 +10,6 @@ use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
 use cft_ident_plant::excite::Judgements;
 use cft_ident_plant::simulate::truth::TruthFile;
 use cft_ident_report::report::json::{self, Document};
-use cft_ident_stages::compare::RunDifference;
 use cft_ident_stages::identify::{
     ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, Payload,
     TorqueAlong, Tracked, Validated, Watched,
@@ -43,8 +42,6 @@ pub enum Kind {
     Diagnose,
     /// JSON document of `compare`
     Compare,
-    /// JSON document of `compare A.json B.json`
-    Diff,
     /// JSON document of `identify`
     Identify,
     /// JSON document of `excite`
@@ -97,7 +94,6 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Track => json::schema::<Tracked>("track"),
         Kind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
         Kind::Compare => json::schema::<ComparisonResult>("compare"),
-        Kind::Diff => json::schema::<RunDifference>("diff"),
         Kind::Identify => json::schema::<identify::Identified>("identify"),
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),

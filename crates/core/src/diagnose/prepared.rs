@@ -17,9 +17,7 @@ use super::problem::unknowns::{Unknowns, step};
 use super::steps::Refit;
 use super::unexplained::errors::Errors;
 use crate::effect::{Added, AugmentedModel, Cover};
-use crate::judge::{
-    BlockSums, Blocks, BlocksLeftOut, LogRows, Term, Terms, TimeBlock, compare, divide,
-};
+use crate::judge::{BlockSums, Blocks, BlocksLeftOut, LogRows, Term, Terms, compare, divide};
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
@@ -33,8 +31,6 @@ pub struct PreparedCase<'a> {
     pub cover: Cover,
     /// Blocks that are fitted.
     pub blocks: Blocks,
-    /// These, then those that only judge.
-    pub all_blocks: Vec<TimeBlock>,
     /// Neighbouring pieces of the split that a bootstrap draws together.
     pub together: usize,
 }
@@ -82,7 +78,6 @@ impl<'a> PreparedCase<'a> {
             fitted,
             cover,
             blocks: Blocks::default(),
-            all_blocks: Vec::new(),
         };
         let prepared = prepared.divided(&logs, memory);
         if prepared.blocks.list.len() >= numbers.blocks {
@@ -105,8 +100,6 @@ impl<'a> PreparedCase<'a> {
         let least = (numbers.memory_times * memory).max(reach);
         let count = (numbers.blocks, 1);
         self.blocks = divide(logs, least, count);
-        let judging = divide(&split.logs(case.rows(), LogRole::Veto), least, count);
-        self.all_blocks = [self.blocks.list.as_slice(), &judging.list].concat();
         let rows = |p: &Piece| p.rows.len() as f64 * split.step_s[p.stretch];
         let lengths: Vec<f64> = split.pieces.iter().map(rows).collect();
         let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
@@ -148,11 +141,6 @@ impl<'a> PreparedCase<'a> {
         }
     }
 
-    /// Number of blocks that only judge.
-    pub fn judging(&self) -> usize {
-        self.all_blocks.len() - self.blocks.list.len()
-    }
-
     /// The declared model fitted anew beside effects that are held.
     pub fn refitted(&self, start: &AugmentedModel) -> Result<AugmentedModel, MotionError> {
         let data = (&self.data, self.blocks.list.as_slice());
@@ -171,7 +159,7 @@ impl<'a> PreparedCase<'a> {
         let nothing = DVector::zeros(self.unknowns.len());
         let squares = |block: &Vec<_>| given.declared.squares(block, &nothing);
         let as_given: Vec<_> = given.sums.blocks.iter().map(squares).collect();
-        let left_out = BlocksLeftOut::new(&fitted.sums, self.judging(), &fitted.declared);
+        let left_out = BlocksLeftOut::new(&fitted.sums, 0, &fitted.declared);
         Ok(left_out.is_some_and(|left_out| {
             let gain = compare(&as_given, &left_out.errors(), weights);
             gain.is_beyond(self.case.numbers.screen, None)

@@ -108,7 +108,7 @@ impl<'a> Field<'a> {
     where
         'a: 't,
     {
-        let found = BlocksLeftOut::new(&self.summed.sums, self.prepared.judging(), terms);
+        let found = BlocksLeftOut::new(&self.summed.sums, 0, terms);
         found.ok_or_else(|| self.prepared.nothing_determined())
     }
 

@@ -71,7 +71,7 @@ impl PreparedCase<'_> {
             stretches,
             ..self.data
         };
-        pass(&beside, columns, &summed.layout, &data, &self.all_blocks)
+        pass(&beside, columns, &summed.layout, &data, &self.blocks.list)
     }
 
     /// The sums with as much noise again in the positions as they have, in the mean over both signs of it.

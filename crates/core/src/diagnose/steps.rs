@@ -350,12 +350,9 @@ impl Judging<'_> {
     /// Rows that may take an effect out, and whether they were given for it: blocks that are set aside are as the rest of
     /// their log, and of single joints they measure.
     fn judging_rows(&self) -> (HeldOutRows<'_>, bool) {
-        let roles = &self.prepared.case.roles;
-        let role = match roles.contains(&LogRole::Veto) {
-            true => LogRole::Veto,
-            false => LogRole::Holdout,
-        };
-        (self.prepared.held_out(role), roles.contains(&role))
+        let role = LogRole::Holdout;
+        let given = self.prepared.case.roles.contains(&role);
+        (self.prepared.held_out(role), given)
     }
 
     /// The effect to take out, where the model that would be written is worse than the given one on held-out data, at a

@@ -110,6 +110,18 @@ impl RegressorColumns {
         }
     }
 
+    /// Whether no weighted row jumps: friction does where samples weigh nothing, and is no steep law.
+    pub(super) fn are_smooth(&self) -> bool {
+        let jumps = |(j, own): (usize, &Vec<Own>)| {
+            let rests = self.rest_speed.get(j).is_some_and(|speed| *speed >= 0.0);
+            let any = |of: &dyn Fn(&Own) -> bool| own.iter().any(of);
+            !rests && any(&|own| *own == Own::Coulomb)
+                || any(&|own| matches!(own, Own::Law(_) | Own::Saturating(_)))
+        };
+        let laws = self.known.iter().any(Option::is_some);
+        !laws && !self.own.iter().enumerate().any(jumps)
+    }
+
     /// Number of unknowns: shared ones first, then each joint's own in turn.
     pub fn unknowns(&self) -> usize {
         self.shared + self.own.iter().map(Vec::len).sum::<usize>()

@@ -68,7 +68,10 @@ pub fn accumulate_weighted<E>(
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
 ) -> Result<(BlockFactors, Summary), RunError<E>> {
     let mut factors = Accumulator::new(columns.clone(), BLOCK_SECONDS);
-    let settings = columns.with_rests(settings);
+    let settings = FilterSettings {
+        thin: settings.weighs_rests && columns.are_smooth(),
+        ..columns.with_rests(settings)
+    };
     let summary = motion::run(
         source,
         columns.joints,

@@ -69,7 +69,7 @@ impl<'a> FitToAll<'a> {
     }
 
     /// Whether an error of which this is the least is surely above `most`.
-    fn is_above(&self, least: f64, most: f64) -> bool {
+    pub fn is_above(&self, least: f64, most: f64) -> bool {
         // sums of products hold half of a number's digits of an error
         let rounding = f64::EPSILON.sqrt();
         self.least().is_some() && least > most * (1.0 + rounding) + rounding

@@ -2,8 +2,8 @@
 //! acceleration and whatever is computed from them.
 //!
 //! ```text
-//! log blocks -> time base -> smooth q -> differences -> fill -> one filter over all -> every m-th
-//!               (segments)   (wide)      v, a           tau, Y, F(v)  channels         row
+//! log blocks -> time base -> smooth q -> differences -> thin  -> fill -> one filter over all -> every m-th
+//!               (segments)   (wide)      v, a           (fast logs)  tau, Y, F(v)  channels    row
 //! ```
 //!
 //! The model `tau = Y(q, v, a) theta + F(v)` holds sample by sample, and it still holds after any
@@ -27,6 +27,7 @@ pub mod rest;
 mod run;
 mod settings;
 mod stretch;
+mod thinning;
 mod time_base;
 mod window;
 mod zero_order_hold;

@@ -3,6 +3,7 @@
 use super::MotionError;
 use super::position_filter::{HIGHEST_SHARE, PositionFilter};
 use super::rest::response;
+use super::thinning::{self, TorqueThinner};
 use crate::math::kept::KeptEvery;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
@@ -49,6 +50,9 @@ pub struct FilterSettings {
     pub rest_speed: Vec<f64>,
     /// Whether samples of a joint that stands or turns weigh nothing; plain least squares weighs all alike.
     pub weighs_rests: bool,
+    /// Whether channels are computed at fewer samples where the log is much faster than its positions' filter lets
+    /// through: not what jumps or remembers, nor what takes single samples.
+    pub thin: bool,
 }
 
 impl Default for FilterSettings {
@@ -68,6 +72,7 @@ impl Default for FilterSettings {
             trim_s: None,
             rest_speed: Vec::new(),
             weighs_rests: true,
+            thin: false,
         }
     }
 }
@@ -124,8 +129,11 @@ pub struct Parallel {
     pub(super) differences: Differences,
     pub(super) position: Option<PositionFilter>,
     pub(super) parallel: ZeroPhase,
-    /// The same, of which the rows are kept.
+    /// The same for the samples that are left, of which the rows are kept.
     pub(super) kept: KeptEvery,
+    /// Every how many samples channels are computed, and torques there where that is more than one.
+    pub(super) thinned: usize,
+    pub(super) thinner: Option<TorqueThinner>,
     /// Every how many samples a row is kept.
     pub decimation: usize,
     /// Samples dropped at a segment's end before the parallel filter.
@@ -206,16 +214,22 @@ impl Parallel {
             });
         }
         let decimation = settings.decimation_at(dt);
-        let parallel = match settings.filter {
+        let parallel_at = |rate: f64| match settings.filter {
             ParallelFilter::Butterworth { order } => {
-                Sos::butterworth(order, settings.cutoff_hz, rate)?
+                Sos::butterworth(order, settings.cutoff_hz, rate)
             }
             ParallelFilter::Chebyshev { order, ripple_db } => {
-                Sos::chebyshev(order, ripple_db, settings.cutoff_hz, rate)?
+                Sos::chebyshev(order, ripple_db, settings.cutoff_hz, rate)
             }
         };
+        let parallel = parallel_at(rate)?;
         let cutoffs = settings.position_cutoffs_hz(rate);
+        let highest = cutoffs.iter().copied().fold(0.0, f64::max);
         let position = PositionFilter::design(settings.q_order, cutoffs, rate)?;
+        let thinned = match position {
+            Some(_) => thinning::factor(settings, highest, decimation, dt),
+            None => 1,
+        };
         let edge = edge(settings, position.as_ref(), dt)?;
         let trim = samples_of("trim_s", settings.trim_s, dt)?
             .unwrap_or_else(|| parallel.settle_samples(3.0));
@@ -230,7 +244,14 @@ impl Parallel {
         let overlap = position_overlap + parallel_overlap.max(trim).max(pad(&parallel));
         let core = WINDOW_CORE.max(2 * overlap);
         let parallel = ZeroPhase::new(parallel);
-        let shortest = 2 * (edge + trim) + 3 * position_pad.max(pad(parallel.sos()));
+        let kept = match thinned {
+            1 => KeptEvery::new(parallel.clone(), decimation),
+            _ => {
+                let filter = ZeroPhase::new(parallel_at(rate / thinned as f64)?);
+                KeptEvery::new(filter, decimation / thinned)
+            }
+        };
+        let shortest = 2 * (edge + trim) + 3 * position_pad.max(thinned * pad(parallel.sos()));
         let reach = settings.differences.reach();
         let of_joint = |(j, speed): (usize, &f64)| {
             let cutoff = position.as_ref().map(|f| f.cutoff_hz(j));
@@ -243,7 +264,9 @@ impl Parallel {
             row_samples: (0.5 / (settings.cutoff_hz * dt)) as usize + 1,
             differences: settings.differences,
             position,
-            kept: KeptEvery::new(parallel.clone(), decimation),
+            kept,
+            thinned,
+            thinner: (thinned > 1).then(|| TorqueThinner::new(thinned)),
             parallel,
             decimation,
             edge,

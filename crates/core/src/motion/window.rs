@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use super::settings::Parallel;
+use super::thinning::TorqueThinner;
 use super::{FilteredRow, MotionError, MotionSample, rest};
 use crate::math::kept::{KeptRows, KeptWork};
 
@@ -34,6 +35,8 @@ pub(super) struct FilterWindow {
     a: Vec<f64>,
     weight: Vec<f64>,
     rests: Vec<bool>,
+    /// Torques one sample before and after those that are left of a log that is thinned.
+    beside: [Vec<f64>; 2],
     /// Samples of the rows, as indices within the window.
     kept: Vec<usize>,
     /// Channels of the rows before and after the filter, row-major.
@@ -75,11 +78,59 @@ impl FilterWindow {
         let from = lost(self.first == 0);
         let to = samples - lost(self.ends);
         self.choose_rows(chain, samples);
+        self.beside.iter_mut().for_each(Vec::clear);
+        let (from, to) = match &chain.thinner {
+            None => (from, to),
+            Some(thinner) => (0, self.thin(chain, thinner, joints, from..to)),
+        };
         WORK.with_borrow_mut(|work| self.filter(work, chain, from..to, (joints, channels), fill))?;
         match self.filtered.iter().all(|x| x.is_finite()) {
             true => Ok(()),
             false => Err(self.offending(from..to, joints, channels, fill)),
         }
+    }
+
+    /// Keeps every so many samples of a span, counted as the rows are; how many they are.
+    fn thin(
+        &mut self,
+        chain: &Parallel,
+        thinner: &TorqueThinner,
+        joints: usize,
+        span: std::ops::Range<usize>,
+    ) -> usize {
+        let every = chain.thinned;
+        // the first of the span that lies on the rows' grid, which begins at the edge
+        let index = self.first + span.start;
+        let start = match index < chain.edge {
+            true => chain.edge - self.first,
+            false => (index - chain.edge).next_multiple_of(every) + chain.edge - self.first,
+        };
+        let left = (start..span.end).step_by(every);
+        let count = left.len();
+        let mut torques = vec![0.0; count * joints];
+        self.beside
+            .iter_mut()
+            .for_each(|tau| tau.resize(count * joints, 0.0));
+        for (i, k) in left.enumerate() {
+            let own = i * joints..(i + 1) * joints;
+            thinner.at(&self.tau, joints, k as isize, &mut torques[own.clone()]);
+            let [before, after] = &mut self.beside;
+            thinner.at(&self.tau, joints, k as isize - 1, &mut before[own.clone()]);
+            thinner.at(&self.tau, joints, k as isize + 1, &mut after[own]);
+            self.t[i] = self.t[k];
+            for of in [&mut self.q, &mut self.v, &mut self.a, &mut self.weight] {
+                of.copy_within(k * joints..(k + 1) * joints, i * joints);
+            }
+        }
+        self.tau = torques;
+        self.t.truncate(count);
+        for of in [&mut self.q, &mut self.v, &mut self.a, &mut self.weight] {
+            of.truncate(count * joints);
+        }
+        for k in &mut self.kept {
+            *k = (*k - start) / every;
+        }
+        count
     }
 
     /// Weighs the samples of every joint, and sees which of them rest.
@@ -201,13 +252,17 @@ impl FilterWindow {
     fn sample(&self, k: usize, joints: usize) -> MotionSample<'_> {
         let row = k * joints..(k + 1) * joints;
         let torques = |k: usize| &self.tau[k * joints..(k + 1) * joints];
+        let beside = match self.beside[0].is_empty() {
+            true => [k.saturating_sub(1), (k + 1).min(self.t.len() - 1)].map(torques),
+            false => self.beside.each_ref().map(|tau| &tau[row.clone()]),
+        };
         MotionSample {
             t: self.t[k],
             q: &self.q[row.clone()],
             v: &self.v[row.clone()],
             a: &self.a[row.clone()],
             tau: torques(k),
-            tau_beside: [k.saturating_sub(1), (k + 1).min(self.t.len() - 1)].map(torques),
+            tau_beside: beside,
             weight: &self.weight[row],
             rests: &self.rests,
         }

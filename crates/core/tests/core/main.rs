@@ -1,5 +1,7 @@
 //! Tests of physics, motion and estimators.
 
+mod filter_principles;
+mod fit_principles;
 mod motion_accuracy;
 mod motion_measured;
 mod motion_time_base;

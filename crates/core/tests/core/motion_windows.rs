@@ -325,3 +325,78 @@ fn how_a_reader_cuts_its_blocks_changes_no_bit() {
         assert!(rows == whole, "blocks of {block}");
     }
 }
+
+/// Root mean square of a channel's differences between two runs, over that of the channel.
+fn off([thin, full]: [&[Kept]; 2], of: impl Fn(&Kept) -> f64) -> f64 {
+    let square = |x: f64| x * x;
+    let size: f64 = full.iter().map(|row| square(of(row))).sum();
+    let pairs = thin.iter().zip(full);
+    let off: f64 = pairs.map(|(a, b)| square(of(a) - of(b))).sum();
+    (off / size).sqrt()
+}
+
+#[test]
+fn a_log_much_faster_than_its_motion_gives_the_same_rows_from_fewer_samples() {
+    let (dt, stretches) = (2e-4, [52_000, 9_000]);
+    let log = log(&stretches, dt);
+    let full = FilterSettings {
+        cutoff_hz: 20.0,
+        q_cutoff_hz: Some(100.0),
+        differences: Differences::HighOrder,
+        decimation: Some(25),
+        ..FilterSettings::default()
+    };
+    let thin = FilterSettings {
+        thin: true,
+        ..full.clone()
+    };
+    let ((rows, summary), (plain, as_given)) = (run(&log, &thin, 1000), run(&log, &full, 1000));
+    assert_eq!(summary, as_given, "a log is described as it is");
+    assert_eq!(rows.len(), plain.len());
+    for (a, b) in rows.iter().zip(&plain) {
+        assert_eq!((a.t, a.segment), (b.t, b.segment));
+        assert_eq!((&a.q, &a.v, &a.a), (&b.q, &b.v, &b.a));
+    }
+    // near the ends of a stretch rows hold what the filter's extension makes of the last samples, both sides alike
+    let border = plain.iter().position(|row| row.segment == 1).unwrap();
+    let inside =
+        |rows: &[Kept]| [&rows[15..border - 15], &rows[border + 15..rows.len() - 15]].concat();
+    let (rows, plain) = (inside(&rows), inside(&plain));
+    let both = [rows.as_slice(), plain.as_slice()];
+    // torques through a filter; smooth terms sampled, and a steep law
+    for (channel, most) in [
+        (0, 5e-5),
+        (1, 1e-4),
+        (2, 5e-5),
+        (3, 5e-5),
+        (8, 1e-5),
+        (9, 1e-5),
+        (7, 1e-3),
+    ] {
+        let off = off(both, |row| row.filtered[channel]);
+        assert!(off < most, "channel {channel}: {off:e}");
+    }
+}
+
+#[test]
+fn noise_between_the_samples_that_are_left_is_not_folded_onto_the_rows() {
+    let (dt, n) = (2e-4, 40_000);
+    let mut log = log(&[n], dt);
+    // 15 Hz beside the thinned rate of 1 kHz: what is left out of it would be a wave of 15 Hz
+    for (k, tau) in log.tau.chunks_exact_mut(JOINTS).enumerate() {
+        tau[0] = (std::f64::consts::TAU * 1015.0 * k as f64 * dt).sin();
+    }
+    let settings = FilterSettings {
+        cutoff_hz: 20.0,
+        q_cutoff_hz: Some(100.0),
+        decimation: Some(25),
+        thin: true,
+        ..FilterSettings::default()
+    };
+    let (rows, _) = run(&log, &settings, 1000);
+    let largest = rows
+        .iter()
+        .map(|row| row.filtered[0].abs())
+        .fold(0.0, f64::max);
+    assert!(rows.len() > 1000 && largest < 1e-4, "{largest:e}");
+}

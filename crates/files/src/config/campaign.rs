@@ -22,10 +22,7 @@ pub struct CampaignLogs {
     /// Logs that are not used, only reconstructed.
     #[serde(default)]
     pub validation: Vec<String>,
-    /// Logs that may veto a diagnosed effect.
-    #[serde(default)]
-    pub veto: Vec<String>,
-    /// Logs that are evaluated once, after everything is decided.
+    /// Logs that are never fitted and judge what a diagnosis adds.
     #[serde(default)]
     pub holdout: Vec<String>,
     /// How long the machine had run when a log began [s], by the log's name as it stands above, without a span: what
@@ -74,9 +71,6 @@ pub struct CampaignSettings {
     /// The parameters of the plain fit alone, without the physically consistent ones beside them.
     #[serde(default)]
     pub unconstrained: bool,
-    /// Accepted and without effect: physically consistent parameters are always there.
-    #[serde(default)]
-    pub feasible: bool,
     /// Limit on every joint's relative validation error, a fraction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_relative_error: Option<f64>,
@@ -118,7 +112,6 @@ impl Campaign {
             ("friction", &logs.friction),
             ("identification", &logs.identification),
             ("validation", &logs.validation),
-            ("veto", &logs.veto),
             ("holdout", &logs.holdout),
         ] {
             for spec in specs {

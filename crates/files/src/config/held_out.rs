@@ -26,9 +26,9 @@ pub struct HeldOut {
     pub positions_seen: [f64; 2],
     /// Greatest speed [m/s or rad/s].
     pub speed_seen: f64,
-    /// Greatest acceleration [m/s^2 or rad/s^2]; absent in files of before.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub acceleration_seen: Option<f64>,
+    /// Greatest acceleration [m/s^2 or rad/s^2].
+    #[serde(default = "absent")]
+    pub acceleration_seen: f64,
     /// Greatest modulus of the model's torque [N or Nm].
     pub torque_seen: f64,
     /// Standard deviation of the external torque where nothing touched the robot, by ranges of speed, the parameters'
@@ -38,7 +38,17 @@ pub struct HeldOut {
     pub external_99: f64,
 }
 
+/// What stands for a number that version 0.2 did not write.
+fn absent() -> f64 {
+    f64::NAN
+}
+
 impl HeldOut {
+    /// Whether version 0.2 wrote it.
+    pub(super) fn is_of_0_2(&self) -> bool {
+        self.acceleration_seen.is_nan()
+    }
+
     /// The range that a number lies in.
     fn range(edges: &[f64], x: f64) -> usize {
         edges.iter().take_while(|edge| x > **edge).count()

@@ -370,11 +370,7 @@ impl ModelFile {
             limits.position = limits.position.or(Some(held.positions_seen));
             limits.speed = limits.speed.or(Some(held.speed_seen));
             limits.torque = limits.torque.or(Some(held.torque_seen));
-            // of a file of before, that of an oscillation over these positions with this speed
-            let [low, high] = held.positions_seen;
-            let swing = held.speed_seen * held.speed_seen / (0.5 * (high - low));
-            let seen = held.acceleration_seen.unwrap_or(swing);
-            let seen = Some(seen).filter(|a| a.is_finite() && *a > 0.0);
+            let seen = Some(held.acceleration_seen).filter(|a| a.is_finite() && *a > 0.0);
             limits.acceleration = limits.acceleration.or(seen);
         }
     }

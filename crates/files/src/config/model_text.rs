@@ -131,6 +131,11 @@ impl ModelFile {
         }
         let document = Document::new(file, text);
         let mut raw: ModelToml = document.read()?;
+        if raw.held_out.iter().any(HeldOut::is_of_0_2) {
+            let problem = "is as version 0.2 wrote it, whose model files are no longer read";
+            let remedy = "fit again: `cft-ident lsq LOG.. -r ROBOT.toml -o MODEL.toml`";
+            return Err(document.value(&["held_out"], problem, remedy));
+        }
         let mut robot = RobotFile {
             robot: raw.robot,
             friction: raw.friction,

@@ -95,7 +95,7 @@ fn model(values: &[f64]) -> ModelFile {
                 half_width_95: vec![vec![at(9).abs()], vec![0.5]],
                 positions_seen: [-1.0, at(10).abs()],
                 speed_seen: 1.0,
-                acceleration_seen: Some(at(11).abs()),
+                acceleration_seen: at(11).abs(),
                 torque_seen: 2.0,
                 external_std: vec![0.25, 0.125],
                 external_99: 2.75,
@@ -197,6 +197,18 @@ fn a_model_is_written_for_people_and_read_back() {
         written.to_toml().unwrap(),
         text,
         "the same model gives the same bytes"
+    );
+}
+
+#[test]
+fn a_model_that_version_0_2_wrote_is_to_be_fitted_again() {
+    let text = model(&[1.0]).to_toml().unwrap();
+    let line = |line: &&str| !line.starts_with("acceleration_seen");
+    let old: Vec<&str> = text.lines().filter(line).collect();
+    assert!(old.len() < text.lines().count());
+    refused(
+        ModelFile::parse("old.toml", &old.join("\n")),
+        &["old.toml", "version 0.2", "fit again", "cft-ident lsq"],
     );
 }
 

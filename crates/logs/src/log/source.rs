@@ -40,9 +40,8 @@ pub struct Provenance {
 pub enum DataRole {
     /// Parameters were fitted to them.
     Fitted,
-    /// They could veto an effect.
-    Vetoed,
-    /// They were evaluated once, after everything was decided.
+    /// They were never fitted, and judged what was added.
+    #[serde(alias = "vetoed")]
     HeldOut,
 }
 
@@ -51,7 +50,6 @@ impl DataRole {
     pub fn word(self) -> &'static str {
         match self {
             DataRole::Fitted => "fitted",
-            DataRole::Vetoed => "vetoed",
             DataRole::HeldOut => "held-out",
         }
     }

@@ -133,22 +133,6 @@ fn metadata(notes: &[String]) -> Metadata {
     }
 }
 
-/// A recording of one message at the time 0, with notes as metadata.
-pub(super) fn single_message(
-    topic: &str,
-    kind: &str,
-    definition: &str,
-    body: &[u8],
-    notes: &[String],
-) -> McapResult<Vec<u8>> {
-    let mut writer = options().create(NoSeek::new(Vec::new()))?;
-    let channel = channel(&mut writer, topic, kind, definition)?;
-    writer.write_to_known_channel(&header(channel, 0, 0), body)?;
-    writer.write_metadata(&metadata(notes))?;
-    writer.finish()?;
-    Ok(writer.into_inner().into_inner())
-}
-
 /// How recordings are written. One thread compresses: the number of threads shows in the bytes.
 fn options() -> WriteOptions {
     WriteOptions::new()
@@ -176,7 +160,7 @@ fn stamp(origin: Instant, t: f64) -> io::Result<(i128, bool)> {
 }
 
 /// A list of names as CDR, without alignment before it.
-pub(super) fn cdr_names(names: &[String]) -> Vec<u8> {
+fn cdr_names(names: &[String]) -> Vec<u8> {
     let mut out = Vec::new();
     out.extend((names.len() as u32).to_le_bytes());
     for name in names {
@@ -215,7 +199,7 @@ fn message(out: &mut Vec<u8>, stamp_ns: i128, topic: &TopicColumns, names: &[u8]
 }
 
 /// Appends a list of numbers to CDR.
-pub(super) fn doubles(out: &mut Vec<u8>, values: impl ExactSizeIterator<Item = f64>) {
+fn doubles(out: &mut Vec<u8>, values: impl ExactSizeIterator<Item = f64>) {
     out.extend((values.len() as u32).to_le_bytes());
     // Alignment counts from after the first four bytes.
     while values.len() > 0 && !(out.len() - 4).is_multiple_of(8) {

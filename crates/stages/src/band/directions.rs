@@ -201,7 +201,6 @@ mod tests {
         let of = |low, high, speed_seen| HeldOut {
             positions_seen: [low, high],
             speed_seen,
-            acceleration_seen: None,
             ..HeldOut::default()
         };
         vec![of(-1.0, 0.5, 2.0), of(0.2, 1.4, 3.0)]

@@ -92,7 +92,7 @@ pub fn held_out(joint: &str, errors: &[Error], independent: f64) -> HeldOut {
             positions.fold(f64::NEG_INFINITY, f64::max),
         ],
         speed_seen: greatest(|e| e.speed),
-        acceleration_seen: Some(greatest(|e| e.acceleration)),
+        acceleration_seen: greatest(|e| e.acceleration),
         torque_seen: greatest(|e| e.torque),
         external_std: vec![f64::NAN; speed_edges.len() + 1],
         external_99: f64::NAN,

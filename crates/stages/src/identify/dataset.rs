@@ -17,9 +17,7 @@ pub struct Dataset {
     pub logs: Vec<Log>,
     /// Logs of one moving joint each, which a campaign gives to the friction filter.
     pub one_joint: Vec<Log>,
-    /// Logs that judge what is added to a model, and are never fitted.
-    pub veto: Vec<Log>,
-    /// Logs that are evaluated once, after everything is decided.
+    /// Logs that are never fitted and judge what is added to a model.
     pub held_out: Vec<Log>,
 }
 
@@ -30,16 +28,7 @@ impl Dataset {
             machine: machine.clone(),
             logs: logs.to_vec(),
             one_joint: Vec::new(),
-            veto: Vec::new(),
             held_out: Vec::new(),
-        }
-    }
-
-    /// The same with logs that judge what is added.
-    pub fn with_veto(self, veto: &[Log]) -> Self {
-        Dataset {
-            veto: veto.to_vec(),
-            ..self
         }
     }
 

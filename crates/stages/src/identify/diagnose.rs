@@ -65,7 +65,7 @@ pub struct Diagnosed {
     pub diagnosis: Diagnosis,
     /// The logs that it looked at.
     pub in_memory: InMemory,
-    /// Names of the logs, in order: fitted, veto, holdout.
+    /// Names of the logs, in order: fitted, holdout.
     pub logs: Vec<String>,
     /// Stretches in which something may push the robot, one sentence each.
     pub contacts: Vec<String>,
@@ -159,22 +159,14 @@ pub fn diagnose(
     if let Some(fault) = without_gains(machine).or(refused(machine, &data.logs, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
-    each_row_once(
-        machine,
-        &[
-            ("fit", &data.logs),
-            ("veto", &data.veto),
-            ("holdout", &data.held_out),
-        ],
-    )?;
+    each_row_once(machine, &[("fit", &data.logs), ("holdout", &data.held_out)])?;
     let groups = [
         (&data.logs, LogRole::Train),
-        (&data.veto, LogRole::Veto),
         (&data.held_out, LogRole::Holdout),
     ];
     let roles = |(logs, role): &(&Vec<Log>, LogRole)| vec![*role; logs.len()];
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
-    let all = [&*data.logs, &data.veto, &data.held_out].concat();
+    let all = [&*data.logs, &data.held_out].concat();
     let laws = known(&given.model);
     let together = machine.with_position_cutoffs(&all, &laws, control)?;
     let each = machine.settings_of_each(&all, &laws, &together, control)?;
@@ -196,11 +188,10 @@ pub fn diagnose(
         true => (file.clone(), file.friction_prior.clone()),
         false => before_these((name, file), fitted)?,
     };
-    let (fitted, vetoed) = (data.logs.len(), data.logs.len() + data.veto.len());
+    let fitted = data.logs.len();
     for (at, input) in in_memory.inputs.iter_mut().enumerate() {
         input.role = Some(match at {
             at if at < fitted => DataRole::Fitted,
-            at if at < vetoed => DataRole::Vetoed,
             _ => DataRole::HeldOut,
         });
     }

@@ -181,7 +181,7 @@ pub struct CandidateResult {
 pub struct BlockAside {
     pub log: String,
     #[serde(rename = "use")]
-    #[schemars(extend("enum" = ["veto", "holdout"]))]
+    #[schemars(extend("enum" = ["holdout"]))]
     pub role: &'static str,
     /// By the log's own clock \[s\].
     pub from_s: f64,

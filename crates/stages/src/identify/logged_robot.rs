@@ -441,6 +441,7 @@ impl LoggedRobot {
             // each log says when its joints rest
             rest_speed: Vec::new(),
             weighs_rests: true,
+            thin: false,
         }
     }
 

@@ -4,7 +4,7 @@
 use crate::setup::{
     Channels, Drive, KnownBeforehand, Problem, Sample, Searched, SetupReport, Thinner, search,
 };
-use cft_ident_core::motion;
+use cft_ident_core::motion::{self, FilterSettings};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::friction::sign;
 use cft_ident_logs::log::{DeclaredChannels as Logged, Layout};
@@ -111,7 +111,11 @@ fn sampled(
     control: &Control,
 ) -> Result<(Channels, Sample), IdentifyError> {
     let n = machine.robot.joints();
-    let settings = machine.settings();
+    let settings = FilterSettings {
+        // signs of the speed are off by half a sample at most, which is no matter here
+        thin: true,
+        ..machine.settings()
+    };
     let _work = control.begin("checking the set-up", None);
     let mut thinner = Thinner::new(n);
     let mut channels: Option<Channels> = None;

@@ -5,7 +5,7 @@ mod weights;
 use super::logged_robot::LoggedRobot;
 use super::setup_file::Declared;
 use crate::setup::{
-    Alternative, Cause, Change, ChannelKind, Correction, Drive, Finding, FindingKind,
+    Alternative, Cause, Change, ChannelKind, Correction, DecidedBy, Drive, Finding, FindingKind,
     FindingSeverity, Found, FrictionPower, LIMITS, Problem, Searched, Setting, SetupErrors,
     SetupEstimate, SetupReport, Undecided,
 };
@@ -75,6 +75,8 @@ impl Words<'_> {
     fn findings(&self, found: &Found) -> Vec<Finding> {
         let tied = found.tied.iter().take(3);
         let tied_with: Vec<Alternative> = tied.map(|change| self.said(change).entry).collect();
+        let conditions = found.conditions.iter();
+        let decided_by: Vec<DecidedBy> = conditions.map(|c| c.reported(self.joints)).collect();
         let finding = |change: Change| {
             let said = self.said(&change);
             let begin = if found.open {
@@ -104,6 +106,7 @@ impl Words<'_> {
                 },
                 with: said.entry.with,
                 tied_with: tied_with.clone(),
+                decided_by: decided_by.clone(),
                 ..self.with_errors(&found.errors, plain)
             }
         };

@@ -142,15 +142,19 @@ fn best(
     let [low, high] = free.range();
     let count = ((high - low) / STEP).ceil();
     let grid = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
-    // by what the steps that follow go down, and the nearest to the declared set-up of equals
-    let scored = |x: f64| {
+    // by what the steps that follow go down, and the nearest to the declared set-up of equals: it is tried first
+    let mut grid: Vec<f64> = grid.collect();
+    grid.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let mut best: Option<(f64, f64)> = None;
+    for x in grid {
         let change = free.change(problem, x);
-        let score = Trial::least(problem, (base, Some(&change)), every, &[few])?;
-        Some((score, x))
-    };
-    let lower =
-        |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0).then(a.1.abs().total_cmp(&b.1.abs()));
-    let (_, mut x) = grid.filter_map(scored).min_by(lower)?;
+        let most = best.map_or(f64::INFINITY, |best| best.0);
+        let score = Trial::least(problem, (base, Some(&change)), (every, most), &[few]);
+        if let Some(score) = score.filter(|score| *score < most) {
+            best = Some((score, x));
+        }
+    }
+    let (_, mut x) = best?;
     let change = free.change(problem, x);
     let rows = (every, f64::INFINITY);
     let found = Trial::new(problem, (base, Some(&change)), rows, &[few])?;

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::condition::DecidedBy;
+
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -137,6 +139,8 @@ pub struct Finding {
     pub joints: Vec<SetupErrors>,
     /// Other readings that fit as well.
     pub tied_with: Vec<Alternative>,
+    /// The conditions that decide whether it is sure: all of them hold then. Empty where another check found it.
+    pub decided_by: Vec<DecidedBy>,
     /// What is wrong, as a sentence.
     pub meaning: String,
 }
@@ -169,8 +173,15 @@ impl Finding {
             sure,
             joints: Vec::new(),
             tied_with: Vec::new(),
+            decided_by: Vec::new(),
             meaning,
         }
+    }
+
+    /// The numbers that decide, in words; nothing where there are none.
+    pub fn decided(&self) -> Option<String> {
+        let each: Vec<&str> = self.decided_by.iter().map(|c| c.text.as_str()).collect();
+        (!each.is_empty()).then(|| each.join(", "))
     }
 
     /// As it is reported: what is wrong, what to write, and what these data say as well.

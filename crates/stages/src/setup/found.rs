@@ -1,5 +1,6 @@
 //! What a search of the set-up comes to.
 
+use super::condition::SetupCondition;
 use super::correction::{Change, Correction};
 use super::estimate::SetupEstimate;
 use super::physics::Driven;
@@ -12,8 +13,10 @@ pub struct Found {
     pub change: Change,
     /// As declared, and put right; not finite where the declared positions belong to no pose.
     pub errors: [Vec<f64>; 2],
-    /// Beyond doubt: a fit refuses the logs.
+    /// Beyond doubt, all conditions hold: a fit refuses the logs.
     pub sure: bool,
+    /// By what that is decided.
+    pub conditions: Vec<SetupCondition>,
     /// Readings that fit alike are of other joints: these data cannot tell.
     pub open: bool,
     /// Other readings that these data do not distinguish from it.

@@ -12,7 +12,9 @@
 //! Blocks, parts and what counts as sure are those of the judge ([`cft_ident_core::judge`]).
 
 mod channels;
+mod condition;
 mod correction;
+mod decide;
 mod estimate;
 mod finding;
 mod found;
@@ -26,6 +28,7 @@ mod undecided;
 mod weight;
 
 pub(crate) use channels::{Channels, Drive};
+pub use condition::{DecidedBy, SetupCriterion};
 pub(crate) use correction::{Change, Correction};
 pub(crate) use estimate::SetupEstimate;
 pub use finding::{

@@ -55,6 +55,31 @@ pub(super) struct Rows {
     blocks: OnceLock<Vec<Vec<DMatrix<f64>>>>,
 }
 
+/// Shares of all rows after which it is looked whether the others need to be made.
+const LOOKS: [f64; 2] = [0.25, 0.5];
+
+/// The sums of products of the rows that are made so far, by joint.
+pub(super) struct RowsSoFar {
+    pub terms: Vec<Term>,
+    pub sums: Vec<DMatrix<f64>>,
+}
+
+impl RowsSoFar {
+    fn none(terms: &[Term], joints: &[JointRows]) -> Self {
+        let zeros = |rows: &JointRows| DMatrix::zeros(rows.columns, rows.columns);
+        Self {
+            terms: terms.to_vec(),
+            sums: joints.iter().map(zeros).collect(),
+        }
+    }
+
+    fn add(&mut self, joints: &[JointRows], rows: Range<usize>) {
+        for (sums, joint) in self.sums.iter_mut().zip(joints) {
+            *sums += joint.products(rows.clone());
+        }
+    }
+}
+
 /// Rows of so many columns, one behind the other.
 struct JointRows {
     columns: usize,
@@ -172,10 +197,25 @@ impl<'a> Problem<'a> {
         all.map(of).collect()
     }
 
-    /// Every so many rows of each block; none where most of them are no pose of the robot.
-    pub(super) fn rows(&self, robot: &Robot, by: &Correction, every: usize) -> Option<Rows> {
+    /// Every so many rows of each block, the blocks made in this order; none where most of them are no pose of the robot,
+    /// or where `is_hopeless` says by the sums of a part of the rows that the others need not be made.
+    pub(super) fn rows(
+        &self,
+        robot: &Robot,
+        by: &Correction,
+        (every, order): (usize, &[usize]),
+        is_hopeless: &mut dyn FnMut(&RowsSoFar) -> bool,
+    ) -> Option<Rows> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let places = self.places_of(robot);
+        let term = |unknown: usize| {
+            let of = |j: usize| Some((j, places[j].iter().position(|u| *u == unknown)?));
+            Term {
+                columns: (0..n).filter_map(of).collect(),
+                bound: Bound::NONE,
+            }
+        };
+        let terms: Vec<Term> = (0..self.first_own(robot, n)).map(term).collect();
         let most = self.sample.len() / every + 1;
         let no_rows = |(places, moves): (&Vec<usize>, &bool)| {
             let columns = places.len() + n;
@@ -187,11 +227,14 @@ impl<'a> Problem<'a> {
         let mut joints: Vec<JointRows> = places.iter().zip(&self.moving).map(no_rows).collect();
         let mut carried = Carried::new(n);
         let mut y = vec![0.0; n * p];
-        let mut of_blocks = Vec::with_capacity(self.blocks.list.len());
+        let mut of_blocks = vec![0..0; self.blocks.list.len()];
         let (mut good, mut all) = (0, 0);
-        for block in &self.blocks.list {
+        let (mut summed, mut part) = (0, RowsSoFar::none(&terms, &joints));
+        let mut shares = LOOKS.iter().peekable();
+        for &b in order {
             let first = good;
-            let rows = block.pieces.iter().flat_map(|(_, rows)| rows.clone());
+            let rows = self.blocks.list[b].pieces.iter();
+            let rows = rows.flat_map(|(_, rows)| rows.clone());
             for k in rows.filter(|k| k % every == 0) {
                 all += 1;
                 if !(self.channels).carry(robot, self.sample.row(k), by, &mut carried) {
@@ -204,28 +247,39 @@ impl<'a> Problem<'a> {
                 good += 1;
                 let all = joints.iter_mut().enumerate();
                 for (j, rows) in all.filter(|(j, _)| self.moving[*j]) {
-                    let shared = places[j].len() - self.columns.own[j].len();
                     let data = &mut rows.data;
-                    data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));
-                    let own = self.columns.own[j].iter();
-                    data.extend(own.map(|own| own_column(*own, &carried, j)));
-                    data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
-                    data.resize(data.len().next_multiple_of(stride(rows.columns)), 0.0);
+                    let at = data.len();
+                    data.resize(at + stride(rows.columns), 0.0);
+                    let (shared, rest) =
+                        data[at..].split_at_mut(places[j].len() - self.columns.own[j].len());
+                    let y = &y[j * p..(j + 1) * p];
+                    for (to, place) in shared.iter_mut().zip(&places[j]) {
+                        *to = y[*place];
+                    }
+                    let (own, torques) = rest.split_at_mut(self.columns.own[j].len());
+                    for (to, own) in own.iter_mut().zip(&self.columns.own[j]) {
+                        *to = own_column(*own, &carried, j);
+                    }
+                    torques[..n].copy_from_slice(&carried.tau[j * n..(j + 1) * n]);
                 }
             }
-            of_blocks.push(first..good);
-        }
-        let term = |unknown: usize| {
-            let of = |j: usize| Some((j, places[j].iter().position(|u| *u == unknown)?));
-            Term {
-                columns: (0..n).filter_map(of).collect(),
-                bound: Bound::NONE,
+            of_blocks[b] = first..good;
+            if shares
+                .next_if(|share| good as f64 >= *share * most as f64)
+                .is_some()
+            {
+                part.add(&joints, summed..good);
+                summed = good;
+                if is_hopeless(&part) {
+                    return None;
+                }
             }
-        };
+        }
+        part.add(&joints, summed..good);
         (good > 0 && 2 * good >= all).then(|| Rows {
-            terms: (0..self.first_own(robot, n)).map(term).collect(),
             count: good,
-            total: joints.iter().map(|rows| rows.products(0..good)).collect(),
+            total: part.sums,
+            terms,
             joints,
             of_blocks,
             blocks: OnceLock::new(),

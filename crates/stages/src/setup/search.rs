@@ -5,22 +5,28 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::LIMITS;
-use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::estimate::{SetupEstimate, estimates};
 use super::found::{Found, Searched};
-use super::hypotheses::{self, oddity, same_line, same_place};
+use super::hypotheses::{self, same_place};
 use super::physics::Broken;
 use super::problem::Problem;
 use super::trial::{Compared, Trial};
-use super::undecided::{proportion, undecided};
+use super::undecided::undecided;
 use super::weight::weights;
 use cft_ident_core::judge::NUMBERS;
 
 /// A reading with all that decides on it.
-struct Judged {
-    trial: Trial,
-    broken: Broken,
+pub(super) struct Judged {
+    pub trial: Trial,
+    pub broken: Broken,
+}
+
+impl Judged {
+    /// Joints that their friction drives, or whose inertia is below zero.
+    pub fn turned(&self) -> usize {
+        self.broken.turned.len()
+    }
 }
 
 /// Looks for one mistake, and for a second one when the first is put right; `stopped` ends it early.
@@ -67,8 +73,8 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
 
 type OneEstimate = Option<(SetupEstimate, [Vec<f64>; 2])>;
 
-struct Look<'a> {
-    problem: &'a Problem<'a>,
+pub(super) struct Look<'a> {
+    pub problem: &'a Problem<'a>,
     stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -260,118 +266,6 @@ impl Look<'_> {
         (firsts, pairs)
     }
 
-    /// The reading that is reported, beside the best value on no list and the best whose factor is not determined.
-    fn decide(
-        &self,
-        declared: Option<&Judged>,
-        list: &[Judged],
-        (fitted, free): (Option<&Trial>, Option<&Trial>),
-    ) -> Option<Found> {
-        let everyone = self.problem.channels_that_move();
-        // what physics breaks counts first, then the error; the simplest of equals is first in the list
-        let turned = |j: &Judged| j.broken.turned.len();
-        let mut order: Vec<&Judged> = list.iter().collect();
-        order.sort_by(|a, b| turned(a).cmp(&turned(b)).then(a.trial.order(&b.trial)));
-        let best = self.plainer(&order)?;
-        let change = best.trial.change.clone()?;
-        let after = best.trial.errors();
-        let (mut seen, mut before) = (everyone.clone(), vec![f64::NAN; after.len()]);
-        let (mut mended, mut confirmed) = (false, true);
-        if let Some(d) = declared {
-            let compared = Compared::of(self.problem, &d.trial, &best.trial);
-            mended = turned(best) < turned(d);
-            before = d.trial.errors();
-            let better = &compared.better;
-            let absurd = better.iter().any(|j| before[*j] > LIMITS.unexplained);
-            confirmed = compared.agreed >= NUMBERS.confirmed;
-            // what is not absurd is a factor, or most of what is missed, and sound machines leave as little
-            let left = best.trial.square(better) / d.trial.square(better);
-            let sound = || after.iter().all(|e| *e <= LIMITS.sound);
-            let plain = || change.times(1.0).is_some() || left < LIMITS.same && sound();
-            let likely = match absurd {
-                true => compared.agreed > 0.0,
-                false => confirmed && plain(),
-            };
-            // behind gears and linkages a motor is of several joints
-            let own = self.problem.channels.drive != Drive::Joints || own_gain(&change, better);
-            // the best one makes a joint worse: nothing on the list is it, and no lesser one takes its place
-            if compared.harms || !(mended || likely && own) {
-                return None;
-            }
-            // physics alone shows where no error changes
-            if !compared.better.is_empty() {
-                seen = compared.better;
-            }
-        }
-        if fitted.is_some_and(|f| f.square(&seen) * LIMITS.far < best.trial.square(&seen)) {
-            return None;
-        }
-        // another value of the same thing, clearly better, contradicts that of the list
-        let contradicts = |f: &Trial| {
-            let value = f.change.as_ref().filter(|_| change.times(1.0).is_some());
-            let same = value.is_some_and(|c| c.is_value_of(&change));
-            let closer = f.whole() * (1.0 + LIMITS.same) < best.trial.whole();
-            let gain = || best.trial.gain(f, &everyone);
-            same && closer && gain().is_beyond(NUMBERS.screen, None)
-        };
-        if fitted.is_some_and(contradicts) {
-            return None;
-        }
-        // nor does a lesser one take the place of what is wrong by a factor that these data leave open
-        if !mended && free.is_some_and(|f| f.whole() * LIMITS.far < best.trial.whole()) {
-            return None;
-        }
-        let untold = |j: &Trial| !j.gain(&best.trial, &seen).is_beyond(NUMBERS.screen, None);
-        let near = |j: &Trial| j.square(&seen) < LIMITS.far * best.trial.square(&seen) || untold(j);
-        let others = order.iter().map(|j| (turned(j), &j.trial));
-        let others = others.filter(|(t, j)| j.change != best.trial.change && *t <= turned(best));
-        let others: Vec<&Trial> = others.map(|(_, j)| j).filter(|j| near(j)).collect();
-        let tied: Vec<Change> = others.iter().filter_map(|j| j.change.clone()).collect();
-        // a ratio that its neighbours are as good as, and that leaves most of the error, is an estimate
-        let ratio = |c: &Change| c.times(1.0).is_some() && self.oddity(c) > 0;
-        let neighbour = |c: &Change| ratio(c) && c.joints() == change.joints();
-        let most = |d: &Judged| best.trial.whole() <= LIMITS.floor * d.trial.whole();
-        if ratio(&change) && tied.iter().any(neighbour) && !declared.is_none_or(most) {
-            return None;
-        }
-        let made = change.clone();
-        let elsewhere = |j: &&&Trial| {
-            let other = j.change.as_ref();
-            other.is_some_and(|other| !same_place(&made, other))
-        };
-        let open = others.iter().filter(elsewhere).any(|j| untold(j));
-        let beside = fitted.is_some_and(|f| {
-            let own = f.change.as_ref().map(Change::joints);
-            own != Some(change.joints()) && near(f)
-        });
-        let absurd: Vec<usize> = (seen.iter().copied())
-            .filter(|j| before[*j].is_nan() || before[*j] > LIMITS.unexplained)
-            .collect();
-        let repaired = absurd.iter().all(|j| after[*j] <= LIMITS.sound)
-            && (!absurd.is_empty() || mended && turned(best) == 0);
-        let alike = tied.iter().all(|other| same_line(&change, other));
-        // no line mends it, and `inspect` knows it surely where the log has velocities
-        let velocity = matches!(change, Change::Velocity(..));
-        let together = change.joints().into_iter().find_map(|j| {
-            let (other, _) = proportion(self.problem, &everyone, j)?;
-            Some([j, other])
-        });
-        Some(Found {
-            sure: repaired
-                && (confirmed || mended)
-                && alike
-                && !beside
-                && together.is_none()
-                && !velocity,
-            errors: [before, after],
-            tied,
-            change,
-            open,
-            together,
-            beyond_limits: Vec::new(),
-        })
-    }
-
     /// A mistake that the limits of the file show and the errors do not; a factor is for the fit to estimate.
     fn within_limits(&self, declared: &Judged) -> Option<Found> {
         let beyond_limits = self.problem.beyond_limits(&declared.trial.by);
@@ -402,39 +296,13 @@ impl Look<'_> {
         Some(Found {
             errors: [before, best.errors()],
             sure: false,
+            conditions: Vec::new(),
             open: !tied.iter().all(|other| same_place(&change, other)),
             tied,
             change,
             together: None,
             beyond_limits,
         })
-    }
-
-    /// How far from what people write the factor of a change is; 0 where it has none.
-    fn oddity(&self, change: &Change) -> u32 {
-        match change {
-            Change::Scale(_, _, f) | Change::Gear(_, f) => oddity(*f, &self.problem.known.ratios),
-            _ => 0,
-        }
-    }
-
-    /// The first reading, or another factor of its channel that blocks do not distinguish and people write more often.
-    fn plainer<'j>(&self, order: &[&'j Judged]) -> Option<&'j Judged> {
-        let best = *order.first()?;
-        let odd = |j: &Judged| j.trial.change.as_ref().map_or(0, |c| self.oddity(c));
-        let alike = |j: &&&Judged| match (&best.trial.change, &j.trial.change) {
-            (Some(best), Some(other)) => other.is_value_of(best),
-            _ => false,
-        };
-        let everyone = self.problem.channels_that_move();
-        let tied = |j: &&&Judged| {
-            let gain = j.trial.gain(&best.trial, &everyone);
-            let near = j.trial.whole() <= best.trial.whole() * (1.0 + LIMITS.same);
-            near && !gain.is_beyond(NUMBERS.screen, None)
-        };
-        let near = order.iter().filter(alike).filter(tied);
-        // the first of equals
-        Some(near.min_by_key(|j| odd(j)).copied().unwrap_or(best))
     }
 
     /// Errors with gravity and without, where the fit needs none: fewer parameters, and no joint is worse.
@@ -464,14 +332,4 @@ fn keep(best: &Mutex<Vec<f64>>, score: f64) {
     let at = best.partition_point(|other| *other <= score);
     best.insert(at, score);
     best.truncate(LIMITS.short_list);
-}
-
-/// Whether the joints of a change gain by it themselves: each mistake of it shows where it was made.
-fn own_gain(change: &Change, better: &[usize]) -> bool {
-    match change {
-        Change::Two(a, b) => own_gain(a, better) && own_gain(b, better),
-        Change::Exchange(_, a, b) => better.contains(a) && better.contains(b),
-        Change::Reverse | Change::Gravity(_) => !better.is_empty(),
-        one => one.joints().iter().all(|j| better.contains(j)),
-    }
 }

@@ -8,8 +8,10 @@ use nalgebra::{DMatrix, DVector};
 use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
-use super::problem::{Problem, Rows};
-use cft_ident_core::judge::{ErrorGain, FitToAll, NUMBERS, Terms, agreement_on_share, compare};
+use super::problem::{Problem, Rows, RowsSoFar};
+use cft_ident_core::judge::{
+    ErrorGain, FitToAll, NUMBERS, Term, Terms, agreement_on_share, compare,
+};
 use cft_ident_core::robot::Robot;
 
 /// A hypothesis as it was fitted.
@@ -41,38 +43,44 @@ struct Mixed {
 }
 
 impl Mixed {
+    /// None where most rows belong to no pose, or the whole error is surely above `most` by a part of them already.
     fn new(
         problem: &Problem,
         (base, change): (&Correction, Option<&Change>),
-        every: usize,
+        (every, most): (usize, f64),
         same: &[&Trial],
     ) -> Option<Self> {
         let by = change.map_or_else(|| base.clone(), |change| base.with(change));
         let joints = problem.channels.drive == Drive::Joints;
         let serves = |same: &&&Trial| joints && same.by.moves_as(&by);
+        let mix = problem.channels.mix(&by);
         let (robot, rows) = match same.iter().find(serves) {
             Some(same) => (same.robot.clone(), Arc::clone(&same.rows)),
             None => {
                 let robot = problem.robot_under(&by)?;
-                let rows = problem.rows(&robot, &by, every)?;
+                // torques of joints are the same whatever their positions are
+                let first = same.first().filter(|_| joints && most.is_finite());
+                let weights = first.map(|same| weights(problem, &same.rows.total, &mix));
+                let mut expected = 0.0;
+                let mut is_hopeless = |part: &RowsSoFar| {
+                    let Some(weights) = &weights else {
+                        return false;
+                    };
+                    // what is far from hopeless is not looked at again
+                    if expected > 0.0 && 2.0 * expected < most {
+                        return false;
+                    }
+                    let terms = terms(&part.terms, weights.clone());
+                    let fit = FitToAll::new(&part.sums, &mix, &terms);
+                    expected = fit.least().unwrap_or(0.0);
+                    fit.is_above(expected, most)
+                };
+                let order = hardest_first(problem.blocks.list.len(), same);
+                let rows = problem.rows(&robot, &by, (every, &order), &mut is_hopeless)?;
                 (robot, Arc::new(rows))
             }
         };
-        let mix = problem.channels.mix(&by);
-        let weight = |(j, (sums, mix)): (usize, (&DMatrix<f64>, &DVector<f64>))| {
-            let torques = sums.nrows() - mix.len();
-            let of_torques = sums.view((torques, torques), (mix.len(), mix.len()));
-            let power = mix.dot(&(of_torques * mix));
-            let counts = problem.moving[j] && power > 0.0;
-            if counts { power.recip() } else { 0.0 }
-        };
-        let joints = rows.total.iter().zip(&mix).enumerate();
-        let terms = Terms {
-            list: rows.terms.clone(),
-            weights: joints.map(weight).collect(),
-            prior: (DMatrix::zeros(0, 0), DVector::zeros(0)),
-            ridge: NUMBERS.ridge,
-        };
+        let terms = terms(&rows.terms, weights(problem, &rows.total, &mix));
         Some(Self {
             by,
             robot,
@@ -87,6 +95,38 @@ impl Mixed {
     }
 }
 
+/// By which each joint's squares count: those of its own torque, 0 where it does not move.
+fn weights(problem: &Problem, total: &[DMatrix<f64>], mix: &[DVector<f64>]) -> Vec<f64> {
+    let weight = |(j, (sums, mix)): (usize, (&DMatrix<f64>, &DVector<f64>))| {
+        let torques = sums.nrows() - mix.len();
+        let of_torques = sums.view((torques, torques), (mix.len(), mix.len()));
+        let power = mix.dot(&(of_torques * mix));
+        let counts = problem.moving[j] && power > 0.0;
+        if counts { power.recip() } else { 0.0 }
+    };
+    total.iter().zip(mix).enumerate().map(weight).collect()
+}
+
+fn terms(list: &[Term], weights: Vec<f64>) -> Terms {
+    Terms {
+        list: list.to_vec(),
+        weights,
+        prior: (DMatrix::zeros(0, 0), DVector::zeros(0)),
+        ridge: NUMBERS.ridge,
+    }
+}
+
+/// Blocks in order of their error by the first trial: what is hardest to foresee as declared shows first that a
+/// hypothesis is no better.
+fn hardest_first(blocks: usize, same: &[&Trial]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..blocks).collect();
+    if let Some(same) = same.first() {
+        let error = |b: &usize| same.left_out[*b].iter().sum::<f64>();
+        order.sort_by(|a, b| error(b).total_cmp(&error(a)));
+    }
+    order
+}
+
 impl Trial {
     /// Fits a change upon `base` to every so many rows. `same` are trials of these rows, whose columns serve where only
     /// torques differ. None where most rows belong to no pose, or the whole error is surely above `most`.
@@ -96,13 +136,8 @@ impl Trial {
         (every, most): (usize, f64),
         same: &[&Trial],
     ) -> Option<Self> {
-        let of = Mixed::new(problem, change, every, same)?;
-        // what is hardest to foresee as declared shows first that a hypothesis is no better
-        let mut order: Vec<usize> = (0..of.rows.blocks()).collect();
-        if let Some(same) = same.first() {
-            let error = |b: &usize| same.left_out[*b].iter().sum::<f64>();
-            order.sort_by(|a, b| error(b).total_cmp(&error(a)));
-        }
+        let of = Mixed::new(problem, change, (every, most), same)?;
+        let order = hardest_first(of.rows.blocks(), same);
         let left_out = of.fit().blocks((&order, |b| of.rows.block(b)), most)?;
         let mut errors = left_out.errors;
         for squares in &mut errors {
@@ -123,14 +158,14 @@ impl Trial {
         })
     }
 
-    /// The whole error of such a fit to all its blocks; none where there is none.
+    /// The whole error of such a fit to all its blocks; none where there is none, or where it is surely above `most`.
     pub fn least(
         problem: &Problem,
         change: (&Correction, Option<&Change>),
-        every: usize,
+        rows: (usize, f64),
         same: &[&Trial],
     ) -> Option<f64> {
-        Mixed::new(problem, change, every, same)?.fit().least()
+        Mixed::new(problem, change, rows, same)?.fit().least()
     }
 
     /// Errors of each block by the fit of a change to all rows, all joints together.
@@ -139,7 +174,7 @@ impl Trial {
         change: (&Correction, Option<&Change>),
         same: &Trial,
     ) -> Option<Vec<f64>> {
-        let all = Mixed::new(problem, change, 1, &[same])?;
+        let all = Mixed::new(problem, change, (1, f64::INFINITY), &[same])?;
         let fit = all.fit();
         let blocks = 0..all.rows.blocks();
         Some(blocks.map(|b| fit.error_of(all.rows.block(b))).collect())

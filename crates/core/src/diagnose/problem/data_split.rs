@@ -13,9 +13,7 @@ use crate::robot::Robot;
 pub enum LogRole {
     /// Fitted; parts may be set aside.
     Train,
-    /// Judges what is added, and is never fitted.
-    Veto,
-    /// Looked at once, after everything is decided.
+    /// Never fitted: judges what is added.
     Holdout,
 }
 
@@ -212,7 +210,7 @@ mod tests {
 
     #[test]
     fn no_row_has_two_uses_and_other_uses_keep_their_distance() {
-        let (split, stretches, filters) = split(&[LogRole::Train, LogRole::Veto]);
+        let (split, stretches, filters) = split(&[LogRole::Train]);
         for (i, a) in split.pieces.iter().enumerate() {
             let later = split.pieces[i + 1..].iter();
             for b in later.filter(|b| b.stretch == a.stretch) {
@@ -231,7 +229,7 @@ mod tests {
 
     #[test]
     fn logs_that_are_held_out_leave_the_training_logs_whole() {
-        let (split, stretches, filters) = split(&[LogRole::Train, LogRole::Veto, LogRole::Holdout]);
+        let (split, stretches, filters) = split(&[LogRole::Train, LogRole::Holdout]);
         assert!(split.set_aside.is_empty());
         let logs = split.logs((&stretches, &filters, &[0.0]), LogRole::Train);
         assert_eq!(logs[0].pieces.len(), 1);

@@ -1,10 +1,9 @@
-//! Vertices of the meshes that a URDF names: where their files are, and what STL and OBJ files hold.
+//! Vertices of the meshes that a URDF names: where their files are, and what STL files hold.
 
 use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::collada;
 use crate::config::text_file::text_of;
 use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::tree::space::Vector;
@@ -85,17 +84,17 @@ fn package_of(folder: &Path) -> Option<String> {
     Some(name.trim().to_owned())
 }
 
-/// Vertices of a mesh from the bytes of an STL, OBJ or COLLADA file; `format` is the ending of its name.
+/// Vertices of a mesh from the bytes of an STL file; `format` is the ending of its name.
 ///
 /// # Errors
 /// What is wrong with the bytes.
 pub fn vertices(format: &str, bytes: &[u8]) -> Result<Vec<Vector>, String> {
-    let found = match format.to_ascii_lowercase().as_str() {
-        "stl" => stl(bytes)?,
-        "obj" => listed(bytes, "v")?,
-        "dae" => collada::vertices(&String::from_utf8_lossy(bytes))?,
-        _ => return Err("is neither STL nor OBJ nor COLLADA (.dae); convert it".to_owned()),
-    };
+    if !format.eq_ignore_ascii_case("stl") {
+        return Err(
+            "is no STL file; convert it to STL, which a mesh for collisions mostly is".to_owned(),
+        );
+    }
+    let found = stl(bytes)?;
     match found.is_empty() {
         true => Err("holds no vertex".to_owned()),
         false => Ok(found),
@@ -111,7 +110,7 @@ fn stl(bytes: &[u8]) -> Result<Vec<Vector>, String> {
     let start = bytes.trim_ascii_start().get(..5).unwrap_or_default();
     // heads of binary files begin with this word too: then the length says
     if start.eq_ignore_ascii_case(b"solid") && room != Some(body.len() as u64) {
-        let vertices = listed(bytes, "vertex")?;
+        let vertices = listed(bytes)?;
         let last = bytes.trim_ascii_end().rsplit(|b| *b == b'\n').next();
         let last = last.unwrap_or_default().trim_ascii_start();
         let ends = last.get(..8).unwrap_or_default();
@@ -143,15 +142,15 @@ fn stl(bytes: &[u8]) -> Result<Vec<Vector>, String> {
     Ok(out)
 }
 
-/// The three numbers behind each `key` that begins a line.
-fn listed(bytes: &[u8], key: &str) -> Result<Vec<Vector>, String> {
+/// The three numbers of each line that begins with `vertex`.
+fn listed(bytes: &[u8]) -> Result<Vec<Vector>, String> {
     let mut out = Vec::new();
     for (k, line) in bytes.split(|b| *b == b'\n').enumerate() {
         let line: Cow<str> = String::from_utf8_lossy(line);
         let mut words = line.split_ascii_whitespace();
         if !words
             .next()
-            .is_some_and(|word| word.eq_ignore_ascii_case(key))
+            .is_some_and(|word| word.eq_ignore_ascii_case("vertex"))
         {
             continue;
         }
@@ -215,12 +214,11 @@ mod tests {
     }
 
     #[test]
-    fn obj_gives_its_vertices_and_no_normals() {
-        let text = "# a\no part\nv 0 0 0\nvn 9 9 9\nv 1.5 0 0 1.0\nvt 7 7\nv 0 -0.2 3\nf 1 2 3\n";
-        assert_eq!(vertices("obj", text.as_bytes()).unwrap(), CORNERS);
-        let short = vertices("obj", b"v 1 2\n").unwrap_err();
-        assert_eq!(short, "line 1: `v 1 2` has not three finite numbers");
-        assert!(vertices("ply", b"ply").unwrap_err().contains("convert it"));
+    fn other_formats_are_to_be_converted() {
+        for format in ["obj", "dae", "ply", ""] {
+            let problem = vertices(format, b"v 0 0 0").unwrap_err();
+            assert!(problem.contains("convert it to STL"), "{problem}");
+        }
     }
 
     #[test]

@@ -7,7 +7,6 @@
 
 pub(super) mod beside;
 pub mod capsules;
-mod collada;
 mod link;
 pub mod mesh;
 mod parts;

@@ -148,17 +148,6 @@ impl<'a> Element<'a, '_> {
         self.node.range()
     }
 
-    /// Its text, up to the first element in it.
-    pub(super) fn text(&self) -> &'a str {
-        self.node.text().unwrap_or_default()
-    }
-
-    /// Itself and all elements in it, however deep.
-    pub(super) fn descendants(self) -> impl Iterator<Item = Self> {
-        let elements = self.node.descendants().filter(Node::is_element);
-        elements.map(move |node| Self { node, ..self })
-    }
-
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
         self.node.attribute(name)
     }

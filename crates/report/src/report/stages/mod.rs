@@ -4,7 +4,6 @@
 pub mod compare;
 pub mod diagnose;
 mod diagnose_words;
-pub mod diff;
 pub mod excite;
 mod first_screen;
 mod formulas;
