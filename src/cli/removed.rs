@@ -34,7 +34,7 @@ const OPTIONS: [(&[&str], &str, &str); 7] = [
     (
         &["diagnose"],
         "--cautious",
-        "leave it out: an effect is written as far as the parts of the data agree on it",
+        "leave it out: an effect is written as far as its amplitude is sure",
     ),
     (
         &["excite"],

@@ -66,7 +66,7 @@ fn committed_results_have_the_schema_of_their_command() {
             Some("cft-ident/friction/1") => Kind::Friction,
             Some("cft-ident/lsq/1") => Kind::Lsq,
             Some("cft-ident/validate/1") => Kind::Validate,
-            Some("cft-ident/diagnose/2") => Kind::Diagnose,
+            Some("cft-ident/diagnose/3") => Kind::Diagnose,
             Some(other) => panic!("{other}"),
             None => continue,
         };

@@ -26,6 +26,8 @@ use cft_ident_core::robot::Robot;
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DiagnosisResult {
     pub verdict: DiagnosisVerdict,
+    /// The errors that count: null where the data are at fault.
+    pub headline: Option<Headline>,
     /// Effects that gain on blocks left out, in the order in which they were found.
     pub steps: Vec<DiagnosisStep>,
     /// Errors of the model as it was given.
@@ -58,6 +60,18 @@ pub struct DiagnosisResult {
     pub faults: Vec<DataFault>,
     /// What the check of the set-up found.
     pub setup: Vec<Finding>,
+}
+
+/// Root mean square over the joints of their relative errors while they move: on held-out data where there are any.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub struct Headline {
+    /// By the given model.
+    pub before: f64,
+    /// By the model that is written.
+    pub after: f64,
+    pub held_out: bool,
+    /// Rows at rest are not counted.
+    pub moving: bool,
 }
 
 /// What a diagnosis comes to.
@@ -201,6 +215,7 @@ impl DataFault {
     pub fn result(&self) -> DiagnosisResult {
         DiagnosisResult {
             verdict: DiagnosisVerdict::DataFault,
+            headline: None,
             steps: Vec::new(),
             before: None,
             after: None,
@@ -234,6 +249,21 @@ impl Diagnosed {
         }
     }
 
+    /// The errors that count.
+    fn headline(&self) -> Headline {
+        let (before, after) = (&self.diagnosis.before, self.diagnosis.errors_now());
+        let of = |errors: &SplitErrors| {
+            let counted = errors.holdout.as_ref().unwrap_or(&errors.train);
+            counted.overall.mean_relative_error_moving
+        };
+        Headline {
+            before: of(before),
+            after: of(after),
+            held_out: after.holdout.is_some(),
+            moving: true,
+        }
+    }
+
     /// The diagnosis as a document holds it.
     pub fn result(&self, machine: &LoggedRobot) -> DiagnosisResult {
         let d = &self.diagnosis;
@@ -264,6 +294,7 @@ impl Diagnosed {
         let others = d.candidates.iter().map(|c| candidate(machine, c));
         DiagnosisResult {
             verdict: self.verdict(),
+            headline: Some(self.headline()),
             steps: d.steps.iter().map(|s| self.step(machine, s)).collect(),
             before: Some(d.before.clone()),
             after: Some(d.after.clone()),

@@ -183,7 +183,7 @@ fn steps(diagnosis: &Value) -> Rendered {
             ),
             text(&step["family"]).to_owned(),
             numbers.join(", "),
-            percent(number(&step["cv_gain"])),
+            percent(number(&step["share"])),
             text(&step["status"]).to_owned(),
             significant(number(&step["shrinkage"]), 2),
             percent(number(&step["holdout_before"])),
