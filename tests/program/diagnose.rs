@@ -114,7 +114,7 @@ fn the_few_strokes_of_a_short_log_agree_on_asymmetric_friction_and_unseen_data_g
     assert_eq!(first["effect"], "asymmetric-friction");
     assert_eq!(
         (&first["status"], &first["written"]),
-        (&"indicated".into(), &true.into())
+        (&"confirmed".into(), &true.into())
     );
     assert!(first["share"].as_f64().unwrap() > 0.5, "{first}");
     let written = effects(&found);

@@ -30,7 +30,10 @@ const ROOMS: &[(&str, &str)] = &[
     ("friction", "explain math robot block motion verdict"),
     ("inertia", "explain math robot block motion verdict"),
     ("judge", "math"),
-    ("diagnose", "explain math robot block motion effect judge"),
+    (
+        "diagnose",
+        "explain math number robot block motion effect judge",
+    ),
     ("validate", "math robot block motion verdict"),
     ("inspect", "math number block log"),
     ("setup", "math number robot motion inertia judge"),

@@ -215,7 +215,7 @@ fn pieces_of_a_link_are_held_and_those_that_are_not_there_are_reported() {
     run.stderr(contains(
         "collision shapes that no capsule holds: lower: package://elsewhere/hand.stl is in no folder of its package",
     ))
-    .stderr(contains("other.STL: vertices beyond 1e30 m; put the files"))
+    .stderr(contains("other.STL: vertices beyond 1e30 m; and 1 more of the kind; put the files"))
     .stderr(contains("hand.dae: is no STL file; convert it to STL"));
     let text = fs::read_to_string(path("arm.toml")).unwrap();
     assert!(

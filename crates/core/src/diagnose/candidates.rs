@@ -4,7 +4,7 @@ use super::problem::case::Case;
 pub use super::problem::pass::Candidate;
 use crate::effect::{
     Added, AugmentedModel, Cover, Family, LAWS, Law, Number, Place, Role, Rule, Search, Seen,
-    ShapeRange,
+    ShapeSpan,
 };
 use crate::judge::Bound;
 use crate::number;
@@ -132,7 +132,7 @@ pub fn refined_shapes(
     effect: &Added,
 ) -> Vec<(usize, Bound)> {
     let ranges = shape_ranges(model, case, cover, effect).into_iter();
-    let of = |(k, range): (usize, ShapeRange)| {
+    let of = |(k, range): (usize, ShapeSpan)| {
         let here = effect.shape[k];
         let bound = Bound {
             least: (range.least - here).min(0.0),
@@ -149,11 +149,11 @@ fn shape_ranges(
     case: &Case,
     cover: &Cover,
     effect: &Added,
-) -> Vec<ShapeRange> {
+) -> Vec<ShapeSpan> {
     let law = effect.law;
     let seen = seen(model, cover, case, effect.place);
     let ranges = law.limits_on(cover, effect.place, &effect.shape);
-    let of = |(k, range): (usize, ShapeRange)| {
+    let of = |(k, range): (usize, ShapeSpan)| {
         let known = bound(effect, law.shape[k], &seen);
         range.within(known.least, known.most)
     };

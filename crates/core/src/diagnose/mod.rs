@@ -21,6 +21,7 @@ mod outcome;
 mod polish;
 mod prepared;
 mod problem;
+mod refit;
 mod run;
 mod search;
 mod searched;
@@ -32,15 +33,15 @@ mod watch;
 pub use error::DiagnoseError;
 pub use outcome::{
     Diagnosis, FormulaEnd, FormulaPicture, FoundEffect, FoundFormula, FrictionChange,
-    LeftCandidate, SplitErrors, StepStatus, Symmetry,
+    LeftCandidate, NotWritten, SplitErrors, StepStatus, Symmetry,
 };
 pub use problem::case::{Case, Wishes};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::formula_numbers::{FORMULA_NUMBERS, FormulaNumbers};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown, value_of};
+pub use refit::{ModelProposal, ModelRefit};
 pub use run::diagnose;
-pub use steps::{NotWritten, Proposal, Refit};
 pub use unexplained::Unexplained;
 pub use unexplained::dependence::Dependence;
 pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};

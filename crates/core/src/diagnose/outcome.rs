@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::problem::data_split::SetAside;
 use super::problem::unknowns::Unknown;
-use super::steps::NotWritten;
 use super::unexplained::Unexplained;
 use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::{Errors, JointChange};
@@ -26,6 +25,20 @@ pub enum StepStatus {
     Indicated,
     /// It gains on blocks left out, and is not written.
     Seen,
+}
+
+/// Why an effect is not written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotWritten {
+    /// Its amplitude is too uncertain, or it can be measured and is not sure enough.
+    Unsure,
+    /// Beside the others a bound takes all of it, or what it cannot be without; or its shape is at an end of its range,
+    /// beyond which another law begins.
+    Bound,
+    /// It takes off no joint's error what one would notice.
+    Small,
+    /// Held-out data are worse with it.
+    HeldOut,
 }
 
 /// One effect that gained on blocks left out.

@@ -14,7 +14,7 @@ use super::problem::data_split::{DataSplit, LogRole, Piece};
 use super::problem::fit::{Fitted, fit};
 use super::problem::pass::{ColumnLayout, Data};
 use super::problem::unknowns::{Unknowns, step};
-use super::steps::Refit;
+use super::refit::ModelRefit;
 use super::unexplained::errors::Errors;
 use crate::effect::{Added, AugmentedModel, Cover};
 use crate::judge::{BlockSums, Blocks, BlocksLeftOut, LogRows, Term, Terms, compare, divide};
@@ -24,7 +24,7 @@ use crate::robot::model::JointFriction;
 /// The declared model fitted, and the data divided.
 pub struct PreparedCase<'a> {
     pub case: &'a Case,
-    pub refit: &'a Refit<'a>,
+    pub refit: &'a ModelRefit<'a>,
     pub data: Data<'a>,
     pub unknowns: Unknowns,
     pub fitted: Fitted,
@@ -50,7 +50,7 @@ impl<'a> PreparedCase<'a> {
     pub fn of(
         case: &'a Case,
         split: &'a DataSplit,
-        refit: &'a Refit<'a>,
+        refit: &'a ModelRefit<'a>,
     ) -> Result<Self, DiagnoseError> {
         let numbers = &case.numbers;
         let data = Data {

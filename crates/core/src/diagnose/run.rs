@@ -5,12 +5,13 @@ use rayon::prelude::*;
 
 use super::change::friction_changes;
 use super::error::DiagnoseError;
-use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, WhatIsLeft};
+use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, NotWritten, WhatIsLeft};
 use super::prepared::{PreparedCase, filtered, residuals};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
+use super::refit::ModelRefit;
 use super::searched::SearchedCase;
-use super::steps::{Judged, NotWritten, Refit, judge};
+use super::steps::{Judged, judge};
 use super::unexplained::dependence::{Left, dependences};
 use super::unexplained::noise_floor::floor;
 use super::unexplained::{part_unexplained, unexplained};
@@ -24,7 +25,7 @@ use crate::motion::Stretch;
 ///
 /// # Errors
 /// [`DiagnoseError`].
-pub fn diagnose(case: &Case, refit: &Refit, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
+pub fn diagnose(case: &Case, refit: &ModelRefit, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
     let split = case.split();
     check(case, &split)?;
     let prepared = PreparedCase::of(case, &split, refit)?;

@@ -5,26 +5,16 @@ use nalgebra::{DMatrix, DVector};
 use super::candidates::no_finding;
 use super::error::DiagnoseError;
 use super::held_out::{EffectChange, HeldOutRows};
-use super::outcome::{FoundEffect, StepStatus};
+use super::outcome::{FoundEffect, NotWritten, StepStatus};
 use super::prepared::PreparedCase;
 use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, step, value_of};
+use super::refit::ModelProposal;
 use super::search::{Chosen, Field};
 use super::searched::SearchedCase;
 use super::tables::{self, Estimates, Verified};
 use crate::effect::{Added, AugmentedModel};
-
-/// A model that would be written: effects with the amplitudes that predict, the declared numbers by the judge's sums.
-pub struct Proposal<'a> {
-    pub model: &'a AugmentedModel,
-    /// Information matrix of the unknowns beside fixed effects, in independent rows.
-    pub information: &'a DMatrix<f64>,
-}
-
-/// Fits the declared numbers beside the effects of a proposal, as the given model was fitted, and gives the model that
-/// torques would be computed with.
-pub type Refit<'a> = dyn Fn(&Proposal) -> Result<AugmentedModel, DiagnoseError> + Sync + 'a;
 
 /// What is made of the effects that were chosen.
 #[derive(Clone)]
@@ -43,20 +33,6 @@ pub struct Judged {
     pub by_effects: DMatrix<f64>,
     /// From the unknowns beside the parts of effects that predict to those beside whole ones.
     pub to_estimate: DVector<f64>,
-}
-
-/// Why an effect is not written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NotWritten {
-    /// Its amplitude is too uncertain, or it can be measured and is not sure enough.
-    Unsure,
-    /// Beside the others a bound takes all of it, or what it cannot be without; or its shape is at an end of its range,
-    /// beyond which another law begins.
-    Bound,
-    /// It takes off no joint's error what one would notice.
-    Small,
-    /// Held-out data are worse with it.
-    HeldOut,
 }
 
 /// One effect on its way.
@@ -308,7 +284,7 @@ impl Judging<'_> {
         }
         let model = self.based(self.prepared.refitted(&self.fitted(&effects))?);
         let information = estimates.information(&self.field);
-        let in_use = (self.prepared.refit)(&Proposal {
+        let in_use = (self.prepared.refit)(&ModelProposal {
             model: &model,
             information: &information,
         })?;

@@ -6,12 +6,12 @@ use super::error::DiagnoseError;
 use super::prepared::moved;
 use super::search::{Chosen, Field, own_joint};
 use crate::effect::{Added, AugmentedModel};
-use crate::judge::{Amplitude, EffectTerms, ErrorGain, JointFit, Terms};
+use crate::judge::{EffectAmplitude, EffectTerms, ErrorGain, JointFit, Terms};
 
 /// What the blocks say of an effect.
 #[derive(Debug, Clone)]
 pub struct Verified {
-    pub amplitude: Amplitude,
+    pub amplitude: EffectAmplitude,
     /// Its coefficients by block, all else as the joint fit has it.
     pub blocks: Vec<Vec<f64>>,
     pub beside: Beside,

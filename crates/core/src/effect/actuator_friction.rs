@@ -1,7 +1,7 @@
 //! `actuator-friction`: friction in the actuator coordinates, tau = J' F(J v). On the CFT robot it
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
-use super::{Entry, Family, Key, Ladder, Law, Places, Search, ShapeRange, Unit};
+use super::{Entry, Family, Key, Ladder, Law, Places, Search, ShapeSpan, Unit};
 use crate::robot::cft::pantograph::reference_jacobian;
 
 pub static ENTRY: Entry = Entry {
@@ -32,7 +32,7 @@ pub static LAW: Law = Law {
         }
         Ok([50.0, 200.0, 1000.0].map(|w| vec![w]).to_vec())
     },
-    limits: |_, _, _| vec![ShapeRange::of(10.0, 1e5).open_above()],
+    limits: |_, _, _| vec![ShapeSpan::of(10.0, 1e5).open_above()],
     code: Some(|to| {
         let [viscous, coulomb, slope] = [to.x(0), to.x(1), to.s(0)];
         to.of_screws(|speed, _| {

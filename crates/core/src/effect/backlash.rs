@@ -1,7 +1,10 @@
 //! `backlash`: a play of width `gap`. After a reversal the motor crosses the gap and does not feel
 //! what lies behind it: c sgn(v) is missing until the gap is used up, a fixed distance.
 
-use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit, exact};
+use super::{
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit,
+    exact,
+};
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
@@ -41,7 +44,7 @@ pub static LAW: Law = Law {
     },
     limits: |cover, place, _| {
         let range = cover.at(place).range();
-        vec![ShapeRange::of(1e-4 * range, 0.3 * range)]
+        vec![ShapeSpan::of(1e-4 * range, 0.3 * range)]
     },
     // where the far side of the gap stands: a play operator
     memory: Some(1),

@@ -7,7 +7,7 @@
 //! contact what takes dz/dt away within a sample.
 
 use super::elasticity::inertia;
-use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit, exact};
+use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit, exact};
 use crate::robot::JointKind;
 
 pub static ENTRY: Entry = Entry {
@@ -64,7 +64,7 @@ pub static LAW: Law = Law {
     },
     limits: |cover, place, _| {
         let range = cover.at(place).range();
-        vec![ShapeRange::of(1e-4 * range, 0.3 * range)]
+        vec![ShapeSpan::of(1e-4 * range, 0.3 * range)]
     },
     // where it lands jumps from sample to sample
     slope_step: 0.03,

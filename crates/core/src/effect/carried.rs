@@ -5,7 +5,7 @@
 //! Files and tables have first moments in the place of the centre: mx = mass x.
 
 use super::payload;
-use super::{KeyValue, Law, Property, Reparametrisation, ShapeRange};
+use super::{KeyValue, Law, Property, Reparametrisation, ShapeSpan};
 use crate::robot::standard::Body;
 use crate::robot::tree::MOST_JOINTS;
 
@@ -25,7 +25,7 @@ pub static LAW: Law = Law {
         let corners = (0..8).map(|k| (0..3).map(|axis| corner(k, axis)).collect());
         Ok(corners.collect())
     },
-    limits: |_, _, _| vec![ShapeRange::of(-MAX_DISTANCE_M, MAX_DISTANCE_M); 3],
+    limits: |_, _, _| vec![ShapeSpan::of(-MAX_DISTANCE_M, MAX_DISTANCE_M); 3],
     reparametrised: Some(Reparametrisation {
         of_keys: |values| {
             let [mass, moments @ ..] = payload::body(values)?;

@@ -65,22 +65,28 @@ pub static LAW: Law = Law {
         }
     },
     code: Some(written),
-    ..Law::linear(&ENTRY, &["viscous", "coulomb", "inertia", "coulomb_from"], |at, _, out| {
-        let (s, k, r) = (at.scene.stretch, at.k, at.shape[0]);
-        // whose motion the row gets, what turns the motor, and how the row sees the motor
-        let (of, [a, b], scale, lever) = match at.place {
-            Place::Pair { on, of } => (of, [on, of], sign(r), 1.0),
-            Place::Geared { motor, other } if at.joint == motor => (other, [motor, other], r, 1.0),
-            Place::Geared { motor, other } => (motor, [motor, other], r, r),
-            _ => return,
-        };
-        out[0] = scale * s.v[of][k];
-        out[1] = lever * sign(s.v[a][k] + r * s.v[b][k]);
-        out[2] = scale * s.a[of][k];
-        if matches!(at.place, Place::Pair { .. }) {
-            out[3] = scale * sign(s.v[of][k]);
-        }
-    })
+    ..Law::linear(
+        &ENTRY,
+        &["viscous", "coulomb", "inertia", "coulomb_from"],
+        |at, _, out| {
+            let (s, k, r) = (at.scene.stretch, at.k, at.shape[0]);
+            // whose motion the row gets, what turns the motor, and how the row sees the motor
+            let (of, [a, b], scale, lever) = match at.place {
+                Place::Pair { on, of } => (of, [on, of], sign(r), 1.0),
+                Place::Geared { motor, other } if at.joint == motor => {
+                    (other, [motor, other], r, 1.0)
+                }
+                Place::Geared { motor, other } => (motor, [motor, other], r, r),
+                _ => return,
+            };
+            out[0] = scale * s.v[of][k];
+            out[1] = lever * sign(s.v[a][k] + r * s.v[b][k]);
+            out[2] = scale * s.a[of][k];
+            if matches!(at.place, Place::Pair { .. }) {
+                out[3] = scale * sign(s.v[of][k]);
+            }
+        },
+    )
 };
 
 /// What it adds to generated code.

@@ -7,7 +7,10 @@
 
 use nalgebra::Matrix4;
 
-use super::{Entry, Family, Key, KeyValue, Law, Limit, Number, Reparametrisation, Rule, Scene, Search, ShapeRange, Unit, exact};
+use super::{
+    Entry, Family, Key, KeyValue, Law, Limit, Number, Reparametrisation, Rule, Scene, Search,
+    ShapeSpan, Unit, exact,
+};
 
 pub static ENTRY: Entry = Entry {
     name: "elasticity",
@@ -53,8 +56,8 @@ pub static LAW: Law = Law {
         Ok(seen.collect())
     },
     limits: |cover, _, _| {
-        let frequency = ShapeRange::of(0.1 * cover.cutoff_hz, highest(cover.dt));
-        vec![frequency, ShapeRange::of(1e-3, 1.0).open_below()]
+        let frequency = ShapeSpan::of(0.1 * cover.cutoff_hz, highest(cover.dt));
+        vec![frequency, ShapeSpan::of(1e-3, 1.0).open_below()]
     },
     // stiffness = inertia (2 pi frequency)^2
     reparametrised: Some(Reparametrisation {

@@ -2,7 +2,7 @@
 //! 1 + k (1 - exp(-x/scale)) times the torque that acts, x the time since the log began (signal 1) or the size of
 //! that torque (signal 2). A fit absorbs a constant gain, and not one that changes along the log.
 
-use super::{CodeSite, Entry, Family, Instant, Key, Law, Search, ShapeRange, Unit};
+use super::{CodeSite, Entry, Family, Instant, Key, Law, Search, ShapeSpan, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -60,7 +60,7 @@ pub static LAW: Law = Law {
             false => cover.at(place).torque,
         };
         // far beyond the data it grows straight
-        vec![ShapeRange::of(0.03 * unit, 10.0 * unit).open_above()]
+        vec![ShapeSpan::of(0.03 * unit, 10.0 * unit).open_above()]
     },
     varied: Some(|shape| match is_time(shape[1]) {
         true => (Family::Slow, true),

@@ -3,7 +3,7 @@
 
 use super::formula::Formulas;
 use super::{
-    CodeSite, Cover, EffectError, Entry, Family, Instant, Place, Property, ShapeRange, Unit, Values,
+    CodeSite, Cover, EffectError, Entry, Family, Instant, Place, Property, ShapeSpan, Unit, Values,
 };
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
@@ -26,7 +26,7 @@ pub struct Law {
     /// Shapes to try on these data, or what they lack.
     pub(super) starts: fn(&Cover, Place) -> Starts,
     /// Range of each shape parameter that is refined, the first of the shape, about a shape on these data.
-    pub(super) limits: fn(&Cover, Place, &[f64]) -> Vec<ShapeRange>,
+    pub(super) limits: fn(&Cover, Place, &[f64]) -> Vec<ShapeSpan>,
     pub(super) columns: Columns,
     /// How many numbers it keeps from sample to sample, NaN at the begin of a stretch, where a column depends on samples
     /// before it.

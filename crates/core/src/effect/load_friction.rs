@@ -1,7 +1,7 @@
 //! `load-friction`: friction that grows with the load, (mu_c + mu_v |v|) |tau_l| tanh(w v)
 //! (Hamon, Gautier and Garrec 2010).
 
-use super::{CurveSignal, Entry, Family, Key, Law, Limit, Number, Rule, Search, ShapeRange, Unit};
+use super::{CurveSignal, Entry, Family, Key, Law, Limit, Number, Rule, Search, ShapeSpan, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -16,11 +16,7 @@ pub static ENTRY: Entry = Entry {
     // mu_v may be negative as long as the load still rubs at top speed
     must: &[
         Rule::not_negative("mu_c", LOADED),
-        Rule::at_least(
-            Number::AtTopSpeed("mu_c", "mu_v"),
-            Limit::Is(0.0),
-            LOADED,
-        ),
+        Rule::at_least(Number::AtTopSpeed("mu_c", "mu_v"), Limit::Is(0.0), LOADED),
     ],
     otherwise: Some(CurveSignal::Load),
     friction: true,
@@ -50,7 +46,7 @@ pub static LAW: Law = Law {
     },
     limits: |cover, place, _| {
         let top = cover.at(place).fastest();
-        vec![ShapeRange::of(4.0 / top, 2000.0 / top).open_above()]
+        vec![ShapeSpan::of(4.0 / top, 2000.0 / top).open_above()]
     },
     code: Some(|to| {
         let (v, load) = (to.v(), to.load());

@@ -40,7 +40,7 @@ pub use physics::{Limit, Number, Rule, Seen};
 pub use place::{Place, Places};
 pub use sampled::Sampled;
 pub use scene::Scene;
-pub use shape_range::ShapeRange;
+pub use shape_range::ShapeSpan;
 pub use signal::CurveSignal;
 pub use unit::Unit;
 pub use values::{EffectError, Values};

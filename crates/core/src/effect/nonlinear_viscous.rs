@@ -1,6 +1,6 @@
 //! `nonlinear-viscous`: friction that bends with speed, c sgn(v) |v|^p.
 
-use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Search, ShapeRange, Unit};
+use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Search, ShapeSpan, Unit};
 use crate::number;
 use crate::robot::friction::sign;
 
@@ -43,8 +43,8 @@ pub static LAW: Law = Law {
     // about 1 it is viscous friction, which every model declares
     limits: |_, _, shape| {
         vec![match shape[0] < 1.0 {
-            true => ShapeRange::of(0.3, 0.8),
-            false => ShapeRange::of(1.5, 3.0),
+            true => ShapeSpan::of(0.3, 0.8),
+            false => ShapeSpan::of(1.5, 3.0),
         }]
     },
     code: Some(|to| {

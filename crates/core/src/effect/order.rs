@@ -1,7 +1,7 @@
 //! Orders of what repeats with position: waves per revolution or metre.
 
 use super::law::Starts;
-use super::{CodeSite, Cover, Instant, Place, ShapeRange, exact};
+use super::{CodeSite, Cover, Instant, Place, ShapeSpan, exact};
 use crate::robot::{JointKind, Robot};
 
 /// rad per rad or per metre of an order (1/rev or 1/m).
@@ -60,9 +60,9 @@ pub fn is_whole(cover: &Cover, place: Place, order: f64) -> bool {
 const FULL_TURNS: f64 = 1.5;
 
 /// Orders between what the travel covers and what the position filter lets through.
-pub(super) fn order_limits(cover: &Cover, place: Place, _: &[f64]) -> Vec<ShapeRange> {
+pub(super) fn order_limits(cover: &Cover, place: Place, _: &[f64]) -> Vec<ShapeSpan> {
     let travel = cover.travel(place).max(f64::MIN_POSITIVE);
-    vec![ShapeRange::of(LEAST_WAVES / travel, MOST_ORDER).open_above()]
+    vec![ShapeSpan::of(LEAST_WAVES / travel, MOST_ORDER).open_above()]
 }
 
 /// Waves that the travel must cover.

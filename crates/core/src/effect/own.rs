@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use super::formula::{Definition, FormulaError, Formulas};
 use super::law::{Law, Starts};
-use super::{Cover, Entry, Family, Instant, Key, Place, Search, ShapeRange, Unit};
+use super::{Cover, Entry, Family, Instant, Key, Place, Search, ShapeSpan, Unit};
 use crate::robot::Robot;
 
 /// Laws that have been made: a definition is read for every command and every file, and is the same law.
@@ -89,11 +89,11 @@ impl Law {
     }
 
     /// Range of each shape parameter that is refined, the first of the shape, about a shape on these data.
-    pub fn limits_on(&self, cover: &Cover, place: Place, shape: &[f64]) -> Vec<ShapeRange> {
+    pub fn limits_on(&self, cover: &Cover, place: Place, shape: &[f64]) -> Vec<ShapeSpan> {
         match &self.formula {
             // the user's own ends: nothing is known of what lies beyond them
             Some(formula) => {
-                let range = |[least, most]: &[f64; 2]| ShapeRange::of(*least, *most);
+                let range = |[least, most]: &[f64; 2]| ShapeSpan::of(*least, *most);
                 let ranges = formula.ranges.iter().map(range);
                 ranges
                     .map(|range| range.open_below().open_above())

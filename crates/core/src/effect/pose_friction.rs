@@ -3,7 +3,9 @@
 //! own way is `position-friction`.
 
 use super::order::wavenumber;
-use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Place, Places, Rule, Search, Unit, exact};
+use super::{
+    Entry, Family, Key, Ladder, Law, Limit, Number, Place, Places, Rule, Search, Unit, exact,
+};
 
 pub static ENTRY: Entry = Entry {
     name: "pose-friction",
@@ -26,7 +28,14 @@ pub static ENTRY: Entry = Entry {
     separate_by: "move this joint alone, both ways, at several poses of the other one",
     formula: "sgn(v_i) (sin sin(order q_j) + cos cos(order q_j)) of joint j = from, counted from 1",
     source: "a bearing that carries more in some poses, a hose or a seal that another joint presses",
-    said: |f| format!("friction of {} that the pose of {} sets, {}", f.at, f.with, f.amplitude()),
+    said: |f| {
+        format!(
+            "friction of {} that the pose of {} sets, {}",
+            f.at,
+            f.with,
+            f.amplitude()
+        )
+    },
     remedy: "look at hoses, cables and bearings of the joint while the other one moves, or keep the refined model",
     ..Entry::USUAL
 };

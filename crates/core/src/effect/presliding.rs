@@ -5,7 +5,7 @@
 
 use super::{
     CurveSignal, Entry, Family, Key, KeyValue, Ladder, Law, Limit, Number, Reparametrisation, Rule,
-    Search, ShapeRange, Unit,
+    Search, ShapeSpan, Unit,
 };
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
@@ -62,7 +62,7 @@ pub static LAW: Law = Law {
     },
     limits: |cover, place, _| {
         let range = cover.at(place).range();
-        vec![ShapeRange::of(3.0 / range, 1e4 / range)]
+        vec![ShapeSpan::of(3.0 / range, 1e4 / range)]
     },
     // sigma0 = fc rate
     reparametrised: Some(Reparametrisation {

@@ -1,7 +1,7 @@
 //! `settling-drift`: a torque that drifts from the begin of a log and settles, level (1 - exp(-t/T)), in both directions.
 //! A drift that goes on over the log is `drift`, with one number less.
 
-use super::{Entry, Family, Key, Law, Search, ShapeRange, Unit};
+use super::{Entry, Family, Key, Law, Search, ShapeSpan, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "settling-drift",
@@ -34,7 +34,12 @@ pub static LAW: Law = Law {
         Ok(shares.map(|s| vec![s * cover.duration_s]).to_vec())
     },
     // one that does not settle within the log is a drift, one that is over at once an offset
-    limits: |cover, _, _| vec![ShapeRange::of(0.02 * cover.duration_s, 2.0 * cover.duration_s)],
+    limits: |cover, _, _| {
+        vec![ShapeSpan::of(
+            0.02 * cover.duration_s,
+            2.0 * cover.duration_s,
+        )]
+    },
     code: Some(|to| to.step(format!("{} * -expm1(-state.t / {})", to.x(0), to.s(0)))),
     ..Law::linear(&ENTRY, &["level"], |at, _, out| {
         out[0] = -(-at.time() / at.shape[0]).exp_m1();

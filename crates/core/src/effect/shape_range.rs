@@ -2,7 +2,7 @@
 
 /// Values of a shape parameter on some data.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShapeRange {
+pub struct ShapeSpan {
     pub least: f64,
     pub most: f64,
     /// Whether the torque beyond the least, and beyond the most, is as good as that at it: a shape there is a bound
@@ -11,7 +11,7 @@ pub struct ShapeRange {
     pub open: [bool; 2],
 }
 
-impl ShapeRange {
+impl ShapeSpan {
     /// From least to most, another law beyond both.
     pub const fn of(least: f64, most: f64) -> Self {
         Self {
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn a_value_at_an_end_that_is_open_is_no_edge() {
-        let range = ShapeRange::of(0.3, 3.0);
+        let range = ShapeSpan::of(0.3, 3.0);
         assert_eq!(range.end_at(0.3), Some(0.3));
         assert_eq!(range.end_at(3.0), Some(3.0));
         assert_eq!(range.end_at(2.9), None);

@@ -2,7 +2,7 @@
 //! fc tanh(v/vs) (Andersson, Soderberg and Bjorklund 2007, eq. 2).
 
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit,
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit,
     jumps_or_is_none,
 };
 use crate::robot::friction::sign;
@@ -53,7 +53,7 @@ pub static LAW: Law = Law {
     },
     limits: |cover, place, _| {
         let top = cover.at(place).fastest();
-        vec![ShapeRange::of(1e-3 * top, 0.5 * top)]
+        vec![ShapeSpan::of(1e-3 * top, 0.5 * top)]
     },
     direction: Some(|shape, v| (v / shape[0]).tanh()),
     code: Some(|to| {

@@ -1,6 +1,6 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3.
 
-use super::{Entry, Family, Key, Ladder, Law, Rule, Search, ShapeRange, Unit};
+use super::{Entry, Family, Key, Ladder, Law, Rule, Search, ShapeSpan, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "spring",
@@ -39,7 +39,7 @@ pub static LAW: Law = Law {
         let [low, high] = cover.at(place).position;
         // a spring that is at rest far outside the travel is hardly more than an offset
         let beyond = 0.25 * (high - low);
-        let range = ShapeRange::of(low - beyond, high + beyond);
+        let range = ShapeSpan::of(low - beyond, high + beyond);
         vec![range.open_below().open_above()]
     },
     code: Some(|to| {

@@ -2,7 +2,7 @@
 //! Dupont and Canudas de Wit 1994), where the declared law has no such term.
 
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit,
+    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit,
     jumps_or_is_none,
 };
 use crate::robot::friction::sign;
@@ -57,7 +57,7 @@ pub static LAW: Law = Law {
     },
     limits: |cover, place, _| {
         let top = cover.at(place).fastest();
-        vec![ShapeRange::of(0.003 * top, 0.8 * top)]
+        vec![ShapeSpan::of(0.003 * top, 0.8 * top)]
     },
     code: Some(|to| {
         let v = to.v();

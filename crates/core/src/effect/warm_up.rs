@@ -1,6 +1,6 @@
 //! `warm-up`: friction times 1 + k (1 - exp(-t/T)), t since the begin of the log.
 
-use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeRange, Unit};
+use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -60,7 +60,7 @@ pub static LAW: Law = Law {
         Ok(shares.map(|s| vec![s * cover.duration_s]).to_vec())
     },
     limits: |cover, _, _| {
-        let range = ShapeRange::of(0.03 * cover.duration_s, 10.0 * cover.duration_s);
+        let range = ShapeSpan::of(0.03 * cover.duration_s, 10.0 * cover.duration_s);
         vec![range]
     },
     code: Some(|to| {

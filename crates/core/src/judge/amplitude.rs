@@ -36,10 +36,10 @@ pub struct JointFit {
 
 /// What the blocks say of an effect's amplitude.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Amplitude {
+pub struct EffectAmplitude {
     /// Coefficients of the joint fit.
     pub values: Vec<f64>,
-    /// a' V^-1 a / k of the torque that the k free coefficients make, each measured along its own column.
+    /// Square of its torque over its standard deviation, over the number k of its free coefficients.
     pub f: f64,
     /// The F that chance exceeds as rarely as five deviations of one number; none where too few blocks tell.
     pub floor: Option<f64>,
@@ -51,7 +51,7 @@ pub struct Amplitude {
     pub s: f64,
 }
 
-impl Amplitude {
+impl EffectAmplitude {
     /// How many of its deviations one number would have to be off zero to be as sure.
     pub fn deviations(&self, numbers: &Numbers) -> f64 {
         let floor = self.floor.unwrap_or(f64::INFINITY);
@@ -132,10 +132,10 @@ impl JointFit {
         effect: &EffectTerms,
         (noisier, measured): (Option<&[DMatrix<f64>]>, bool),
         numbers: &Numbers,
-    ) -> Amplitude {
+    ) -> EffectAmplitude {
         let own: Vec<usize> = effect.coefficients.clone().collect();
         let free: Vec<usize> = own.iter().copied().filter(|i| !self.at_bound[*i]).collect();
-        let mut out = Amplitude {
+        let mut out = EffectAmplitude {
             values: own.iter().map(|i| self.values[*i]).collect(),
             f: 0.0,
             floor: None,
@@ -196,12 +196,11 @@ impl JointFit {
             square(*a).total_cmp(&square(*b))
         });
         if let Some(j) = strongest {
-            let own = &of_joint[j] * &amplitude;
-            let square = amplitude.dot(&own).max(f64::MIN_POSITIVE);
+            let square = amplitude.dot(&(&of_joint[j] * &amplitude));
             let rms = (square / self.rows[j].max(1.0)).sqrt();
             out.torque = [
                 rms,
-                rms * own.dot(&(&spread * &own)).max(0.0).sqrt() / square,
+                rms * pull.dot(&(&spread * &pull)).max(0.0).sqrt() / size,
             ];
         }
         let leverages = self.leverages(&free, &amplitude);
@@ -212,9 +211,8 @@ impl JointFit {
         if self.blocks.len() < numbers.least_blocks {
             out.floor = None;
         }
-        if let Some(factor) = spread.cholesky() {
-            out.f = amplitude.dot(&factor.solve(&amplitude)) / k as f64;
-        }
+        let across = pull.dot(&(&spread * &pull)).max(f64::MIN_POSITIVE);
+        out.f = size * size / (across * k as f64);
         out.s = out
             .floor
             .map_or(0.0, |floor| (1.0 - floor / out.f).max(0.0));
@@ -261,7 +259,7 @@ impl JointFit {
         each.iter().map(|x| x / sum).collect()
     }
 
-    /// Amplitude of an effect in each block, all else as the joint fit has it; none where its torque is next to nothing.
+    /// EffectAmplitude of an effect in each block, all else as the joint fit has it; none where its torque is next to nothing.
     pub fn by_block(&self, effect: &EffectTerms, numbers: &Numbers) -> Vec<Vec<f64>> {
         let own: Vec<usize> = effect.coefficients.clone().collect();
         let k = own.len();
@@ -386,7 +384,7 @@ const SILENT: f64 = 1e-3;
 const HALVINGS: usize = 60;
 
 /// The F of k numbers by n blocks that chance exceeds as rarely as [`Numbers::deviations`] of one number by
-/// [`Numbers::blocks`] (Hotelling 1931); none of blocks that are no more than these numbers.
+/// [`Numbers::blocks`], for the combination of them that was found (Scheffé 1953); none of less than two blocks.
 pub fn floor(k: usize, n: f64, numbers: &Numbers) -> Option<f64> {
     let chance = |k: f64, n: f64, f: f64| Some(FisherSnedecor::new(k, n).ok()?.sf(f));
     let usual = numbers.blocks as f64 - 1.0;
@@ -394,18 +392,18 @@ pub fn floor(k: usize, n: f64, numbers: &Numbers) -> Option<f64> {
     let k = k as f64;
     // blocks that are not there are not missed
     let n = n.min(numbers.blocks as f64);
-    if n <= k + 1.0 {
+    if n < 2.0 {
         return None;
     }
     let (mut low, mut high) = (0.0_f64, 1e9_f64);
     for _ in 0..HALVINGS {
         let middle = (low.max(1e-9) * high).sqrt();
-        match chance(k, n - k, middle)? > rare {
+        match chance(k, n - 1.0, middle)? > rare {
             true => low = middle,
             false => high = middle,
         }
     }
-    Some((n - 1.0) / (n - k) * high)
+    Some(high)
 }
 
 #[cfg(test)]
@@ -419,13 +417,14 @@ mod tests {
         let near = |found: f64, wanted: f64| {
             assert!((found / wanted - 1.0).abs() < 0.04, "{found} {wanted}")
         };
-        for (k, wanted) in [(1, 25.0), (2, 17.0), (3, 14.0), (4, 13.0), (10, 18.0)] {
-            near(of(k, 24.0), wanted);
-        }
-        for (k, wanted) in [(1, 42.0), (2, 35.0), (3, 38.0), (4, 46.0)] {
-            near(of(k, 12.0), wanted);
-        }
-        assert_eq!(floor(2, 3.0, &NUMBERS), None);
+        near(of(1, 24.0), 25.0);
+        near(of(1, 12.0), 42.0);
+        // each number beside the first makes the square of a torque that chance reaches greater, and F less
+        let each: Vec<f64> = (1..=10).map(|k| of(k, 24.0)).collect();
+        assert!(each.windows(2).all(|f| f[1] < f[0]), "{each:?}");
+        let squares = (1..).zip(&each).map(|(k, f)| f64::from(k) * f);
+        assert!(squares.clone().zip(squares.skip(1)).all(|(a, b)| a < b));
+        assert_eq!(floor(2, 1.5, &NUMBERS), None);
         let (blocks, wide) = freedom(&[1.0 / 24.0; 24]).unwrap();
         assert!((blocks - 24.0).abs() < 1e-9 && (wide - 1.0).abs() < 1e-9);
         let half: Vec<f64> = (0..24)

@@ -20,7 +20,7 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
-pub use amplitude::{Amplitude, EffectTerms, JointFit, floor};
+pub use amplitude::{EffectAmplitude, EffectTerms, JointFit, floor};
 pub use block_errors::{BlockErrors, FitToAll};
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;

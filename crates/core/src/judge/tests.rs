@@ -143,13 +143,13 @@ impl Campaign {
     }
 
     /// What is left in the set when all that stand pass, with what the blocks say of each; the least sure leaves first.
-    fn judged(&self) -> Vec<(usize, Amplitude)> {
+    fn judged(&self) -> Vec<(usize, EffectAmplitude)> {
         let mut set = self.chosen();
         loop {
             let fit = self.joint_fit(&set);
             let of =
                 |(i, c): (usize, &usize)| (*c, fit.amplitude(&own(i), (None, false), &NUMBERS));
-            let found: Vec<(usize, Amplitude)> = set.iter().enumerate().map(of).collect();
+            let found: Vec<(usize, EffectAmplitude)> = set.iter().enumerate().map(of).collect();
             let out = found.iter().enumerate().filter(|(_, (_, a))| a.s == 0.0);
             let out = out.min_by(|a, b| a.1.1.certainty().total_cmp(&b.1.1.certainty()));
             match out.map(|(i, _)| i) {

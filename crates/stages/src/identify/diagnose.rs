@@ -17,7 +17,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{own_laws, refined};
 use super::open_loop::spoiled;
-use super::own_fit::{OwnFit, Refitting};
+use super::own_fit::{OwnFit, OwnRefit};
 use super::position_cutoff::known;
 use super::prior::{information, moved_alone, open};
 use super::repeated::each_row_once;
@@ -25,8 +25,8 @@ use super::temperatures;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ParameterPrior,
-    Proposal, Watch, Wishes,
+    self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ModelProposal,
+    ParameterPrior, Watch, Wishes,
 };
 use cft_ident_core::effect::{self, Added, AugmentedModel};
 use cft_ident_core::judge::NUMBERS;
@@ -220,18 +220,19 @@ pub fn diagnose(
         (settings.keep, settings.hold_friction),
     );
     let unknowns = case.unknowns();
-    let refitting = Refitting {
+    let refitting = OwnRefit {
         machine: &data.machine,
         given: settings.model,
         logs: &data.logs,
         stretches: &case.stretches,
         unknowns: &unknowns.list,
+        hold_friction: settings.hold_friction,
         own,
         control: control.clone(),
     };
     let files: Mutex<Vec<(Vec<Added>, ModelFile)>> = Mutex::default();
     let failed: Mutex<Option<IdentifyError>> = Mutex::default();
-    let refit = |proposal: &Proposal| {
+    let refit = |proposal: &ModelProposal| {
         let made = refitting.file(proposal).and_then(|file| {
             let mut in_use = refined(&file, name)?;
             in_use.effects.clone_from(&proposal.model.effects);

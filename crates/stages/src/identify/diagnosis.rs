@@ -27,7 +27,7 @@ use cft_ident_core::robot::Robot;
 pub struct DiagnosisResult {
     pub verdict: DiagnosisVerdict,
     /// The errors that count: null where the data are at fault.
-    pub headline: Option<Headline>,
+    pub headline: Option<HeadlineErrors>,
     /// Effects that gain on blocks left out, in the order in which they were found.
     pub steps: Vec<DiagnosisStep>,
     /// Errors of the model as it was given.
@@ -64,7 +64,7 @@ pub struct DiagnosisResult {
 
 /// Root mean square over the joints of their relative errors while they move: on held-out data where there are any.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-pub struct Headline {
+pub struct HeadlineErrors {
     /// By the given model.
     pub before: f64,
     /// By the model that is written.
@@ -250,13 +250,13 @@ impl Diagnosed {
     }
 
     /// The errors that count.
-    fn headline(&self) -> Headline {
+    fn headline(&self) -> HeadlineErrors {
         let (before, after) = (&self.diagnosis.before, self.diagnosis.errors_now());
         let of = |errors: &SplitErrors| {
             let counted = errors.holdout.as_ref().unwrap_or(&errors.train);
             counted.overall.mean_relative_error_moving
         };
-        Headline {
+        HeadlineErrors {
             before: of(before),
             after: of(after),
             held_out: after.holdout.is_some(),

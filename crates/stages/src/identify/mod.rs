@@ -81,6 +81,7 @@ mod torque;
 mod track;
 mod track_error;
 mod track_source;
+mod unknown_key;
 mod unknowns;
 mod validate;
 mod watch;

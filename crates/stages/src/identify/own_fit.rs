@@ -12,8 +12,8 @@ use super::held_torque::HeldTorque;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::lsq::{LsqSettings, lsq};
-use super::refined_model::{key_of, value_of};
-use cft_ident_core::diagnose::{Proposal, Unknown};
+use super::unknown_key::key_of;
+use cft_ident_core::diagnose::{ModelProposal, Unknown, value_of};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_files::config::ModelFile;
@@ -21,13 +21,15 @@ use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::Provenance;
 
 /// How the declared numbers of a proposal are fitted.
-pub(super) struct Refitting<'a> {
+pub(super) struct OwnRefit<'a> {
     pub machine: &'a LoggedRobot,
     pub given: &'a GivenModel,
     /// The logs that are fitted.
     pub logs: &'a [Log],
     pub stretches: &'a [Stretch],
     pub unknowns: &'a [Unknown],
+    /// The friction of the given model stays as it is.
+    pub hold_friction: bool,
     /// The fit that made the given model; none where other logs made it, or another way.
     pub own: Option<OwnFit>,
     pub control: Control,
@@ -68,9 +70,9 @@ impl OwnFit {
     }
 }
 
-impl Refitting<'_> {
+impl OwnRefit<'_> {
     /// The model file of a proposal, without its effects.
-    pub fn file(&self, proposal: &Proposal) -> Result<ModelFile, IdentifyError> {
+    pub fn file(&self, proposal: &ModelProposal) -> Result<ModelFile, IdentifyError> {
         match &self.own {
             Some(own) => self.by_lsq(own, proposal.model),
             None => Ok(self.by_sums(proposal)),
@@ -113,9 +115,10 @@ impl Refitting<'_> {
     }
 
     /// The given model with the declared numbers by the judge's sums, consistent ones nearest to them in their metric.
-    fn by_sums(&self, proposal: &Proposal) -> ModelFile {
+    fn by_sums(&self, proposal: &ModelProposal) -> ModelFile {
         let mut file = self.given.file.clone();
-        for unknown in self.unknowns {
+        let held = |u: &&Unknown| self.hold_friction && matches!(u, Unknown::Friction { .. });
+        for unknown in self.unknowns.iter().filter(|u| !held(u)) {
             let (name, joint) = key_of(proposal.model, *unknown);
             let own = file.parameters.iter_mut();
             for p in own.filter(|p| p.name == name && p.joint == joint) {

@@ -6,13 +6,10 @@ use super::formulas::{numbers_of, written_sections};
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::open_loop::{is_in_si, whole};
+use super::unknown_key::key_of;
 use crate::open_loop::{FreeRun, RunSpan, free_run};
-use cft_ident_core::diagnose::Unknown;
-pub(super) use cft_ident_core::diagnose::value_of;
-use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::diagnose::{Unknown, value_of};
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
-use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::candidates::CandidateSection;
@@ -253,24 +250,6 @@ impl Diagnosed {
             model.effects.push(section);
         }
     }
-}
-
-/// Name and joint of an unknown, as model files have them.
-pub(super) fn key_of(model: &AugmentedModel, unknown: Unknown) -> (String, Option<String>) {
-    let robot = &model.model.robot;
-    let (name, joint) = match unknown {
-        Unknown::Theta(k) => (robot.parameters()[k].name.to_string(), None),
-        Unknown::Offset(j) => ("offset".to_owned(), Some(j)),
-        Unknown::Friction { joint, k } => {
-            let name = match &model.model.friction[joint] {
-                JointFriction::None => "",
-                JointFriction::DoubleTanh(_) => DoubleTanh::NAMES[k],
-                JointFriction::ViscousCoulomb(_) => ViscousCoulomb::NAMES[k],
-            };
-            (name.to_owned(), Some(joint))
-        }
-    };
-    (name, joint.map(|j| robot.joint_names()[j].clone()))
 }
 
 /// Gives a parameter what was found; how much wider its deviation is, where nothing else explains the same torque.
