@@ -1,8 +1,7 @@
 #!/bin/bash
 # Runs the commands of the manual: the ```sh blocks of each page, one after the other, in a folder of
 # the page's own.
-#   .ci/manual.sh TOOL [PAGE...]        (pages: README.md, those of docs and docs/measured, and examples/README.md where
-#                                        absent)
+#   .ci/manual.sh TOOL [PAGE...]        (pages: README.md, all of docs, and examples/README.md where absent)
 # `cargo` stands for the build that is there already, examples for those beside TOOL. A page whose logs are not there is skipped aloud.
 set -u
 tool=$(realpath "${1:?the built cft-ident}") || exit 1
@@ -10,7 +9,7 @@ shift
 cd "$(dirname "$0")/.." || exit 1
 repository=$PWD
 pages=("$@")
-[ ${#pages[@]} -gt 0 ] || pages=(README.md docs/*.md docs/measured/*.md examples/README.md)
+[ ${#pages[@]} -gt 0 ] || pages=(README.md docs/*.md docs/results/measured/*.md examples/README.md)
 
 export CFT_IDENT_EXAMPLES=${tool%/*}/examples
 work=$(mktemp -d)
@@ -39,7 +38,7 @@ for page in "${pages[@]}"; do
   [ -n "$script" ] || continue
   echo
   if [[ $script == *../shared/* && ! -e $work/pages/shared ]]; then
-    echo "== manual: $page SKIPPED, ../shared/data is not there (docs/measured/data.md says where it is from)"
+    echo "== manual: $page SKIPPED, ../shared/data is not there (docs/results/measured/data.md says where it is from)"
     skipped+=("$page")
     continue
   fi

@@ -78,7 +78,7 @@ if [ -n "$data" ]; then
   one panda configs/panda.toml "$data/panda/panda_exciting.csv@0..70%" "$data/panda/panda_exciting.csv@70..100%"
   one emps configs/emps.toml "$data/emps/emps_id.csv@0..70%" "$data/emps/emps_id.csv@70..100%"
 else
-  echo "== next: panda and emps SKIPPED, ../shared/data is not there (docs/data.md says where it is from)"
+  echo "== next: panda and emps SKIPPED, ../shared/data is not there (docs/results/measured/data.md says where it is from)"
 fi
 echo "== next: $run commands run, $failed failed"
 [ "$failed" -eq 0 ]

@@ -14,7 +14,7 @@ skip() {
 }
 
 data=../shared/data
-[ -d "$data/ur10" ] || skip "$data is not there (docs/measured/data.md says where it is from)"
+[ -d "$data/ur10" ] || skip "$data is not there (docs/results/measured/data.md says where it is from)"
 command -v cc > /dev/null || skip "there is no C compiler \`cc\`"
 command -v python3 > /dev/null || skip "python3 is not installed"
 work=$(mktemp -d)

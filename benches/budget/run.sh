@@ -6,7 +6,7 @@ set -euo pipefail
 tool=$(realpath "${1:-target/release/cft-ident}")
 cd "$(dirname "$0")/../.."
 log=../shared/data/tx40/tx40_joint.csv
-[ -f "$log" ] || { echo "budget: SKIPPED, $log is not there (docs/measured/data.md says where it is from)"; exit 0; }
+[ -f "$log" ] || { echo "budget: SKIPPED, $log is not there (docs/results/measured/data.md says where it is from)"; exit 0; }
 command -v perf > /dev/null || { echo "budget: SKIPPED, \`perf\` is not installed (Debian: linux-perf)"; exit 0; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

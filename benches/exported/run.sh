@@ -6,7 +6,7 @@ set -euo pipefail
 tool=$(realpath "${1:-target/release/cft-ident}")
 cd "$(dirname "$0")/../.."
 log=../shared/data/panda/panda_exciting.csv
-[ -f "$log" ] || { echo "exported: SKIPPED, $log is not there (docs/measured/data.md says where it is from)"; exit 0; }
+[ -f "$log" ] || { echo "exported: SKIPPED, $log is not there (docs/results/measured/data.md says where it is from)"; exit 0; }
 command -v cc > /dev/null || { echo "exported: SKIPPED, there is no C compiler \`cc\`"; exit 0; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -8,7 +8,7 @@ cd "$(dirname "$0")/../.."
 folder=${1:-target/pinocchio}
 data=../shared/data/tx40
 if [ ! -d "$data" ]; then
-  echo "benches/pinocchio/run.sh: SKIPPED, $data is not there (docs/measured/data.md says where it is from)"
+  echo "benches/pinocchio/run.sh: SKIPPED, $data is not there (docs/results/measured/data.md says where it is from)"
   exit 0
 fi
 mkdir -p "$folder"

@@ -1,4 +1,4 @@
-"""Joins the rows of docs/results/published/*.json into docs/results/published.json, the table of docs/published.md.
+"""Joins the rows of docs/results/published/*.json into docs/results/published.json, the table of docs/results/published.md.
 
 Usage: table.py [RESULTS]
 """

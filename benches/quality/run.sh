@@ -1,5 +1,5 @@
 #!/bin/bash
-# Loads, interruptions, hostile input: the figures of docs/quality.md, written to docs/results/quality_*.json.
+# Loads, interruptions, hostile input: the figures of docs/results/quality.md, written to docs/results/quality_*.json.
 #   benches/quality/run.sh TOOL [short] [hostile|files|interrupted|same|large]...
 # `short` takes minutes and writes nothing. Needs python3 with venv; says so, and passes, where the packages of the
 # first line below cannot be had. `coverage.sh`, `mutants.py` and `fuzz/run` make the other figures of that page.

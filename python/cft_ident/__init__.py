@@ -22,12 +22,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Union
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._native import (
@@ -106,17 +107,19 @@ class Robot:
 class Log:
     """A log: a file or a part of it, or arrays in memory."""
 
-    def __init__(self, native: _native.Log):
+    def __init__(self, native: _native.Log, path: str | None = None, arrays: tuple[Array, Array, Array] | None = None):
         self._native = native
+        self._path = path
+        self._arrays = arrays
 
     @classmethod
     def load(cls, path: PathLike) -> Log:
         """A file, its columns mapped as the robot file says; ``log.csv@0..70%`` is a part of it."""
-        return cls(_native.Log.load(os.fspath(path)))
+        return cls(_native.Log.load(os.fspath(path)), os.fspath(path))
 
     @classmethod
-    def arrays(cls, t: Any, q: Any, tau: Any, *, reference: Any = None, temperature: Any = None,
-               name: str = "arrays") -> Log:
+    def arrays(cls, t: ArrayLike, q: ArrayLike, tau: ArrayLike, *, reference: ArrayLike | None = None,
+               temperature: ArrayLike | None = None, name: str = "arrays") -> Log:
         """Times ``t`` [s], positions ``q`` and torques ``tau``, one row per sample, one column per joint, SI units.
 
         ``reference`` are the positions that the controller was asked for, for ``estimator="iv"``; ``temperature``
@@ -124,13 +127,17 @@ class Log:
         """
         flat = np.ascontiguousarray(t, dtype=np.float64)
 
-        def matrix(values: Any) -> Array:
+        def matrix(values: ArrayLike) -> Array:
             found: Array = np.ascontiguousarray(values, dtype=np.float64)
             return found.reshape(len(flat), -1) if found.ndim == 1 and len(flat) else found
 
         other = None if reference is None else matrix(reference)
         warm = None if temperature is None else matrix(temperature)
-        return cls(_native.Log.arrays(name, flat, matrix(q), matrix(tau), other, warm))
+        positions, torques = matrix(q), matrix(tau)
+        native = _native.Log.arrays(name, flat, positions, torques, other, warm)
+        # a command that works on files gets these three; what else there is it cannot be told
+        kept = None if other is not None or warm is not None else (flat, positions, torques)
+        return cls(native, arrays=kept)
 
     @classmethod
     def frame(cls, frame: Any, joints: Sequence[str], *, t: str = "t", q: str = "q_{}", tau: str = "tau_{}",
@@ -151,6 +158,100 @@ class Log:
 
 
 LogLike = Union[PathLike, Log, "Part"]
+
+
+def _several(logs: LogLike | Iterable[LogLike]) -> list[LogLike]:
+    return [logs] if isinstance(logs, (str, os.PathLike, Log, Part)) else list(logs)
+
+
+def _own_columns(text: str) -> str:
+    """A robot or model file whose logs have the columns ``t``, ``q_NAME`` and ``tau_NAME`` in SI units."""
+    kept, inside, held = [], False, ""
+    for line in text.splitlines():
+        if line.startswith("["):
+            inside = line.startswith(("[log]", "[log."))
+        if inside:
+            held = line if line.startswith("torque_held") else held
+        else:
+            kept.append(line)
+    return "\n".join([*kept, "", "[log]", 'torque_is = "joint"', held, ""])
+
+
+class _Files:
+    """Logs, robots and models as files, for as long as a command works on them."""
+
+    def __init__(self, *logs: LogLike | Iterable[LogLike]):
+        self._folder = tempfile.TemporaryDirectory()
+        self.of_arrays = any(isinstance(log, Log) and log._path is None for of in logs for log in _several(of))
+
+    def __enter__(self) -> _Files:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._folder.cleanup()
+
+    def new(self, name: str) -> str:
+        """A place for a file."""
+        return os.path.join(self._folder.name, name)
+
+    def logs(self, logs: LogLike | Iterable[LogLike], joints: Sequence[str] | None = None) -> list[str]:
+        """Paths of logs; those of arrays and reduced ones are written."""
+        return [self._log(log, joints) for log in _several(logs)]
+
+    def _log(self, log: LogLike, joints: Sequence[str] | None) -> str:
+        if isinstance(log, Part):
+            path = self.new(f"part-{len(os.listdir(self._folder.name))}.cfi")
+            log.save(path)
+            return path
+        if not isinstance(log, Log):
+            return os.fspath(log)
+        if log._path is not None:
+            return log._path
+        if log._arrays is None:
+            raise UsageError(f"{log.name}: this function takes arrays without references and temperatures")
+        t, q, tau = log._arrays
+        names = list(joints) if joints is not None else [f"q{k + 1}" for k in range(q.shape[1])]
+        if not len(names) == q.shape[1] == tau.shape[1]:
+            raise UsageError(f"{log.name}: {q.shape[1]} columns of positions and {tau.shape[1]} of torques, and the "
+                             f"robot has the joints {', '.join(names)}")
+        columns = {f"q_{name}": q[:, k] for k, name in enumerate(names)}
+        columns |= {f"tau_{name}": tau[:, k] for k, name in enumerate(names)}
+        path = self.new(f"{log.name}.npz")
+        np.savez(path, t=t, **columns)
+        return path
+
+    def model(self, model: Model | PathLike) -> str:
+        """The path of a model that reads these logs."""
+        if not isinstance(model, Model):
+            if not self.of_arrays:
+                return os.fspath(model)
+            model = Model.load(model)
+        path = self.new(f"model-{len(os.listdir(self._folder.name))}.toml")
+        with open(path, "w", encoding="utf-8", newline="\n") as file:
+            file.write(_own_columns(model.text) if self.of_arrays else model.text)
+        return path
+
+    def robot(self, robot: Robot | PathLike) -> str:
+        """The path of a robot file that reads these logs."""
+        path = robot.path if isinstance(robot, Robot) else os.fspath(robot)
+        if not self.of_arrays or not os.path.exists(path):
+            return path
+        with open(path, encoding="utf-8") as file:
+            text = _own_columns(file.read())
+        # beside the given one, so that its URDF is found
+        folder = os.path.dirname(os.path.abspath(path))
+        text = re.sub(r'^urdf = "(?!/)', lambda _: f'urdf = "{folder}/', text, flags=re.MULTILINE)
+        own = self.new("robot.toml")
+        with open(own, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        return own
+
+    def page(self, line: list[str]) -> str:
+        """The page of a command line."""
+        path = self.new("report.html")
+        _native.run([*line, "--report", path])
+        with open(path, encoding="utf-8") as file:
+            return file.read()
 
 
 def _logs(logs: LogLike | Iterable[LogLike]) -> list[_native.Log]:
@@ -230,7 +331,7 @@ class Model:
         names, matrix = found
         return pandas.DataFrame(matrix, index=names, columns=names)
 
-    def torque(self, q: Any, v: Any, a: Any, *, dt: float | None = None) -> Array:
+    def torque(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, dt: float | None = None) -> Array:
         """Torques along a motion, with friction, offsets and effects.
 
         ``q``, ``v``, ``a``: arrays of shape (N, n) or (n,), in m or rad and per s. Returns the same shape, in N or
@@ -240,7 +341,7 @@ class Model:
         tau = _native.torque(self._native, q, v, a, dt)
         return tau[0] if one else tau
 
-    def gravity(self, q: Any) -> Array:
+    def gravity(self, q: ArrayLike) -> Array:
         """Torques that carry the links at rest, without friction: (N, n) or (n,), in N or N m."""
         (q,), one = _motion(q)
         still = np.zeros_like(q)
@@ -248,7 +349,7 @@ class Model:
         weight: Array = rows @ self._theta()
         return weight[0] if one else weight
 
-    def friction(self, v: Any) -> Array:
+    def friction(self, v: ArrayLike) -> Array:
         """Friction of each joint at the velocities ``v``: (N, n) or (n,), in N or N m.
 
         The declared law with the effects that depend on a joint's speed alone, as exported code has it: none where it
@@ -258,7 +359,7 @@ class Model:
         found = _native.joint_friction(self._native, v)
         return found[0] if one else found
 
-    def friction_compensation(self, v: Any, v_desired: Any) -> Array:
+    def friction_compensation(self, v: ArrayLike, v_desired: ArrayLike) -> Array:
         """Friction for a controller to add, silent at rest: (N, n) or (n,), in N or N m.
 
         ``v`` and ``v_desired``: measured and desired velocities, of one shape. A joint that is told to move gets the
@@ -272,13 +373,13 @@ class Model:
         tau: Array = share * self.friction(wanted) + (1.0 - share) * felt * self.friction(v)
         return tau[0] if one else tau
 
-    def regressor(self, q: Any, v: Any, a: Any) -> Array:
+    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """The matrix Y of the inertial parameters: (N, n, p), or (n, p) for one row."""
         (q, v, a), one = _motion(q, v, a)
         rows = _native.regressor(self._native, q, v, a)
         return rows[0] if one else rows
 
-    def regressor_blocks(self, q: Any, v: Any, a: Any, rows: int = 10_000) -> Iterator[Array]:
+    def regressor_blocks(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, rows: int = 10_000) -> Iterator[Array]:
         """The matrices Y of so many rows after one another, (rows, n, p) each: all together may not fit into memory.
 
         Contiguous arrays of floats are not copied.
@@ -288,7 +389,7 @@ class Model:
             block = slice(first, first + rows)
             yield _native.regressor(self._native, q[block], v[block], a[block])
 
-    def mass_matrix(self, q: Any) -> Array:
+    def mass_matrix(self, q: ArrayLike) -> Array:
         """The mass matrix: (N, n, n), or (n, n) for one row, in kg, kg m or kg m^2."""
         (q,), one = _motion(q)
         mass = _native.mass_matrix(self._native, q)
@@ -331,7 +432,7 @@ class Model:
         return f"Model({self._native.name!r}, {len(self._native.parameters)} parameters)"
 
 
-def _motion(*arrays: Any) -> tuple[list[Array], bool]:
+def _motion(*arrays: ArrayLike) -> tuple[list[Array], bool]:
     """Arrays of one motion, row after row, and whether they are of one row."""
     found = [np.ascontiguousarray(x, dtype=np.float64) for x in arrays]
     one = all(x.ndim == 1 for x in found)
@@ -384,12 +485,14 @@ class Part:
         return f"Part({len(self._native.logs)} logs)"
 
 
-def inspect(logs: PathLike | Iterable[PathLike], robot: Robot | PathLike | None = None) -> Result:
-    """What log files hold and what is wrong with them."""
-    line = ["inspect", *_files(logs)]
-    if robot is not None:
-        line += ["-r", robot.path if isinstance(robot, Robot) else os.fspath(robot)]
-    return Result(*_command(line))
+def inspect(logs: LogLike | Iterable[LogLike], robot: Robot | PathLike | None = None) -> Result:
+    """What logs hold and what is wrong with them."""
+    with _Files(logs) as files:
+        joints = None if robot is None else _robot(robot).joints
+        line = ["inspect", *files.logs(logs, joints)]
+        if robot is not None:
+            line += ["-r", files.robot(robot)]
+        return Result(*_command(line))
 
 
 def friction(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, joint: str | None = None,
@@ -408,21 +511,55 @@ def lsq(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, model: Mo
     plain fit and beside it the nearest parameters of links, drives and friction that can exist, which torques are computed
     with; ``unconstrained`` leaves those out.
     """
+    def page() -> str:
+        with _Files(logs) as files:
+            line = ["lsq", *files.logs(logs, _robot(robot).joints), "-r", files.robot(robot), "--estimator", estimator]
+            line += [] if model is None else ["-m", files.model(model)]
+            line += _options({"unconstrained": unconstrained, "hold_friction": hold_friction, "as_declared": as_declared})
+            return files.page([*line, "-o", files.new("fitted.toml")])
+
     told, found = _native.lsq(_robot(robot), _logs(logs), _model(model), estimator, unconstrained, hold_friction,
                               as_declared)
-    return Fit(*told, Model(found))
+    return Fit(*told, Model(found), page if isinstance(robot, (str, os.PathLike)) or robot._path else None)
 
 
 def validate(model: Model | PathLike, logs: LogLike | Iterable[LogLike]) -> Result:
     """How far the torques of logs are off that were not used."""
-    return Result(*_native.validate(_given(model), _logs(logs)))
+    def page() -> str:
+        with _Files(logs) as files:
+            joints = _given(model).joints
+            return files.page(["validate", *files.logs(logs, joints), "-m", files.model(model)])
+
+    document, short, text = _native.validate(_given(model), _logs(logs))
+    return Result(document, short, text, page)
 
 
 def diagnose(model: Model | PathLike, logs: LogLike | Iterable[LogLike], *,
-             holdout: LogLike | Iterable[LogLike] = (), keep: bool = False) -> Diagnosis:
-    """Effects that the model lacks; ``.model`` is the refined one, ``None`` where the data are at fault."""
-    told, found = _native.diagnose(_given(model), _logs(logs), _logs(holdout), keep)
-    return Diagnosis(*told, None if found is None else Model(found))
+             holdout: LogLike | Iterable[LogLike] = (), keep: bool = False, accept: Sequence[str] = (),
+             search: bool = False, candidates: PathLike | None = None) -> Diagnosis:
+    """Effects that the model lacks; ``.model`` is the refined one, ``None`` where the data are at fault.
+
+    ``accept`` names effects to write whatever the data say, ``"backlash:q4"``; ``search`` looks for a formula for what is
+    left; ``candidates`` is a file of formulas of your own.
+    """
+    def line(files: _Files) -> list[str]:
+        joints = _given(model).joints
+        words = ["diagnose", *files.logs(logs, joints), "-m", files.model(model)]
+        for log in files.logs(holdout, joints):
+            words += ["--holdout", log]
+        return words + _options({"keep": keep, "accept": list(accept), "search": search, "candidates": candidates})
+
+    def page() -> str:
+        with _Files(logs, holdout) as files:
+            return files.page(line(files))
+
+    if accept or search or candidates is not None:
+        with _Files(logs, holdout) as files:
+            refined = files.new("refined.toml")
+            document, _, text = _command([*line(files), "-o", refined])
+            return Diagnosis(document, None, text, Model.load(refined), page)
+    (document, short, text), found = _native.diagnose(_given(model), _logs(logs), _logs(holdout), keep)
+    return Diagnosis(document, short, text, None if found is None else Model(found), page)
 
 
 def reduce(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, model: Model | PathLike | None = None,
@@ -503,13 +640,20 @@ def simulate(robot: Robot | PathLike, output: PathLike, *, model: Model | PathLi
                           os.fspath(output))
 
 
-def identify(urdf: PathLike, logs: PathLike | Iterable[PathLike], output: PathLike = "cft-ident-run") -> Identification:
-    """Everything from a URDF (or a robot file) and log files: fit, held-out errors, effects that are missing.
+def identify(urdf: PathLike, logs: LogLike | Iterable[LogLike], output: PathLike = "cft-ident-run") -> Identification:
+    """Everything from a URDF (or a robot file) and logs: fit, held-out errors, effects that are missing.
 
     Models, pages and the robot file stand in the folder ``output``; ``.model`` is the one to use.
     """
     folder = os.fspath(output)
-    document, _, text = _command(["identify", os.fspath(urdf), *_files(logs), "-o", folder])
+    with _Files(logs) as files:
+        robot = os.fspath(urdf)
+        joints = None
+        if files.of_arrays:
+            is_file = robot.endswith(".toml")
+            joints = Robot.load(robot).joints if is_file else Robot.from_urdf(robot).joints
+            robot = files.robot(robot) if is_file else robot
+        document, _, text = _command(["identify", robot, *files.logs(logs, joints), "-o", folder])
     kept = [name for name in ("refined.toml", "model.toml") if os.path.exists(os.path.join(folder, name))]
     page = os.path.join(folder, "report.html")
     html = None
@@ -533,14 +677,15 @@ def _as_file(model: Model | PathLike | None) -> Iterator[str | None]:
         yield path
 
 
-def payload(model: Model | PathLike, logs: PathLike | Iterable[PathLike], output: PathLike | None = None) -> Payload:
-    """Mass [kg], centre [m] and inertia [kg m^2] of what the arm carries in these log files, with 95 % intervals.
+def payload(model: Model | PathLike, logs: LogLike | Iterable[LogLike], output: PathLike | None = None) -> Payload:
+    """Mass [kg], centre [m] and inertia [kg m^2] of what the arm carries in these logs, with 95 % intervals.
 
     ``model`` is that of the unloaded arm; ``.model`` is that of the loaded one, which ``output`` keeps as a file.
     """
-    with _as_file(model) as path, tempfile.TemporaryDirectory() as folder:
-        loaded = os.fspath(output) if output is not None else os.path.join(folder, "loaded.toml")
-        told = _command(["payload", *_files(logs), "-m", str(path), "-o", loaded])
+    with _Files(logs) as files:
+        loaded = os.fspath(output) if output is not None else files.new("loaded.toml")
+        joints = _given(model).joints
+        told = _command(["payload", *files.logs(logs, joints), "-m", files.model(model), "-o", loaded])
         return Payload(*told, Model.load(loaded))
 
 
@@ -553,10 +698,11 @@ def torque(model: Model | PathLike, motion: PathLike, output: PathLike) -> Resul
         return Result(*_command(["torque", os.fspath(motion), "-m", str(path), "-o", os.fspath(output)]))
 
 
-def compare(one: Model | PathLike, other: Model | PathLike, logs: PathLike | Iterable[PathLike] = ()) -> Result:
-    """Where two models differ, parameter by parameter with 95 % intervals; with log files also by their errors."""
-    with _as_file(one) as first, _as_file(other) as second:
-        return Result(*_command(["compare", str(first), str(second), *_files(logs)]))
+def compare(one: Model | PathLike, other: Model | PathLike, logs: LogLike | Iterable[LogLike] = ()) -> Result:
+    """Where two models differ, parameter by parameter with 95 % intervals; with logs also by their errors."""
+    with _Files(logs) as files:
+        both = [files.model(one), files.model(other)]
+        return Result(*_command(["compare", *both, *files.logs(logs, _given(one).joints)]))
 
 
 def watch(model: Model | PathLike, log: PathLike, output: PathLike, **settings: Any) -> Result:

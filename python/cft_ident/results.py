@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -13,10 +14,33 @@ if TYPE_CHECKING:
 class Result:
     """What a stage found: ``to_dict`` is the JSON document of the command, ``html`` its page, ``str`` its tables."""
 
-    def __init__(self, document: str, page: str | None, text: str):
+    def __init__(self, document: str, page: str | None, text: str, full: Callable[[], str] | None = None):
         self.json = document
-        self.html = page
+        self._page = page
         self._text = text
+        self._full = full
+
+    @property
+    def html(self) -> str | None:
+        """The page of the command, made when it is first asked for; ``None`` where the command has none."""
+        if self._full is not None:
+            self._page, self._full = self._full(), None
+        return self._page
+
+    @property
+    def errors(self) -> dict[str, Any]:
+        """Relative torque errors as arrays in the order of ``joint``; of a diagnosis ``before`` and ``after``."""
+        import numpy as np
+
+        document = self.to_dict()
+        sides = [side for side in ("before", "after") if side in document]
+        parts = {side: document[side].get("holdout") or document[side]["train"] for side in sides} or {"error": document}
+        rows = {side: part["joints"] for side, part in parts.items()}
+        first = next(iter(rows.values()))
+        found: dict[str, Any] = {"joint": [row["joint"] for row in first]}
+        for side, of in rows.items():
+            found[side] = np.array([row["relative_error"] for row in of], dtype=float)
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """The document; undetermined numbers are ``None``."""
@@ -31,16 +55,18 @@ class Result:
 
     def save_html(self, path: Any) -> None:
         """Write the report as one page."""
-        if self.html is None:
+        page = self.html
+        if page is None:
             raise ValueError("this result has no page")
         with open(path, "w", encoding="utf-8") as file:
-            file.write(self.html)
+            file.write(page)
 
     def _repr_html_(self) -> str:
-        if self.html is None:
+        page = self.html
+        if page is None:
             return f"<pre>{html.escape(self._text)}</pre>"
         # a page of its own inside the notebook's
-        return f'<iframe srcdoc="{html.escape(self.html, quote=True)}" width="100%" height="600" frameborder="0"></iframe>'
+        return f'<iframe srcdoc="{html.escape(page, quote=True)}" width="100%" height="600" frameborder="0"></iframe>'
 
     def __str__(self) -> str:
         return self._text
@@ -52,8 +78,8 @@ class Result:
 class Fit(Result):
     """A fit with its model."""
 
-    def __init__(self, document: str, page: str, text: str, model: Model):
-        super().__init__(document, page, text)
+    def __init__(self, document: str, page: str, text: str, model: Model, full: Callable[[], str] | None = None):
+        super().__init__(document, page, text, full)
         self.model = model
 
     @property
@@ -79,8 +105,9 @@ class Identification(Result):
 class Diagnosis(Result):
     """A diagnosis; ``model`` is refined, or ``None`` where the data are at fault."""
 
-    def __init__(self, document: str, page: str, text: str, model: Model | None):
-        super().__init__(document, page, text)
+    def __init__(self, document: str, page: str | None, text: str, model: Model | None,
+                 full: Callable[[], str] | None = None):
+        super().__init__(document, page, text, full)
         self.model = model
 
 

@@ -18,7 +18,7 @@ def measured():
     def path(name: str) -> str:
         file = DATA / name
         if not file.exists():
-            pytest.skip(f"{file} is not there (docs/measured/data.md says where it is from)")
+            pytest.skip(f"{file} is not there (docs/results/measured/data.md says where it is from)")
         return str(file)
 
     return path

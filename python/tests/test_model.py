@@ -80,7 +80,7 @@ def test_friction_compensation_is_silent_at_rest_continuous_and_friction_at_spee
 
 
 def test_the_loop_of_the_manual_runs(model, tmp_path, monkeypatch):
-    page = (pathlib.Path(__file__).parents[2] / "docs/controllers.md").read_text()
+    page = (pathlib.Path(__file__).parents[2] / "docs/use.md").read_text()
     monkeypatch.chdir(tmp_path)
     model.save("model.toml")
     words = {}

@@ -2,6 +2,9 @@
 
 use std::io::IsTerminal;
 
+use cft_ident_report::report::Tone;
+use cft_ident_report::report::text::BETWEEN;
+
 const GREEN: &str = "32";
 const YELLOW: &str = "33";
 const RED: &str = "31";
@@ -18,27 +21,65 @@ const WORDS: [(&str, &str); 7] = [
     ("worse", RED),
 ];
 
-/// Whether standard output takes colour: a terminal that is not dumb, without NO_COLOR; or CLICOLOR_FORCE.
-pub(super) fn wanted() -> bool {
+/// Words behind a figure of the verdict, and its colour.
+const TONES: [(Tone, &str); 3] = [
+    (Tone::Better, GREEN),
+    (Tone::Worse, RED),
+    (Tone::High, YELLOW),
+];
+
+/// Words at the beginning of a finding or of a message, and their colour.
+const BEGINNINGS: [(&str, &str); 12] = [
+    ("confirmed", GREEN),
+    ("usable", GREEN),
+    ("known", GREEN),
+    ("limit kept", GREEN),
+    ("indicated", YELLOW),
+    ("too short", YELLOW),
+    ("high", YELLOW),
+    ("worse", RED),
+    ("not ", RED),
+    ("limit missed", RED),
+    ("warning:", YELLOW),
+    ("error:", RED),
+];
+
+fn is_wanted(terminal: bool) -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let forced = std::env::var_os("CLICOLOR_FORCE").is_some_and(|value| value != "0");
     let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-    !set("NO_COLOR") && (forced || !dumb && std::io::stdout().is_terminal())
+    !set("NO_COLOR") && (forced || !dumb && terminal)
 }
 
-/// A text with its first paragraph in bold, red where a limit is missed, and the words of verdicts in their colours.
+/// Whether standard output takes colour: a terminal that is not dumb, without NO_COLOR; or CLICOLOR_FORCE.
+pub(super) fn wanted() -> bool {
+    is_wanted(std::io::stdout().is_terminal())
+}
+
+fn painted(text: &str, colour: &str) -> String {
+    format!("\u{1b}[{colour}m{text}\u{1b}[0m")
+}
+
+/// A text with the figures of its verdict, or its first paragraph, in bold, red where a limit is missed, and the words
+/// of verdicts in their colours.
 pub(super) fn coloured(text: &str, met: bool) -> String {
+    let headline = text
+        .lines()
+        .next()
+        .is_some_and(|line| line.contains(BETWEEN));
     let (first, rest) = match text.find("\n\n") {
         Some(end) => text.split_at(end),
         None => ("", text),
     };
     let mut out = String::with_capacity(2 * text.len());
-    let style = match met {
-        true => BOLD.to_owned(),
-        false => format!("{BOLD};{RED}"),
-    };
-    for line in first.lines() {
-        out += &format!("\u{1b}[{style}m{line}\u{1b}[0m\n");
+    for (k, line) in first.lines().enumerate() {
+        out += &match (headline, k, met) {
+            (true, 0, _) => figures(line),
+            (true, _, _) => beginning(line),
+            (false, _, true) => painted(line, BOLD),
+            (false, _, false) => painted(line, &format!("{BOLD};{RED}")),
+        };
+        out.push('\n');
     }
     // the line end is there already
     let rest = match first {
@@ -54,6 +95,51 @@ pub(super) fn coloured(text: &str, met: bool) -> String {
         }
     }
     out
+}
+
+/// The figures of a verdict, each in the colour of the word behind it.
+fn figures(line: &str) -> String {
+    let figure = |figure: &str| {
+        let tone = TONES.iter().find(|(tone, _)| {
+            let word = figure.strip_suffix(')').unwrap_or_default();
+            word.ends_with(&format!("({}", tone.word()))
+        });
+        match tone {
+            Some((_, colour)) => painted(figure, &format!("{BOLD};{colour}")),
+            None => painted(figure, BOLD),
+        }
+    };
+    line.split(BETWEEN)
+        .map(figure)
+        .collect::<Vec<_>>()
+        .join(BETWEEN)
+}
+
+/// A line whose first words say how firm it is.
+fn beginning(line: &str) -> String {
+    let bare = line.trim_start();
+    let margin = &line[..line.len() - bare.len()];
+    match BEGINNINGS.iter().find(|(word, _)| bare.starts_with(word)) {
+        Some((word, colour)) => {
+            // up to the gap, or to the colon
+            let end = bare.find("  ").unwrap_or(word.len());
+            let (grade, rest) = bare.split_at(end);
+            format!("{margin}{}{rest}", painted(grade, colour))
+        }
+        None => line.to_owned(),
+    }
+}
+
+/// A message for standard error, whose first word has its colour where that leads to a terminal.
+pub(super) fn message(text: &str) -> String {
+    if !is_wanted(std::io::stderr().is_terminal()) {
+        return text.to_owned();
+    }
+    let (first, rest) = text.split_once(':').unwrap_or((text, ""));
+    match (BEGINNINGS.iter()).find(|(word, _)| word.strip_suffix(':') == Some(first)) {
+        Some((word, colour)) => painted(word, &format!("{BOLD};{colour}")) + rest,
+        None => text.to_owned(),
+    }
 }
 
 /// A line of a table, whose last cell may be a verdict.
@@ -86,5 +172,15 @@ mod tests {
              q2 \u{1b}[33mweak\u{1b}[0m\n\nno weak\n"
         );
         assert!(coloured(text, false).starts_with("\u{1b}[1;31m2 of 3"));
+    }
+
+    #[test]
+    fn figures_and_findings_of_a_verdict_have_the_colours_of_their_words() {
+        let text = "before 10 %  |  after 8 % (better)\ntorque error\n  confirmed  play of q1\n\n";
+        assert_eq!(
+            coloured(text, true),
+            "\u{1b}[1mbefore 10 %\u{1b}[0m  |  \u{1b}[1;32mafter 8 % (better)\u{1b}[0m\ntorque error\n  \
+             \u{1b}[32mconfirmed\u{1b}[0m  play of q1\n\n"
+        );
     }
 }

@@ -88,5 +88,5 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let figure = stages::compare::figure(&of, replayed.as_ref());
         context.write_picture(path, &figure.svg())?;
     }
-    Ok(Outcome::new(report.text_for(context.detail), document))
+    Ok(Outcome::new(report.text_for(context.screen), document))
 }

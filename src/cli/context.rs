@@ -16,7 +16,7 @@ use indicatif::{
 use super::error::{CliError, indented, to_stderr};
 use super::{outputs, typed};
 use cft_ident_logs::output::Together;
-use cft_ident_report::report::{Detail, figure};
+use cft_ident_report::report::{Detail, Screen, figure};
 use cft_ident_stages::identify::{self, Control};
 
 #[derive(Debug)]
@@ -28,8 +28,8 @@ pub struct Context {
     said: Mutex<Said>,
     /// The command as it was typed, without folders from the root on and without what does not change a result.
     pub(super) command: String,
-    /// How much of a result is shown.
-    pub(super) detail: Detail,
+    /// How much of a result is shown, and how wide.
+    pub(super) screen: Screen,
     /// The document goes to standard output, and nothing else.
     pub(super) prints_document: bool,
     /// [`Context::interrupted`] and the progress bars, for a stage of [`identify`].
@@ -46,6 +46,8 @@ struct Said {
     ending: Option<CliError>,
     /// Warnings that stand before those of the command's own result.
     warnings: Vec<String>,
+    /// Those of all warnings that a terminal shows only where everything is asked for.
+    asides: Vec<String>,
 }
 
 impl Context {
@@ -73,7 +75,7 @@ impl Context {
             interrupted,
             said: Mutex::default(),
             command: typed::line(arguments),
-            detail: Detail::Usual,
+            screen: Screen::of(Detail::Usual),
             prints_document: false,
             control,
             files: Together::default(),
@@ -86,7 +88,7 @@ impl Context {
 
     /// What is shown of a result that is no report: all of it, or `brief` where little is asked for.
     pub(super) fn text(&self, all: String, brief: &str) -> String {
-        match self.detail {
+        match self.screen.detail {
             Detail::Brief => format!("{brief}\n"),
             Detail::Usual | Detail::Full => all,
         }
@@ -163,6 +165,15 @@ impl Context {
         }
     }
 
+    /// Says of a warning that it does not touch the result that was asked for.
+    pub(super) fn aside(&self, text: &str) {
+        self.said().asides.push(text.to_owned());
+    }
+
+    pub(super) fn asides(&self) -> Vec<String> {
+        self.said().asides.clone()
+    }
+
     pub(super) fn warnings(&self) -> Vec<String> {
         self.said().warnings.clone()
     }
@@ -170,6 +181,11 @@ impl Context {
     /// A line on standard error for the person who waits; `-q` silences it.
     pub fn note(&self, text: &str) {
         note(text, self.quiet);
+    }
+
+    /// The bar of a command of several stages, above those of the work in each.
+    pub(super) fn stages(&self, names: &'static [&'static str]) -> StageBar {
+        StageBar::new(names, self.bars)
     }
 
     /// A progress bar over `total` steps (a spinner for `None`), removed when it is dropped.
@@ -256,6 +272,44 @@ impl RunningBar {
 
     pub fn label(&self, label: &str) {
         self.bar.set_message(label.to_owned());
+    }
+}
+
+/// Which stage of a command runs, of how many.
+#[derive(Debug)]
+pub(super) struct StageBar {
+    bar: ProgressBar,
+    names: &'static [&'static str],
+}
+
+impl StageBar {
+    fn new(names: &'static [&'static str], drawn: bool) -> Self {
+        let bar = ProgressBar::new(names.len() as u64);
+        let bar = match drawn {
+            true => BARS.insert(0, bar),
+            false => {
+                bar.set_draw_target(ProgressDrawTarget::hidden());
+                bar
+            }
+        };
+        if let Ok(style) = ProgressStyle::with_template("{msg:<24} [{bar:32}] {pos} of {len}") {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        StageBar { bar, names }
+    }
+
+    /// A stage begins; those before it have ended.
+    pub fn begin(&self, name: &'static str) {
+        if let Some(k) = self.names.iter().position(|known| *known == name) {
+            self.bar.set_message(name);
+            self.bar.set_position(k as u64 + 1);
+        }
+    }
+}
+
+impl Drop for StageBar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
     }
 }
 

@@ -123,7 +123,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 ..fault.result()
             };
             let document = Document::new("diagnose", &[], &[], &result)?;
-            return Ok(Outcome::new(report.text_for(context.detail), document));
+            return Ok(Outcome::new(report.text_for(context.screen), document));
         }
     };
     let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
@@ -181,7 +181,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let written = format!("written: {}{unchanged}", path.display());
         report.terminal().line(&written);
     }
-    Ok(Outcome::new(report.text_for(context.detail), document))
+    Ok(Outcome::new(report.text_for(context.screen), document))
 }
 
 fn at_fault(fault: &DataFault) -> CliError {

@@ -7,6 +7,7 @@ use std::fmt;
 use std::io::{IsTerminal, Write};
 
 use super::exit::Exit;
+use super::{colour, window};
 use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::log::{LogError, is_hidden};
@@ -161,7 +162,10 @@ impl From<JsonError> for CliError {
 pub(super) fn to_stderr(stderr: &mut dyn Write, text: &str) {
     // A closed standard error is no reason to lose a result.
     let _ = match std::io::stderr().is_terminal() {
-        true => write!(stderr, "{}", folded(text)),
+        true => {
+            let width = window::columns(window::Stream::Error);
+            write!(stderr, "{}", colour::message(&folded(text, width)))
+        }
         false => writeln!(stderr, "{text}"),
     };
 }

@@ -55,7 +55,7 @@ enum Content {
     Config(&'static str),
 }
 
-struct Machine {
+pub(super) struct Machine {
     name: &'static str,
     what: &'static str,
     /// Licence of its data; null of a simulation.
@@ -146,7 +146,17 @@ static CFT: Machine = Machine {
 const SEED: u64 = 1;
 
 impl ExampleMachine {
-    fn machine(self) -> &'static Machine {
+    /// Its description and its log, by which it is identified; none of the simulated one, which has a campaign.
+    pub(super) fn robot_and_log(self) -> Option<[&'static str; 2]> {
+        match self {
+            ExampleMachine::Ur10 => Some(["ur10.urdf", "ur10.csv"]),
+            ExampleMachine::Tx40 => Some(["tx40.toml", "tx40.csv"]),
+            ExampleMachine::Bldc => Some(["bldc.toml", "bldc.csv"]),
+            ExampleMachine::Cft => None,
+        }
+    }
+
+    pub(super) fn machine(self) -> &'static Machine {
         match self {
             ExampleMachine::Ur10 => &UR10,
             ExampleMachine::Tx40 => &TX40,
@@ -238,7 +248,12 @@ fn commands(next: &str) -> Vec<String> {
     whole.lines().map(str::to_owned).collect()
 }
 
-fn write(machine: &Machine, folder: &Path, context: &Context) -> Result<Vec<String>, CliError> {
+/// Writes the files of an example into a folder; their names.
+pub(super) fn write(
+    machine: &Machine,
+    folder: &Path,
+    context: &Context,
+) -> Result<Vec<String>, CliError> {
     let unusable = |e: &dyn std::fmt::Display| {
         CliError::output(format!("cannot write into {}: {e}", folder.display()))
             .hint("name another folder with -o")

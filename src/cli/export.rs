@@ -20,7 +20,9 @@ use cft_ident_export::export::arm::{Arm, Says};
 use cft_ident_export::export::dissipative::below_zero;
 use cft_ident_export::export::left_out::{self, Elsewhere};
 use cft_ident_export::export::{self, ExportError, Note, Program, urdf_source};
-use cft_ident_files::config::{self, ModelFile, RobotFile, UrdfReplacement, replaced_in_urdf};
+use cft_ident_files::config::{
+    self, ModelFile, RobotFile, UrdfReplacement, replaced_in_mjcf, replaced_in_urdf,
+};
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
@@ -72,6 +74,15 @@ pub struct Args {
     /// MJCF file of MuJoCo to write
     #[arg(long, value_name = "FILE.xml", group = "into", value_parser = arguments::ends_in(["xml"]))]
     pub mjcf: Option<PathBuf>,
+    /// MJCF of the same robot whose geoms, meshes, names and actuators the one of --mjcf keeps: only inertials,
+    /// armatures and friction are replaced
+    #[arg(
+        hide_short_help = true,
+        long,
+        value_name = "FILE.xml",
+        requires = "mjcf"
+    )]
+    pub mjcf_source: Option<PathBuf>,
     /// SDF file of Gazebo to write
     #[arg(hide_short_help = true, long, value_name = "FILE.sdf", group = "into", value_parser = arguments::ends_in(["sdf"]))]
     pub sdf: Option<PathBuf>,
@@ -218,7 +229,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs.into_iter().filter_map(|path| path.as_deref());
     let outputs = outputs.chain(formats.iter().flat_map(|f| [f.path, &f.side]));
     let inputs = paths_of(&args.logs).chain([&*args.model]);
-    context.check_outputs(inputs.chain(args.urdf_source.as_deref()), outputs)?;
+    let sources = args.urdf_source.iter().chain(&args.mjcf_source);
+    context.check_outputs(inputs.chain(sources.map(|path| &**path)), outputs)?;
     let given = files::model(&args.model, context)?;
     for effect in &given.value.file.effects {
         if let (Some(reason), false) = (no_torque(&effect.name), args.without_effects) {
@@ -336,7 +348,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             let side = export::left_out::side_file(&found, &head, &logs).map_err(failed)?;
             head.extend(left_out::lines(&found, &logs, Elsewhere::Nowhere));
             head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
-            texts.push((format.path, format.what, (format.text)(&arm, &head)));
+            let of_source = args.mjcf_source.as_deref();
+            let text = match of_source.filter(|_| args.mjcf.as_deref() == Some(format.path)) {
+                None => (format.text)(&arm, &head),
+                Some(source) => {
+                    let names = controller_names(&given.value.file);
+                    let joints = export::mjcf::replacements(&arm, &names);
+                    let shown = escape(&source.to_string_lossy());
+                    replaced_in_mjcf(&shown, &config::text(source)?, &joints, &head)?
+                }
+            };
+            texts.push((format.path, format.what, text));
             texts.push((&format.side, "what it cannot say", side));
             beyond.extend(found.into_iter().map(|part| Beyond {
                 file: file_name(format.path),

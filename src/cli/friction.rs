@@ -100,5 +100,5 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     checked.write(context)?;
     context.write_text(&args.output, &model.to_toml()?)?;
     written(&mut report, &args.output);
-    Ok(Outcome::new(report.text_for(context.detail), document))
+    Ok(Outcome::new(report.text_for(context.screen), document))
 }

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::beside_truth::{BesideTruth, load_truth, true_value};
+use super::named::{self, Named, is_urdf};
 use super::{
     CliError, Context, Outcome, campaign, file_name, held_out, logs_of, names_of, new, pictures,
     setup, typed, validate,
@@ -29,32 +30,36 @@ use cft_ident_stages::setup::Finding;
 const EXAMPLE: &str = "\
 Example:
   cft-ident identify
-  cft-ident identify arm.urdf log.mcap -o run
+  cft-ident identify ur10
+  cft-ident identify log.mcap arm.urdf -o run
   cft-ident identify campaign.toml -o runs/monday";
 
 /// Run everything: friction, inertias, validation, diagnosis, and one report.
 ///
-/// A robot, as a URDF or a robot file, is followed by its logs: columns are mapped, parts are held out, and what was
-/// guessed stands first in the report, with the line to change. One campaign file alone says all of it. Without a
-/// file the built-in campaign of the CFT robot is simulated first, and the result is compared with its truth at
-/// the end.
+/// Name a robot (URDF or robot file) and its logs, in any order: columns are mapped, a part is held out, and every guess
+/// is listed with the line to change. A campaign file alone says all of it. The name of an example (ur10, tx40, bldc)
+/// stands for its files. Without a name the CFT robot is simulated, and the result is compared with the truth.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// Robot (URDF, robot file, or a built-in one such as configs/ur10.toml), or a campaign file
-    #[arg(value_name = "ROBOT|CAMPAIGN.toml")]
-    pub robot: Option<PathBuf>,
-    /// Logs of the robot; a span is chosen by LOG@0..70% or LOG@15.2..23s
-    #[arg(value_name = "LOG")]
-    pub logs: Vec<LogSpec>,
+    /// Robot (URDF, robot file, or a built-in one such as configs/ur10.toml) and its logs, LOG@0..70% for a part of one;
+    /// or a campaign file, or an example
+    #[arg(value_name = "ROBOT LOG...|CAMPAIGN.toml|EXAMPLE")]
+    pub files: Vec<LogSpec>,
+    /// The robot, as a URDF of any name
+    #[arg(long, value_name = "FILE")]
+    pub urdf: Option<PathBuf>,
+    /// A log of any name; may be given more than once
+    #[arg(long, value_name = "LOG")]
+    pub log: Vec<LogSpec>,
     /// Link of the URDF where the chain ends, if it branches
-    #[arg(long, value_name = "LINK", requires = "logs")]
+    #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
     /// Rate of logs that have no column of times
-    #[arg(long, value_name = "HZ", requires = "logs", value_parser = new::rate)]
+    #[arg(long, value_name = "HZ", value_parser = new::rate)]
     pub rate: Option<f64>,
     /// Topic of the robot in a recording of several machines
-    #[arg(long, value_name = "NAME", requires = "logs")]
+    #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
     /// Folder to write into [default: cft-ident-run, or the file's name with .run]
     #[arg(short, long, value_name = "DIR")]
@@ -73,6 +78,15 @@ pub struct Args {
 const FOLDER: &str = "cft-ident-run";
 /// Seed where none is named.
 const SEED: u64 = 1;
+/// The stages in their order.
+const STAGES: [&str; 6] = [
+    "set-up",
+    "friction",
+    "inertias",
+    "held-out data",
+    "missing effects",
+    "report",
+];
 struct Work {
     name: String,
     campaign: Campaign,
@@ -90,36 +104,30 @@ struct Work {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let of_robot = !args.logs.is_empty();
-    let folder = args.output.clone().unwrap_or_else(|| match &args.robot {
-        None => PathBuf::from(FOLDER),
+    let named = named::named(&args.files, (args.urdf.as_deref(), &args.log), context)?;
+    let folder = args.output.clone().unwrap_or_else(|| match &named {
+        Named::BuiltIn => PathBuf::from(FOLDER),
         // beside the campaign; a robot may lie anywhere
-        Some(file) if of_robot => {
+        Named::Robot(file, _) => {
             let name = file.file_stem().unwrap_or_default();
             PathBuf::from(name).with_extension("run")
         }
-        Some(file) => file.with_extension("run"),
+        Named::Campaign(file) => file.with_extension("run"),
     });
-    if let (Some(file), false) = (&args.robot, of_robot) {
-        if is_urdf(file) {
-            let named = file.display();
-            return Err(
-                CliError::input(format!("{named}: a robot without a log")).hint(format!(
-                    "name its logs behind it: cft-ident identify {named} LOG.."
-                )),
-            );
-        }
+    if let Named::Campaign(file) = &named {
         // read again below: no folder is made for a campaign that cannot be run
-        Campaign::load(file)?;
+        named::campaign(file)?;
     }
     context.files.make_folder(&folder).map_err(|e| {
         CliError::output(format!("cannot make the folder {}: {e}", folder.display()))
             .hint("name another one with -o")
     })?;
-    let work = match &args.robot {
-        Some(robot) if of_robot => Work::of_robot(robot, args, &folder, context)?,
-        Some(file) => Work::of_campaign(file, Vec::new())?,
-        None => {
+    let work = match &named {
+        Named::Robot(robot, logs) => {
+            Work::of_robot((robot.as_path(), logs.as_slice()), args, &folder, context)?
+        }
+        Named::Campaign(file) => Work::of_campaign(file, Vec::new())?,
+        Named::BuiltIn => {
             let (_, warnings) = campaign::simulate(&folder, args.seed.unwrap_or(SEED), context)?;
             Work::of_campaign(&folder.join("campaign.toml"), warnings)?
         }
@@ -130,13 +138,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         folder.display()
     );
     Ok(outcome)
-}
-
-/// Whether a file is the description of a robot and no file of this tool.
-fn is_urdf(file: &Path) -> bool {
-    // a document of JSON is refused by the readers of TOML
-    file.extension()
-        .is_some_and(|end| end != "toml" && end != "json")
 }
 
 impl Work {
@@ -158,12 +159,12 @@ impl Work {
     }
 
     fn of_robot(
-        file: &Path,
+        (file, all): (&Path, &[LogSpec]),
         args: &Args,
         folder: &Path,
         context: &Context,
     ) -> Result<Self, CliError> {
-        let Some(first) = args.logs.first() else {
+        let Some(first) = all.first() else {
             return Err(CliError::input("no log is named"));
         };
         let (mut robot, mut draft, mut guesses) = (file.to_path_buf(), None, Vec::new());
@@ -191,13 +192,13 @@ impl Work {
                 LoggedRobot::new(&robot.to_string_lossy(), found.file)
             }
         };
-        let logs = held_out::parted(&args.logs);
+        let logs = held_out::parted(all);
         if logs.validation.is_empty() {
             let text =
                 "no part of a log is held out: the error on data that were not fitted is not known";
             warnings.push(text.to_owned());
         }
-        let names = names_of(&args.logs).join(", ");
+        let names = names_of(all).join(", ");
         let of = file_name(file);
         Ok(Self {
             name: format!("{of} with {names}"),
@@ -266,6 +267,8 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         // what was guessed of the columns gives way to what the torques say
         with_draft.fix_setup = Some(work.robot.clone());
     }
+    let stages = context.stages(&STAGES);
+    stages.begin("set-up");
     let data = Dataset::new(&work.machine, &logs_of(&training));
     let checked = setup::checked(data, (&work.robot, &[]), &with_draft, context)?;
     warnings.extend(checked.warnings.iter().cloned());
@@ -293,9 +296,23 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         hold_friction: args.hold_friction,
     };
     let control = &context.control;
+    let first = if one_joint.is_empty() {
+        "inertias"
+    } else {
+        "friction"
+    };
+    stages.begin(first);
     let found = identify::identify(&data, &settings, control, &mut |end| {
+        match end {
+            StageEnd::Friction(..) => stages.begin("inertias"),
+            StageEnd::Dynamics(..) if unseen.is_empty() => stages.begin("missing effects"),
+            StageEnd::Dynamics(..) => stages.begin("held-out data"),
+            StageEnd::Validated(_) => stages.begin("missing effects"),
+            StageEnd::Refined(_) => {}
+        }
         keep(end, &machine, &title, &mut out)
     })?;
+    stages.begin("report");
     warnings.extend(found.warnings.iter().cloned());
     let (mut diagnosis, mut replayed_diagnosis) = (None, None);
     match &found.diagnosed {
@@ -387,7 +404,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         .map(|found| validate::missed(found.judged(), limit));
     Ok(Outcome {
         missed: missed.unwrap_or_default(),
-        ..Outcome::new(report.text_for(context.detail), document)
+        ..Outcome::new(report.text_for(context.screen), document)
     })
 }
 

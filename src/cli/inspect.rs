@@ -298,12 +298,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         setup: report.findings,
         topics: (!all_topics.is_empty()).then_some(all_topics),
     };
-    let shown = match known.is_some() || context.detail == Detail::Brief {
+    let shown = match known.is_some() || context.screen.detail == Detail::Brief {
         true => String::new(),
         false => topics_text(result.topics.as_deref().unwrap_or_default()),
     };
     Ok(Outcome::new(
-        text.text_for(context.detail) + &shown,
+        text.text_for(context.screen) + &shown,
         Document::new("inspect", &provenance, &warnings, &result)?,
     ))
 }

@@ -139,7 +139,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     checked.write(context)?;
     context.write_text(&args.output, &model.to_toml()?)?;
     written(&mut report, &args.output);
-    Ok(Outcome::new(report.text_for(context.detail), document))
+    Ok(Outcome::new(report.text_for(context.screen), document))
 }
 
 /// Logs as a shell takes them; of many, and of reduced ones, which hold no rows to diagnose, a word.

@@ -27,6 +27,7 @@ mod identify;
 mod inspect;
 mod known_payload;
 mod lsq;
+mod named;
 mod new;
 mod outcome;
 mod outputs;
@@ -42,6 +43,7 @@ mod track;
 mod typed;
 mod validate;
 mod watch;
+mod window;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -55,8 +57,8 @@ use clap::{Parser, Subcommand};
 
 use cft_ident_logs::log::LogSpec;
 use cft_ident_logs::output;
-use cft_ident_report::report::table::{WIDTH, folded};
-use cft_ident_report::report::{Detail, Report};
+use cft_ident_report::report::table::folded;
+use cft_ident_report::report::{Detail, Report, Screen};
 use cft_ident_stages::identify::{Log, ReducedLogs, is_reduced};
 
 use arguments::Destination;
@@ -130,7 +132,7 @@ The help of each command ends with examples; --help-all has every option. Their 
 
 /// Identification of robot dynamics from logged joint positions and torques.
 #[derive(Debug, Parser)]
-#[command(name = "cft-ident", version, max_term_width = 80, after_help = EXAMPLES, disable_help_flag = true)]
+#[command(name = "cft-ident", version, max_term_width = 100, after_help = EXAMPLES, disable_help_flag = true)]
 pub struct Cli {
     #[command(flatten)]
     common: Common,
@@ -264,10 +266,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
             }
             // Help and version are answers on standard output, the rest are errors.
             let text = answer.render().to_string();
-            let long = |line: &str| line.chars().count() > WIDTH;
+            let width = window::columns(window::Stream::Error);
+            let long = |line: &str| line.chars().count() > width;
             match answer.use_stderr() && text.lines().any(long) {
                 // a long list of values, which the parser leaves in one line
-                true => error::to_stderr(&mut std::io::stderr(), folded(&text).trim_end()),
+                true => error::to_stderr(&mut std::io::stderr(), folded(&text, width).trim_end()),
                 false => drop(answer.print()),
             }
             return match answer.use_stderr() {
@@ -313,10 +316,13 @@ fn execute(
     let quiet = cli.common.quiet;
     let document = json.and_then(Destination::file);
     let mut context = Context::new(quiet, document, interrupted, arguments);
-    context.detail = match (quiet, cli.common.verbose) {
-        (true, _) => Detail::Brief,
-        (_, true) => Detail::Full,
-        _ => Detail::Usual,
+    context.screen = Screen {
+        detail: match (quiet, cli.common.verbose) {
+            (true, _) => Detail::Brief,
+            (_, true) => Detail::Full,
+            _ => Detail::Usual,
+        },
+        width: window::columns(window::Stream::Output),
     };
     context.prints_document = matches!(json, Some(Destination::Stdout));
     // Said before the long run, also by a command that has no other output.
@@ -324,12 +330,13 @@ fn execute(
     let mut outcome = cli.command.run(&context)?;
     outcome.document.warn_first(context.warnings());
     if let Some(page) = context.page() {
-        outcome.says_where(&page, context.detail);
+        outcome.says_where(&page, context.screen.detail);
     }
+    outcome.asides = context.asides();
     let exit = outcome::show(
         &outcome,
         json,
-        (&context.files, context.detail),
+        (&context.files, context.screen.detail),
         &mut std::io::stdout().lock(),
         &mut std::io::stderr().lock(),
     )?;
@@ -381,7 +388,7 @@ mod tests {
         let args: super::convert::Args = parse("a.csv b.csv out.mcap").unwrap();
         assert_eq!((args.logs.len(), args.output), (2, "out.mcap".into()));
         let args: super::identify::Args = parse("").unwrap();
-        assert!(args.robot.is_none());
+        assert!(args.files.is_empty());
         let args: super::simulate::Args = parse(
             "-r cft.toml --move q4 --seconds 20 --effect payload:mass=1 --effect ripple:q5 --seed 3 -o q4.csv",
         )

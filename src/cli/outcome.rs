@@ -22,6 +22,8 @@ pub struct Outcome {
     pub document: Document,
     /// Limits that the user set and the result misses, one sentence each; they make exit status 1.
     pub missed: Vec<String>,
+    /// Warnings of the document that do not touch what was asked for.
+    pub(super) asides: Vec<String>,
 }
 
 impl Outcome {
@@ -31,6 +33,7 @@ impl Outcome {
             text,
             document,
             missed: Vec::new(),
+            asides: Vec::new(),
         }
     }
 
@@ -43,7 +46,7 @@ impl Outcome {
     }
 }
 
-/// Warnings that are shown before a result.
+/// Warnings that are shown below a result.
 const MAX_WARNINGS: usize = 8;
 /// Those of them about one log or joint.
 const ABOUT_ONE: usize = 2;
@@ -56,7 +59,35 @@ pub(super) fn show(
     stdout: &mut dyn Write,
     stderr: &mut dyn Write,
 ) -> Result<Exit, CliError> {
-    let all: Vec<&str> = outcome.document.warnings().collect();
+    match json {
+        Some(Destination::Stdout) => {
+            write(stdout, &outcome.document.text()).map_err(|error| no_standard_output(&error))?;
+        }
+        Some(Destination::File(path)) => {
+            files.write(path, outcome.document.text().as_bytes())?;
+            write_for_a_person(stdout, outcome)?;
+        }
+        None => write_for_a_person(stdout, outcome)?,
+    }
+    files.commit()?;
+    warn(outcome, detail, stderr);
+    for limit in &outcome.missed {
+        to_stderr(stderr, &format!("limit missed: {}", indented(limit)));
+    }
+    Ok(match outcome.missed.is_empty() {
+        true => Exit::Success,
+        false => Exit::LimitMissed,
+    })
+}
+
+/// Shows the warnings, after the result: they explain it.
+fn warn(outcome: &Outcome, detail: Detail, stderr: &mut dyn Write) {
+    let aside = |warning: &&str| outcome.asides.iter().any(|text| text == warning);
+    let all = outcome.document.warnings();
+    let all: Vec<&str> = match detail {
+        Detail::Full => all.collect(),
+        _ => all.filter(|warning| !aside(warning)).collect(),
+    };
     let most = match detail {
         Detail::Full => usize::MAX,
         _ => MAX_WARNINGS,
@@ -72,24 +103,6 @@ pub(super) fn show(
             &format!("warning: {more} more; --verbose shows them, --json holds them"),
         );
     }
-    match json {
-        Some(Destination::Stdout) => {
-            write(stdout, &outcome.document.text()).map_err(|error| no_standard_output(&error))?;
-        }
-        Some(Destination::File(path)) => {
-            files.write(path, outcome.document.text().as_bytes())?;
-            write_for_a_person(stdout, outcome)?;
-        }
-        None => write_for_a_person(stdout, outcome)?,
-    }
-    files.commit()?;
-    for limit in &outcome.missed {
-        to_stderr(stderr, &format!("limit missed: {}", indented(limit)));
-    }
-    Ok(match outcome.missed.is_empty() {
-        true => Exit::Success,
-        false => Exit::LimitMissed,
-    })
 }
 
 /// The warnings that are shown, and how many are not: of several about one log or joint the first two.
@@ -151,6 +164,7 @@ mod tests {
             text: "joint  rmse\n".into(),
             document: Document::new("validate", &[], &warnings, &body).unwrap(),
             missed: missed.iter().map(|limit| limit.to_string()).collect(),
+            asides: Vec::new(),
         }
     }
 

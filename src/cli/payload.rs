@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::{CliError, Context, Outcome, files, logs_of, names_of, paths_of};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, paths_of, written};
 use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
+use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::{Figure, Finding, Headline, Report, Tone};
 use cft_ident_stages::identify::{
     self, Dataset, Number95, Payload, PayloadReading, PayloadVerdict,
 };
@@ -34,31 +36,53 @@ pub struct Args {
     /// free gains contradict it, or where it makes the error of a joint larger
     #[arg(short, long, value_name = "LOADED.toml")]
     pub output: Option<PathBuf>,
+    /// Write the same as a page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
+    pub report: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs = paths_of(&args.logs).chain([&*args.model]);
-    context.check_outputs(inputs, args.output.as_deref())?;
+    let outputs = args.output.iter().chain(&args.report).map(|path| &**path);
+    context.check_outputs(inputs, outputs)?;
     let given = files::model(&args.model, context)?.value;
     let data = Dataset::new(&given.machine(), &logs_of(&args.logs));
     let found = identify::payload(&data, &given, &context.control)?;
-    let brief = sentences(&found).join("\n");
-    let tables = text_of(&found, &names_of(&args.logs).join(", "));
-    let mut text = format!("{brief}\n\n{tables}");
+    let mut report = report(&found, &names_of(&args.logs).join(", "));
+    if let Some(path) = &args.report {
+        let page = &mut report.page();
+        let of = (&given.file.robot, &context.command);
+        provenance::section(page, of.0, &found.inputs, &[], None, of.1);
+        context.write_text(path, &report.html())?;
+        written(&mut report, path);
+    }
     if let Some(path) = &args.output {
         let (model, how) = match found.loaded(&given.file) {
             Some(loaded) => (loaded.to_toml()?, ""),
             None => (files::text(&args.model)?, ", the given model byte for byte"),
         };
         context.write_text(path, &model)?;
-        text += &format!("written: {}{how}\n", path.display());
+        let line = format!("written: {}{how}", path.display());
+        report.terminal().line(&line);
     }
     Ok(Outcome::new(
-        context.text(text, &brief),
+        report.text_for(context.screen),
         Document::new("payload", &found.inputs, &found.warnings, &found)?,
     ))
 }
 
+/// A gain error as percent; nothing is known of one whose interval holds a gain of zero.
+fn gain(x: &Number95) -> String {
+    match (x.value, x.interval_95) {
+        (Some(value), Some([low, high])) if low > -1.0 => {
+            let [value, low, high] = [value, low, high].map(|x| format!("{:+.1}", 100.0 * x));
+            format!("{value} % ({low} .. {high})")
+        }
+        _ => "not determined".to_owned(),
+    }
+}
+
+/// A number with its interval.
 fn shown(x: &Number95) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
@@ -69,55 +93,97 @@ fn shown(x: &Number95) -> String {
     }
 }
 
-fn sentences(found: &Payload) -> Vec<String> {
+/// The mass with both readings of the gains, and what that means.
+fn report(found: &Payload, logs: &str) -> Report {
+    let mut report = Report::new(&format!("Payload in {}", escape(logs)));
+    let mut all = report.everywhere();
     let mass = |gains_free: bool| {
         let reading = found.readings.iter().find(|of| of.gains_free == gains_free);
-        reading.map_or(number::ABSENT.to_owned(), |of| {
-            format!("{} kg", shown(&of.mass))
-        })
+        let value = reading.map(|of| format!("{} kg", shown(&of.mass)));
+        value.unwrap_or(number::ABSENT.to_owned())
     };
-    let (held, free) = (mass(false), mass(true));
-    let said = match found.verdict {
-        PayloadVerdict::Seen => format!(
-            "payload: {held} with the gains of the torque channels as the model has them, {free} with a gain error of every joint free"
-        ),
-        PayloadVerdict::NotApartFromGains => format!(
-            "payload: {held} if the gains of the torque channels are those of the model\nthese data cannot tell the mass apart from the gains: {free} with a gain error of every joint free; a log of wider motion of all joints, the arm stretched out and folded, lifted against gravity, does"
-        ),
-        PayloadVerdict::GainsContradict => format!(
-            "the gains of the torque channels are not those of the model, or the log is not of this arm: {held} with them, {free} with a gain error of every joint free"
-        ),
-        PayloadVerdict::NoneSeen => format!(
-            "no payload seen: {held}; with a gain error of every joint free: {free}"
-        ),
-        PayloadVerdict::NotDetermined => "these data do not determine the mass: log a motion that lifts the last link against gravity, or moves it fast".to_owned(),
+    let figure = |label, value| Figure {
+        label,
+        value,
+        tone: Tone::Plain,
     };
-    let worse = found.readings.iter().filter_map(made_worse);
-    worse.chain(said.lines().map(str::to_owned)).collect()
+    all.headline(Headline {
+        figures: vec![
+            figure("mass", mass(false)),
+            figure("with free gains", mass(true)),
+        ],
+        of: "value and 95 % interval, with the gains of the torque channels as in the model, and with a gain error of \
+             every joint free"
+            .to_owned(),
+    });
+    let (grade, text, next) = match found.verdict {
+        PayloadVerdict::Seen => ("confirmed", "a payload, by both", None),
+        PayloadVerdict::NotApartFromGains => (
+            "not certain",
+            "these data cannot tell the mass from an error of the gains; the first number holds if the gains are right",
+            Some(
+                "Next: log all joints over wider ranges, the arm stretched out and folded, lifted against gravity.",
+            ),
+        ),
+        PayloadVerdict::GainsContradict => (
+            "not certain",
+            "the two disagree: the gains are not those of the model, or the log is of another arm; the second number \
+             holds if only the gains changed",
+            Some("Next: `cft-ident validate` on a log without a load."),
+        ),
+        PayloadVerdict::NoneSeen => (
+            "none",
+            "no payload; one above the upper end of the interval would show",
+            None,
+        ),
+        PayloadVerdict::NotDetermined => (
+            "not determined",
+            "these data do not show the mass",
+            Some("Next: log a motion that lifts the last link against gravity, or moves it fast."),
+        ),
+    };
+    let mut findings = vec![Finding {
+        grade,
+        text: text.to_owned(),
+    }];
+    findings.extend(found.readings.iter().filter_map(made_worse));
+    all.found(findings);
+    if let Some(next) = next {
+        all.next(next, None);
+    }
+    all.line("");
+    let [body, errors] = tables(found, logs);
+    all.table(body);
+    all.line("");
+    all.table(errors);
+    report
 }
 
-/// A warning where the body of a reading makes the error of a joint larger.
-fn made_worse(reading: &PayloadReading) -> Option<String> {
+/// Where the body of a reading makes the error of a joint larger.
+fn made_worse(reading: &PayloadReading) -> Option<Finding> {
     let worse: Vec<String> = reading
         .worse()
         .map(|of| {
             let (before, after) = (number::percent(of.before), number::percent(of.after));
-            format!("{} {before} -> {after}", escape(&of.joint))
+            format!("{} from {before} to {after}", escape(&of.joint))
         })
         .collect();
     let how = match reading.gains_free {
         false => "",
-        true => " beside free gains",
+        true => " with free gains",
     };
-    (!worse.is_empty()).then(|| {
-        format!(
-            "warning: the body{how} makes errors larger: {}. The model is not that of this arm without a load, or its gains changed: do not use the mass before `validate` on a log without a load is as good as it was",
+    (!worse.is_empty()).then(|| Finding {
+        grade: "worse",
+        text: format!(
+            "the body{how} makes errors larger: {}. The model is not that of this arm without a load, or its gains \
+             changed: check it with `validate` on a log without a load before you use the mass",
             worse.join(", ")
-        )
+        ),
     })
 }
 
-fn text_of(found: &Payload, logs: &str) -> String {
+/// The body, and the errors of the joints with it.
+fn tables(found: &Payload, logs: &str) -> [Table; 2] {
     let caption = format!(
         "body on {} by {}, in the frame of that link, with 95 % intervals",
         escape(&found.link),
@@ -143,7 +209,7 @@ fn text_of(found: &Payload, logs: &str) -> String {
     }
     let mut errors = Table::new(&[
         ("joint", Align::Left),
-        ("error as given", Align::Decimal),
+        ("error before", Align::Decimal),
         ("with the body", Align::Decimal),
         ("and gains", Align::Decimal),
         ("gain error", Align::Left),
@@ -155,9 +221,9 @@ fn text_of(found: &Payload, logs: &str) -> String {
                 &number::percent(a.before),
                 &number::percent(a.after),
                 &number::percent(b.after),
-                &shown(&gain.error),
+                &self::gain(&gain.error),
             ]);
         }
     }
-    format!("{table}\n{errors}")
+    [table, errors]
 }

@@ -102,7 +102,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     checked.write(context)?;
     context.files.write(&args.output, &bytes)?;
     Ok(Outcome::new(
-        report(&found, &result, args).text_for(context.detail),
+        report(&found, &result, args).text_for(context.screen),
         document,
     ))
 }

@@ -75,7 +75,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         point,
     };
     Ok(Outcome::new(
-        report.text_for(context.detail),
+        report.text_for(context.screen),
         Document::new("show", &inputs, &[], &shown)?,
     ))
 }

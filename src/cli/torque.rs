@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use super::excite::LADDER_S;
-use super::{CliError, Context, Outcome, arguments, columns_of, files};
+use super::{CliError, Context, Outcome, arguments, columns_of, files, written};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
-use cft_ident_logs::log::{LogSpec, Provenance};
+use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_plant::excite::{self, ExciteError, Motion};
+use cft_ident_report::report::Report;
 use cft_ident_report::report::json::Document;
+use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::table::{Align, Table};
 use cft_ident_stages::identify::{self, Log};
 
@@ -31,6 +33,9 @@ pub struct Args {
     /// Log to write
     #[arg(short, long, value_name = "OUT.csv|.mcap", value_parser = arguments::log_file)]
     pub output: PathBuf,
+    /// Write the same as a page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
+    pub report: Option<PathBuf>,
 }
 
 /// Rate of a planned motion where the robot file names none \[Hz\].
@@ -75,7 +80,8 @@ fn planned(
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    context.check_outputs([&*args.log.path, &*args.model], [&*args.output])?;
+    let outputs = args.report.iter().chain([&args.output]).map(|path| &**path);
+    context.check_outputs([&*args.log.path, &*args.model], outputs)?;
     let given = files::model(&args.model, context)?;
     let (name, file) = (&given.value.name, &given.value.file);
     let joints = given.value.file.robot.joint_names();
@@ -128,9 +134,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     inputs.splice(0..0, trajectory);
     let document = Document::new("torque", &inputs, &found.warnings, &found.along)?;
     context.files.add_log(out)?;
-    let written = format!("written: {}", args.output.display());
-    Ok(Outcome::new(
-        context.text(format!("{table}{written}\n"), &written),
-        document,
-    ))
+    let mut report = Report::new(&format!("Torque along {}", escape(&args.log.name())));
+    report.everywhere().table(table);
+    if let Some(path) = &args.report {
+        let page = &mut report.page();
+        provenance::section(page, &file.robot, &inputs, &[], None, &context.command);
+        context.write_text(path, &report.html())?;
+        written(&mut report, path);
+    }
+    let line = format!("written: {}", args.output.display());
+    report.terminal().line(&line);
+    report.brief().verdict(&line, true);
+    Ok(Outcome::new(report.text_for(context.screen), document))
 }

@@ -49,7 +49,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(path) = &args.report {
         context.write_text(path, &report.html())?;
     }
-    Ok(Outcome::new(report.text_for(context.detail), document))
+    Ok(Outcome::new(report.text_for(context.screen), document))
 }
 
 /// The robots: files of one folder are one, in the order in which folders come.

@@ -205,8 +205,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         written(&mut report, path);
     }
     Ok(Outcome {
-        text: report.text_for(context.detail),
-        document,
         missed: missed(found.judged(), args.max_relative_error),
+        ..Outcome::new(report.text_for(context.screen), document)
     })
 }

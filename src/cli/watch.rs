@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use super::context::{self, RunningBar};
 use super::outcome::no_standard_output;
-use super::{CliError, Context, Outcome, arguments, columns_of, files, logs_of, paths_of};
+use super::{CliError, Context, Outcome, arguments, columns_of, files, logs_of, paths_of, written};
 use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_report::report::json::Document;
+use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::{Figure, Headline, Report, Tone};
 use cft_ident_stages::identify::{self, Log, STREAM, WatchLine, WatchSettings, Watchable, Watched};
 
 const EXAMPLE: &str = "\
@@ -42,6 +44,9 @@ pub struct Args {
     /// Log to write, in place of lines on standard output
     #[arg(short, long, value_name = "OUT.csv|.mcap", value_parser = arguments::log_file)]
     pub output: Option<PathBuf>,
+    /// Write the thresholds and the alarms as a page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
+    pub report: Option<PathBuf>,
 }
 
 enum Sink {
@@ -138,7 +143,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let of_stream = args.log.path == Path::new(STREAM);
     let log = (!of_stream).then_some(&*args.log.path);
     let inputs = paths_of(&args.unloaded).chain([&*args.model]).chain(log);
-    context.check_outputs(inputs, args.output.as_deref())?;
+    let outputs = args.output.iter().chain(&args.report).map(|path| &**path);
+    context.check_outputs(inputs, outputs)?;
     let given = files::model(&args.model, context)?;
     let robot = &given.value.file.robot;
     let joints = robot.joint_names();
@@ -191,8 +197,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         return Err(error);
     }
     context.check()?;
-    let verdict = verdict(&found);
-    let text = context.text(text_of(&found, &args.log.name()), &verdict);
+    let mut report = report(&found, &args.log.name());
+    if let Some(path) = &args.report {
+        let page = &mut report.page();
+        provenance::section(page, robot, &found.inputs, &[], None, &context.command);
+        context.write_text(path, &report.html())?;
+        written(&mut report, path);
+    }
+    let text = report.text_for(context.screen);
     let document = Document::new("watch", &found.inputs, &found.warnings, &found)?;
     if let Some(error) = found.error.take() {
         let error = CliError::from(error).hint("the results before it are printed above");
@@ -234,18 +246,64 @@ fn put(sink: &mut Sink, line: &WatchLine) -> Result<bool, CliError> {
     Ok(true)
 }
 
-fn verdict(found: &Watched) -> String {
-    let alarms = found.alarms.len();
-    format!(
-        "{} rows, {:.1} s; {alarms} alarm{}, {} of the rows beyond the threshold",
-        found.samples,
-        found.duration_s,
-        if alarms == 1 { "" } else { "s" },
-        number::percent(found.beyond)
-    )
+/// Alarms that are listed.
+const MAX_ALARMS: usize = 20;
+
+/// The alarms, the thresholds, and what explains the alarms.
+fn report(found: &Watched, log: &str) -> Report {
+    let mut report = Report::new(&format!("External torques of {}", escape(log)));
+    let mut all = report.everywhere();
+    let figure = |label, value| Figure {
+        label,
+        value,
+        tone: Tone::Plain,
+    };
+    let mut figures = vec![
+        figure("alarms", found.alarms.len().to_string()),
+        figure("above the threshold", number::percent(found.beyond)),
+    ];
+    if let Some(delay) = found.delay_s {
+        figures.push(figure("delay", format!("{:.1} ms", 1e3 * delay)));
+    }
+    all.headline(Headline {
+        figures,
+        of: format!("{} rows, {:.1} s", found.samples, found.duration_s),
+    });
+    let alarms = found.alarms.iter().take(MAX_ALARMS).map(|alarm| {
+        let joints = alarm.joints.iter().map(|of| {
+            let size = number::plus_minus(of.external, of.std);
+            format!("{} {size}", of.joint)
+        });
+        let joints: Vec<String> = joints.collect();
+        let [from, to] = [alarm.from_s, alarm.to_s];
+        format!("{from:.3} to {to:.3} s: {}", joints.join(", "))
+    });
+    all.list(alarms);
+    if found.alarms.len() > MAX_ALARMS {
+        let more = found.alarms.len() - MAX_ALARMS;
+        all.line(&format!("  and {more} more"));
+    }
+    if let Some(found) = &found.explanation {
+        let numbers = found.changes.iter().map(|of| {
+            let value = number::plus_minus(of.value, of.std);
+            format!("{} {value} {}", of.name, of.unit)
+        });
+        let numbers: Vec<String> = numbers.collect();
+        let of = found.joint.as_ref().map(|joint| format!(" of {joint}"));
+        all.paragraph(&format!(
+            "A change of {}{} explains {} of the alarms' power: {}.",
+            found.kind,
+            of.unwrap_or_default(),
+            number::percent(found.share),
+            numbers.join(", ")
+        ));
+    }
+    all.line("");
+    all.table(thresholds(found));
+    report
 }
 
-fn text_of(found: &Watched, log: &str) -> String {
+fn thresholds(found: &Watched) -> Table {
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("threshold", Align::Left),
@@ -254,13 +312,13 @@ fn text_of(found: &Watched, log: &str) -> String {
         ("", Align::Left),
     ])
     .caption(&format!(
-        "external torques of {log}: thresholds for {} false alarms an hour, by speed; the least as a force at the {}",
+        "thresholds for {} false alarms an hour, from slow to fast; smallest detectable force at the {}",
         found.false_alarms_per_hour,
         escape(&found.point)
     ));
     for joint in &found.joints {
         let [low, high] = joint.threshold.map(|x| number::significant(x, 3));
-        let both = format!("{low} .. {high}");
+        let both = format!("{low} to {high}");
         let force = joint.force_n.map(|force| number::significant(force, 2));
         let blind = if joint.blind { "cannot be watched" } else { "" };
         table.row([
@@ -271,39 +329,5 @@ fn text_of(found: &Watched, log: &str) -> String {
             blind,
         ]);
     }
-    let mut text = table.to_string();
-    if let Some(delay) = found.delay_s {
-        text += &format!("late by {:.1} ms\n", 1e3 * delay);
-    }
-    text += &verdict(found);
-    text.push('\n');
-    for alarm in found.alarms.iter().take(20) {
-        let joints = alarm.joints.iter().map(|of| {
-            let [size, std] = [of.external, of.std].map(|x| number::significant(x, 3));
-            format!("{} {size} (std {std})", of.joint)
-        });
-        let joints: Vec<String> = joints.collect();
-        let ([from, to], joints) = ([alarm.from_s, alarm.to_s], joints.join(", "));
-        text += &format!("  {from:.3} .. {to:.3} s: {joints}\n");
-    }
-    if found.alarms.len() > 20 {
-        text += &format!("  and {} more\n", found.alarms.len() - 20);
-    }
-    if let Some(found) = &found.explanation {
-        let numbers = found.changes.iter().map(|of| {
-            let [value, std] = [of.value, of.std].map(|x| number::significant(x, 3));
-            format!("{} {value} +- {std} {}", of.name, of.unit)
-        });
-        let numbers: Vec<String> = numbers.collect();
-        let of = found.joint.as_ref().map(|joint| format!(" of {joint}"));
-        let (kind, of, share) = (
-            found.kind,
-            of.unwrap_or_default(),
-            number::percent(found.share),
-        );
-        let numbers = numbers.join(", ");
-        text +=
-            &format!("a change of {kind}{of} takes away {share} of the alarms' power: {numbers}\n");
-    }
-    text
+    table
 }

@@ -51,7 +51,7 @@ fn a_design_is_written_with_its_samples_and_its_picture_and_passes_its_own_check
     excite(folder.path(), &line)
         .assert()
         .code(0)
-        .stdout(contains("weakest direction"))
+        .stdout(contains("least certain combination"))
         .stdout(contains("written: d.toml"));
     let path = |name: &str| folder.path().join(name);
     let text = fs::read_to_string(path("d.toml")).unwrap();

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use crate::export_support::{run, there};
 
-const PAGE: &str = include_str!("../../docs/controllers.md");
+const PAGE: &str = include_str!("../../docs/use.md");
 const PLANT: &str = include_str!("../../fixtures/controllers/plant.c");
 const SCHEMA: &str = include_str!("../../fixtures/controllers/joint_trajectory_controller.txt");
 

@@ -29,7 +29,7 @@ fn measured(path: &str) -> Option<String> {
     if file.exists() {
         return Some(file.to_string_lossy().into_owned());
     }
-    println!("SKIPPED: {path} is not there (docs/measured/data.md says where it is from)");
+    println!("SKIPPED: {path} is not there (docs/results/measured/data.md says where it is from)");
     None
 }
 

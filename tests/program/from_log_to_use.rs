@@ -153,7 +153,7 @@ fn the_plain_fit_stands_in_the_file_and_beside_it_what_can_exist() {
     assert_eq!(found.links.len(), 2);
     let said = good(path, "lsq fit.csv -r arm.toml -o again.toml");
     assert!(
-        said.contains("want what no machine has") && said.contains("coulomb:elbow -0.6"),
+        said.contains("the fit is unphysical") && said.contains("coulomb:elbow -0.6"),
         "{said}"
     );
     assert_eq!(
@@ -266,14 +266,14 @@ fn another_robots_log_is_refused_by_its_positions_and_shown_by_its_torques() {
     fs::write(path.join("heavy.csv"), log(&heavy, 0.3, 1.0)).unwrap();
     let (status, out, _) = run(path, "validate heavy.csv -m model.toml");
     assert_eq!(status, 0);
-    assert!(out.starts_with("NOT A VALIDATION"), "{out}");
+    assert!(out.contains("not a validation"), "{out}");
     let (status, ..) = run(
         path,
         "validate heavy.csv -m model.toml --max-relative-error 0.5",
     );
     assert_eq!(status, 1);
     let out = good(path, "validate new.csv -m model.toml");
-    assert!(!out.contains("NOT A VALIDATION"), "{out}");
+    assert!(!out.contains("not a validation"), "{out}");
 }
 
 #[test]
@@ -408,7 +408,7 @@ fn a_log_without_a_load_says_that_none_is_seen_and_leaves_the_model_as_it_was() 
     for seed in 1..=6 {
         fs::write(path.join("empty.csv"), loaded(seed, 0.0, [1.0; 2])).unwrap();
         let out = good(path, "payload empty.csv -m model.toml -o loaded.toml");
-        if out.starts_with("no payload seen: ") {
+        if out.contains("no payload; one above") {
             let text = |name: &str| fs::read(path.join(name)).unwrap();
             assert!(text("loaded.toml") == text("model.toml"), "{out}");
             none += 1;
@@ -428,10 +428,7 @@ fn a_body_that_spoils_a_joint_is_announced_first_and_is_not_written() {
         path,
         "payload odd.csv -m model.toml -o loaded.toml --json p.json",
     );
-    assert!(
-        out.starts_with("warning: the body makes errors larger: "),
-        "{out}"
-    );
+    assert!(out.contains("the body makes errors larger: "), "{out}");
     let json: serde_json::Value =
         serde_json::from_slice(&fs::read(path.join("p.json")).unwrap()).unwrap();
     let joints = json["readings"][0]["joints"].as_array().unwrap().iter();

@@ -75,6 +75,7 @@ const DOORS: &[(&str, &str)] = &[
     ("clap_complete", "cli/generate/completions.rs"),
     ("clap_mangen", "cli/generate/man.rs"),
     ("indicatif", "cli/context.rs"),
+    ("terminal_size", "cli/window.rs"),
     ("ctrlc", "cli/mod.rs"),
     ("csv_core", "log/text/records.rs"),
     ("exmex", "math/formula.rs"),

@@ -155,7 +155,7 @@ fn the_built_in_campaign_meets_its_limits_and_no_thread_count_changes_a_byte() {
     let result: serde_json::Value = serde_json::from_str(&text).unwrap();
     let page = std::fs::read_to_string(one.join("report.html")).unwrap();
     assert!(page.len() < 5_000_000 && page.ends_with("</html>\n"));
-    assert!(page.contains("One effect confirmed, on held-out data too: ripple of q1, "));
+    assert!(page.contains("confirmed</b> ripple of q1, "));
     let files = result["files"].as_array().unwrap();
     assert!(files.contains(&"report.html".into()), "{files:?}");
     // the declared model lacks an effect of q1; the refined one lacks nothing

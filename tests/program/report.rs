@@ -142,11 +142,11 @@ fn the_report_of_a_minute_is_whole_small_and_the_same_again() {
             "Where it came from"
         ]
     );
-    // bars; and cards of the sketch, of friction, and of the residual joint by joint
-    assert_eq!(page.matches("<figure>").count(), 1);
-    assert_eq!(page.matches("<figure class=\"card").count(), 2 + 4);
+    // bars, and correlations; cards of the parameters, of the sketch, of friction, and of the residual joint by joint
+    assert_eq!(page.matches("<figure>").count(), 2);
+    assert_eq!(page.matches("<figure class=\"card").count(), 3 + 4);
     assert_eq!(page.matches("class=\"traces\">").count(), 1);
-    let verdict = page.find("class=\"verdict").unwrap();
+    let verdict = page.find("class=\"headline").unwrap();
     let table = page.find("<table").unwrap();
     assert!(verdict < table && table < page.find("<h2").unwrap());
     // words are kept whole by spans
@@ -159,8 +159,8 @@ fn the_report_of_a_minute_is_whole_small_and_the_same_again() {
 fn a_fit_tells_what_it_leaves_open_and_a_log_used_twice_is_no_test() {
     let page = read(&campaign().join("lsq.html"));
     is_sound(&page);
-    assert!(headings(&page).contains(&"Condition and weakest directions"));
-    assert!(page.contains("weakest direction"));
+    assert!(headings(&page).contains(&"Condition and least certain combination"));
+    assert!(page.contains("least certain combination"));
     let folder = tempfile::tempdir().unwrap();
     let page = validate(folder.path(), "id.csv", "2");
     assert!(page.contains("id.csv was used to make this model"));
@@ -239,7 +239,7 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     is_sound(&page);
     let said = page.replace("<span>", "").replace("</span>", "");
     assert!(
-        said.contains("held-out error") && said.contains("Usual: "),
+        said.contains("error in motion, on held-out data") && said.contains("usual"),
         "{said}"
     );
     // the first screen: errors per joint as bars, and what to do next

@@ -91,7 +91,7 @@ fn rests_do_not_move_the_friction_and_are_distinguished_in_the_errors() {
             u.fitted_std
         );
     }
-    let shown = |text: &String| text.contains("at rest in a part of the rows: slide");
+    let shown = |text: &String| text.contains("at a reversal were ignored: slide");
     assert!(found.warnings.iter().any(shown), "{:?}", found.warnings);
     let fitted = &found.joints[0];
     let (moving, rest) = (fitted.relative_error_moving, fitted.relative_error_rest);

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p cft-ident-studies --example study_campaign -- [SEEDS] [FOLDER]` writes one line per seed to
 //! target/study_campaign.jsonl as it goes (so that a stopped study goes on where it was) and, at
-//! the end, into FOLDER the summaries that docs/studies.md is generated from.
+//! the end, into FOLDER the summaries that docs/results/studies.md is generated from.
 
 mod study;
 

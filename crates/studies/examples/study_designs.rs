@@ -2,7 +2,7 @@
 //! N = 4, 0.4 Hz, 4000 revolutions per minute of every motor, 10 V, what `excite` does by default.
 //!
 //! `cargo run -p cft-ident-studies --example study_designs -- [FOLDER]` writes into FOLDER the summary that
-//! docs/studies.md is generated from. It takes a minute or two on two cores.
+//! docs/results/studies.md is generated from. It takes a minute or two on two cores.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;

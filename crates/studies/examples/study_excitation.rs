@@ -7,7 +7,7 @@
 //!
 //! `cargo run --release -p cft-ident-studies --example study_excitation -- [SEEDS] [FOLDER]` writes one line per seed to
 //! target/study_excitation.jsonl as it goes and, at the end, into FOLDER the summary that
-//! docs/studies.md is generated from.
+//! docs/results/studies.md is generated from.
 
 mod study;
 

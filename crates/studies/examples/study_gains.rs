@@ -8,7 +8,7 @@
 //!
 //! `cargo run --release -p cft-ident-studies --example study_gains -- [RUNS] [FOLDER]` writes one line per run to
 //! target/study_gains.jsonl as it goes and, at the end, into FOLDER the summary that
-//! docs/studies.md is generated from.
+//! docs/results/studies.md is generated from.
 
 #[path = "../../../tests/program/currents_arm/mod.rs"]
 mod currents_arm;

@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p cft-ident-studies --example study_track -- [ROBOTS] [FOLDER]` writes one line per robot to
 //! target/study_track.jsonl as it goes and, at the end, FOLDER/study_track.json, from which
-//! docs/studies.md has its table and its figure. Of every ten robots one changes: the friction of one joint, or its
+//! docs/results/studies.md has its table and its figure. Of every ten robots one changes: the friction of one joint, or its
 //! Coulomb friction alone, grows by 10 to 50 % from one log to the next or log by log. Estimates of 54 parameters are
 //! drawn with their covariance, for 50 logs a robot; temperature scales the friction of all joints, and one log in ten
 //! carries a payload. Each robot is followed as its logs come in, and an alarm counts when it is first told. One part of

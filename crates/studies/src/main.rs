@@ -1,7 +1,7 @@
 //! `studies coverage|clean|planted|kinds|formula|nulls|rotations|setup|next|payload [--tool CFT-IDENT] [--label NAME] [--runs N] [--only TEXT] [--results FOLDER]`
 //! makes the runs of a study that are not yet in FOLDER/independent_STUDY.jsonl: a study goes on where it was stopped.
 //! `--keep FOLDER` records nothing and leaves the files of the last run there. `studies tables` writes the tables of
-//! docs/independent.md anew from all runs; `studies speed` says how long the plants take.
+//! docs/results/independent.md anew from all runs; `studies speed` says how long the plants take.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -220,7 +220,7 @@ fn all<'a, C: 'a>(
 }
 
 fn tables(results: &Path) -> Result<(), StudyError> {
-    let page = results.join("../independent.md");
+    let page = results.join("independent.md");
     files::write(&page, &page::rendered(&page, results)?)
 }
 

@@ -1,5 +1,7 @@
 //! What the next motion is for: weak parameters of a model, or an effect that the logs do not distinguish from its like.
 
+use std::collections::BTreeMap;
+
 use super::{Bench, FUNDAMENTAL_HZ};
 use crate::cli::error::CliError;
 use cft_ident_core::effect::entry;
@@ -8,6 +10,7 @@ use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::information::Information;
 use cft_ident_plant::excite::limits::Quantity;
 use cft_ident_plant::excite::machine::ForeseenRobot;
+use cft_ident_plant::excite::strokes::Memory;
 use cft_ident_plant::excite::{Criterion, ExciteError, InformationBefore, usual_motion};
 use cft_ident_stages::identify::LoggedRobot;
 
@@ -18,6 +21,13 @@ const SAMPLES_PER_PERIOD: usize = 100;
 pub(super) enum Aim {
     /// The parameters that are not identified.
     Weak,
+    /// An effect of a joint with a memory, which strokes at several amplitudes separate.
+    Strokes {
+        joint: String,
+        effect: Memory,
+        width: f64,
+        torque: f64,
+    },
     /// An effect of a joint, which a ladder of speeds of that joint alone separates.
     Ladder {
         joint: String,
@@ -29,8 +39,8 @@ pub(super) enum Aim {
 
 impl Aim {
     /// `weak`, or `EFFECT:JOINT`.
-    pub fn of(text: &str, file: &RobotFile) -> Result<Self, CliError> {
-        let Some((name, joint)) = text.split_once(':') else {
+    pub fn of(text: &str, file: &RobotFile, model: Option<&ModelFile>) -> Result<Self, CliError> {
+        let Some((name, rest)) = text.split_once(':') else {
             let wrong = format!(
                 "--for takes `weak` or EFFECT:JOINT, and not `{}`",
                 escape(text)
@@ -40,6 +50,7 @@ impl Aim {
                 _ => Err(CliError::usage(wrong)),
             };
         };
+        let (joint, numbers) = rest.split_once(':').unwrap_or((rest, ""));
         let effect = entry(name).ok_or_else(|| {
             CliError::usage(format!("no effect is called `{}`", escape(name)))
                 .hint("`diagnose` names the effects that it finds")
@@ -50,6 +61,9 @@ impl Aim {
                 CliError::usage(format!("the robot has no joint `{}`", escape(joint)))
                     .hint(format!("its joints are {}", escape(&joints.join(", ")))),
             );
+        }
+        if let Some(strokes) = strokes((name, joint), numbers, model)? {
+            return Ok(strokes);
         }
         match effect.ladder {
             Some(ladder) => Ok(Self::Ladder {
@@ -64,6 +78,52 @@ impl Aim {
             .hint(format!("what does: {}", effect.separate_by))),
         }
     }
+}
+
+/// The strokes for an effect with a memory: its numbers are those that are given, or those of the model.
+fn strokes(
+    (name, joint): (&str, &str),
+    given: &str,
+    model: Option<&ModelFile>,
+) -> Result<Option<Aim>, CliError> {
+    let effect = match name {
+        "backlash" => Memory::Gap,
+        "presliding" => Memory::Bristle,
+        _ => return Ok(None),
+    };
+    let mut numbers: BTreeMap<String, f64> = BTreeMap::new();
+    let held = model.into_iter().flat_map(|model| &model.effects);
+    let held = held.filter(|of| of.name == name && of.joint.as_deref() == Some(joint));
+    for section in held {
+        let values = section.parameters.iter();
+        numbers.extend(values.map(|(key, p)| (key.clone(), p.value)));
+    }
+    for pair in given.split(',').filter(|pair| !pair.is_empty()) {
+        let number = pair.split_once('=');
+        let number = number.and_then(|(key, value)| Some((key, value.parse().ok()?)));
+        let (key, value) = number.ok_or_else(|| {
+            CliError::usage(format!("`{}` is not KEY=VALUE", escape(pair)))
+                .hint("write --for backlash:JOINT:gap=0.02,c=1.5")
+        })?;
+        numbers.insert(key.to_owned(), value);
+    }
+    let number = |key: &str| numbers.get(key).copied().filter(|x| x.is_finite());
+    let of = match effect {
+        Memory::Gap => number("gap").zip(number("c")),
+        Memory::Bristle => {
+            let both = number("fc").zip(number("sigma0"));
+            both.map(|(fc, sigma0)| (fc / sigma0, fc))
+        }
+    };
+    // without its size the usual speeds of the joint alone are the best guess
+    Ok(of
+        .filter(|(width, torque)| *width > 0.0 && *torque != 0.0)
+        .map(|(width, torque)| Aim::Strokes {
+            joint: joint.to_owned(),
+            effect,
+            width,
+            torque: torque.abs(),
+        }))
 }
 
 /// Frequency of the middle coordinate's swing over its positions at its speed; that of other designs at most.

@@ -36,7 +36,7 @@ use aim::Aim;
 use criterion::weights;
 use judge::{head, judged, refuse_broken};
 use names::Names;
-use one_joint::{ladder, ladder_task};
+use one_joint::{ladder, ladder_task, strokes};
 use search::{blended, searched, task};
 
 const EXAMPLE: &str = "\
@@ -221,7 +221,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let named = model.as_ref();
     let named = named.map(|given| (given.name.as_str(), &given.value.file));
     let aim = args.aim.as_ref();
-    let aim = aim.map(|text| Aim::of(text, &file)).transpose()?;
+    let aim = aim.map(|text| Aim::of(text, &file, named.map(|(_, model)| model)));
+    let aim = aim.transpose()?;
     if let (Some(_), Some((_, model))) = (&aim, named) {
         model.limit_to_seen(&mut file.limits);
     }
@@ -262,6 +263,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     match (&args.check, joint) {
         (Some(path), _) => check(&mut bench, path, &all[0]),
         (None, Some(joint)) => ladder(&bench, &joint, &all[0]),
+        (None, None) if matches!(bench.aim, Some(Aim::Strokes { .. })) => strokes(&bench, &all[0]),
         (None, None) => designs(&mut bench, &all),
     }
 }
@@ -296,7 +298,7 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
     let document = Document::new("excite", &bench.inputs, &judged.warnings, &judged)?;
     Ok(Outcome {
         missed: judged.broken(),
-        ..Outcome::new(report.text_for(bench.context.detail), document)
+        ..Outcome::new(report.text_for(bench.context.screen), document)
     })
 }
 
@@ -340,7 +342,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         let (shown, context) = (names.shown(), bench.context);
         let trajectory = Some(Trajectory::Fourier(fourier));
         let report = written(bench, &motion, &judged, names, (&shown, trajectory))?;
-        text += &report.text_for(context.detail);
+        text += &report.text_for(context.screen);
         warnings.extend(judged.warnings.iter().cloned());
         all.push(judged);
         if found.stopped {

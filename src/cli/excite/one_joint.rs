@@ -7,8 +7,10 @@ use super::{Bench, written};
 use crate::cli::{CliError, Outcome};
 use cft_ident_files::config::Trajectory;
 use cft_ident_plant::excite::ladder::{LadderTask, design_ladder};
+use cft_ident_plant::excite::strokes::{StrokesTask, design_strokes};
 use cft_ident_plant::excite::{LawForeseen, Motion};
 use cft_ident_report::report::json::Document;
+use cft_ident_stages::identify::LoggedRobot;
 
 pub(super) fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
     let (seconds, part) = match &bench.aim {
@@ -23,6 +25,49 @@ pub(super) fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
         rate_hz: bench.rate_hz,
         reserve: bench.args.margin,
     }
+}
+
+/// Strokes that tell an effect with a memory from its like.
+pub(super) fn strokes(bench: &Bench, names: &Names) -> Result<Outcome, CliError> {
+    let Some(Aim::Strokes {
+        joint,
+        effect,
+        width,
+        torque,
+    }) = &bench.aim
+    else {
+        return Err(CliError::usage("no effect with a memory is named"));
+    };
+    let logged = LoggedRobot::new("", bench.file.clone());
+    let task = StrokesTask {
+        joint: joint.clone(),
+        effect: *effect,
+        width: *width,
+        torque: *torque,
+        cutoff_hz: logged.settings().cutoff_hz,
+        rate_hz: bench.rate_hz,
+        reserve: bench.args.margin,
+    };
+    let found = design_strokes(&bench.machine, &task)?;
+    let trajectory = Trajectory::Points(found.file);
+    let motion = Motion::of_file(
+        &bench.machine,
+        &trajectory,
+        bench.args.seconds,
+        bench.args.seed,
+    )?;
+    let channels = &bench.machine.channels;
+    let mut judged = judged(bench, &motion, channels, None, None)?;
+    judged.separates = Some(found.separation);
+    // it is not meant to separate the inertias
+    judged.warnings.clear();
+    refuse_broken(&judged)?;
+    let of = (&*names.shown(), Some(trajectory));
+    let report = written(bench, &motion, &judged, names, of)?;
+    Ok(Outcome::new(
+        report.text_for(bench.context.screen),
+        Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
+    ))
 }
 
 pub(super) fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError> {
@@ -45,7 +90,7 @@ pub(super) fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcom
     let of = (&*names.shown(), Some(trajectory));
     let report = written(bench, &motion, &judged, names, of)?;
     Ok(Outcome::new(
-        report.text_for(bench.context.detail),
+        report.text_for(bench.context.screen),
         Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
     ))
 }

@@ -55,7 +55,7 @@ pub(super) fn about_effects(program: &Program, left_out: &[String]) -> Vec<Strin
     let late = effects.lead_s.iter().zip(&program.joints);
     for (lead, joint) in late.filter(|(lead, _)| **lead != 0.0) {
         lines.push(format!(
-            "The logged torque of {} is late by {} s, {} samples at 1 kHz: these functions give the torque \
+            "The logged torque of {} has a delay of {} s, {} samples at 1 kHz: these functions give the torque \
              without it; send it that much earlier.",
             escape(joint),
             number::significant(*lead, 6),

@@ -176,6 +176,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     ))
 }
 
+/// The name of a single joint: that of its robot file, as far as a column may hold it.
+fn joint_name(target: &Path) -> String {
+    let name = target.file_stem().unwrap_or_default().to_string_lossy();
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    name.chars().map(plain).collect()
+}
+
 /// A robot file as it was drafted.
 pub(super) struct Described {
     pub text: String,
@@ -241,7 +248,11 @@ pub(super) fn describe(
     let seen = log.map(|spec| look(spec, &asked, joints, &stop));
     let seen = seen.transpose()?;
     drop(bar);
-    let mapping = Mapping::of(known.as_deref(), seen.as_ref());
+    let mut mapping = Mapping::of(known.as_deref(), seen.as_ref());
+    if let ([alone], None) = (&mut mapping.joints[..], &known) {
+        // a column says what it is of, and not always of which joint
+        alone.joint = joint_name(target);
+    }
     let shape = match (&args.urdf, mapping.joints.len()) {
         (Some(path), _) => Shape::Urdf {
             path: beside(path, target),
@@ -273,7 +284,11 @@ pub(super) fn describe(
     }
     let text = draft.text();
     let mut warnings = [file.notes.0.clone(), mapping.warnings.clone()].concat();
-    warnings.extend(unheld(&draft.capsules));
+    if let Some(text) = unheld(&draft.capsules) {
+        // capsules are for motions to come
+        context.aside(&text);
+        warnings.push(text);
+    }
     if let Some(seen) = &seen
         && args.topic.is_none()
         && let Some(topic) = &seen.topic

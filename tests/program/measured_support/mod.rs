@@ -15,7 +15,7 @@ pub fn shared(log: &str) -> Option<PathBuf> {
         return Some(data.join(log));
     }
     eprintln!(
-        "SKIPPED: {} is not there (docs/measured/data.md says where it is from)",
+        "SKIPPED: {} is not there (docs/results/measured/data.md says where it is from)",
         file.display()
     );
     None

@@ -1,12 +1,15 @@
 //! MuJoCo's MJCF: bodies with inertials, joints with armature, damping, friction loss and ranges, gear trains
 //! of two joints as tendons, followers as equalities.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::arm::{Arm, ArmJoint, ArmLink, Says, quaternion};
 use super::prepared::{in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
+use cft_ident_core::robot::standard::Body;
 use cft_ident_core::robot::tree::space::of_roll_pitch_yaw;
+use cft_ident_files::config::MjcfJoint;
 
 /// What MJCF can say.
 pub const SAYS: Says = Says {
@@ -43,6 +46,43 @@ pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
     out
 }
 
+/// What stands in the user's own MJCF, by the names that it has for the joints: geoms and meshes stay. `names` are those of
+/// joints that are called otherwise there.
+pub fn replacements(arm: &Arm, names: &BTreeMap<String, String>) -> BTreeMap<String, MjcfJoint> {
+    let own = arm.trains();
+    let of = |link: &ArmLink| {
+        let ArmJoint::Own(joint) = &link.joint else {
+            return None;
+        };
+        let whole = [joint.armature, joint.damping];
+        let [armature, damping] = own.as_ref().map_or(whole, |own| own[joint.index]);
+        let numbers = [
+            ("armature", armature),
+            ("damping", damping),
+            ("frictionloss", joint.friction),
+        ];
+        let name = names.get(&joint.name).unwrap_or(&joint.name);
+        let with = MjcfJoint {
+            inertial: inertial(&link.body),
+            attributes: numbers.map(|(key, x)| (key, format!("{x:?}"))).to_vec(),
+            origin: link.origin,
+        };
+        Some((name.clone(), with))
+    };
+    arm.links.iter().filter_map(of).collect()
+}
+
+/// The inertia of a body about its centre.
+fn inertial(body: &Body) -> String {
+    let [xx, xy, xz, yy, yz, zz] = body.inertia;
+    format!(
+        "<inertial pos=\"{}\" mass=\"{:?}\" fullinertia=\"{}\"/>",
+        words(&body.centre),
+        body.mass,
+        words(&[xx, yy, zz, xy, xz, yz])
+    )
+}
+
 /// The links that hang on `parent`, each with all that hang on it; trees are at most as deep as they have links.
 fn bodies(
     out: &mut String,
@@ -54,18 +94,13 @@ fn bodies(
     let pad = "  ".repeat(depth);
     let all = arm.links.iter().enumerate();
     for (i, link) in all.filter(|(_, link)| link.parent == parent) {
-        let body = &link.body;
-        let [xx, xy, xz, yy, yz, zz] = body.inertia;
         let _ = write!(
             out,
-            "{pad}<body name=\"{}\" pos=\"{}\" quat=\"{}\">\n{pad}  <inertial pos=\"{}\" mass=\"{:?}\" \
-             fullinertia=\"{}\"/>\n",
+            "{pad}<body name=\"{}\" pos=\"{}\" quat=\"{}\">\n{pad}  {}\n",
             quoted(&link.name),
             words(&link.origin),
             words(&quaternion(&link.rotation)),
-            words(&body.centre),
-            body.mass,
-            words(&[xx, yy, zz, xy, xz, yz])
+            inertial(&link.body)
         );
         joint(out, link, &pad, own);
         for frame in arm.frames.iter().filter(|frame| frame.link == link.name) {

@@ -39,4 +39,5 @@ pub use urdf::UrdfChain;
 pub use urdf::beside::DRIVE_INERTIA;
 pub use urdf::capsules::Capsules;
 pub use urdf::mesh::vertices as vertices_of_mesh;
+pub use urdf::mjcf::{MjcfJoint, replaced_in_mjcf};
 pub use urdf::source::{Replacement as UrdfReplacement, replaced as replaced_in_urdf};

@@ -131,6 +131,16 @@ impl ModelFile {
         }
         let document = Document::new(file, text);
         let mut raw: ModelToml = document.read()?;
+        if raw.parameter.is_empty() && raw.provenance.is_none() {
+            return Err(ConfigError::Kind {
+                file: file.to_owned(),
+                found: "a robot file",
+                wanted: "a model file",
+                remedy: format!(
+                    "fit a model first: cft-ident lsq LOG -r {file} -o model.toml; then give model.toml"
+                ),
+            });
+        }
         if raw.held_out.iter().any(HeldOut::is_of_0_2) {
             let problem = "is as version 0.2 wrote it, whose model files are no longer read";
             let remedy = "fit again: `cft-ident lsq LOG.. -r ROBOT.toml -o MODEL.toml`";
@@ -158,7 +168,7 @@ impl ModelFile {
         if raw.parameter.is_empty() {
             return Err(document.missing(
                 &["parameter"],
-                "[[parameter]] tables (this looks like a robot file: give it as -r, not as -m)",
+                "[[parameter]] tables, or fit the model again",
             ));
         }
         let mut model = Self {

@@ -11,6 +11,7 @@ use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::motion::{spectrum, torque_band};
 use super::series::Series;
+use super::strokes::Separation;
 use super::usage::{Use, along_way};
 use super::{ExciteError, GivenInformation, Motion};
 use cft_ident_core::number;
@@ -76,6 +77,9 @@ pub struct Judgement {
     pub seed: u64,
     /// Evaluations that the design took; null for a motion that was there.
     pub evaluations: Option<u64>,
+    /// Of strokes that tell an effect from its like.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub separates: Option<Separation>,
     /// What a reader should know.
     #[serde(skip)]
     pub warnings: Vec<String>,
@@ -256,6 +260,7 @@ pub fn judge(
         criterion: terms.criterion.to_owned(),
         seed: terms.seed,
         evaluations: None,
+        separates: None,
         warnings,
     })
 }

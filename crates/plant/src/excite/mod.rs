@@ -34,6 +34,7 @@ pub mod search;
 pub mod series;
 pub mod space;
 mod start;
+pub mod strokes;
 pub mod usage;
 mod variables;
 
@@ -49,6 +50,7 @@ pub use start::{usual_motion, usual_torque};
 
 use crate::simulate::SimulateError;
 use cft_ident_core::explain::Explain;
+use cft_ident_core::number;
 use cft_ident_files::config::{ConfigError, did_you_mean};
 
 /// Why no motion came out. Each message says what to change.
@@ -157,6 +159,19 @@ pub enum ExciteError {
         "give one with -m that has"
     )]
     NoLaw { joint: String },
+    #[explain(
+        format!(
+            "joint {joint} has room for strokes of {}, too little around a width of {}",
+            number::significant(*room, 3),
+            number::significant(*width, 3)
+        ),
+        "widen its position limits in [limits]"
+    )]
+    Narrow {
+        joint: String,
+        width: f64,
+        room: f64,
+    },
     #[explain(_0.explanation())]
     Config(#[from] ConfigError),
     #[explain(_0.explanation())]

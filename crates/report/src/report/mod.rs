@@ -12,10 +12,10 @@ pub mod sections;
 pub mod stages;
 mod summary;
 pub mod table;
-mod text;
+pub mod text;
 mod traces;
 pub mod usual;
 mod value;
 mod words;
 
-pub use value::{Detail, Report, Writer};
+pub use value::{Detail, Figure, Finding, Headline, Report, Screen, Tone, Writer};

@@ -1,4 +1,4 @@
-//! Plain-text tables that fit a terminal of 80 columns.
+//! Plain-text tables that fit a terminal: of 80 columns, or of as many as the format's width says (`{table:100}`).
 //!
 //! Numbers line up at the decimal point; a column of words is wrapped when the table would be too
 //! wide. No colour: the text is the same in a file, a pipe and a terminal.
@@ -9,7 +9,7 @@ use super::words;
 use cft_ident_core::number;
 use cft_ident_logs::log::escape_whole;
 
-/// Columns of a terminal that a table keeps to where it can.
+/// Columns of a table or a text that is not for a window: it keeps to them where it can.
 pub const WIDTH: usize = 80;
 /// A column of words is not wrapped below this.
 const NARROWEST: usize = 10;
@@ -74,19 +74,23 @@ impl Table {
     }
 
     /// Widths of the columns and the gap between them, after words were narrowed to fit [`WIDTH`].
-    fn widths(&self, rows: &[Vec<String>]) -> (Vec<usize>, usize) {
+    fn widths(&self, rows: &[Vec<String>], room: usize) -> (Vec<usize>, usize) {
         let natural = |(j, (name, _)): (usize, &(String, Align))| {
             let cells = rows.iter().map(|row| length(&row[j]));
             cells.fold(length(name), usize::max)
         };
         let natural: Vec<usize> = self.columns.iter().enumerate().map(natural).collect();
-        let [wide, narrow] = GAPS.map(|gap| (self.narrowed(natural.clone(), gap), gap));
-        if fits(&wide.0, wide.1) { wide } else { narrow }
+        let [wide, narrow] = GAPS.map(|gap| (self.narrowed(natural.clone(), gap, room), gap));
+        if fits(&wide.0, wide.1, room) {
+            wide
+        } else {
+            narrow
+        }
     }
 
     /// Columns of words, narrowed until all fit or none can give more.
-    fn narrowed(&self, mut widths: Vec<usize>, gap: usize) -> Vec<usize> {
-        while !fits(&widths, gap) {
+    fn narrowed(&self, mut widths: Vec<usize>, gap: usize, room: usize) -> Vec<usize> {
+        while !fits(&widths, gap, room) {
             // The widest column of words gives first, down to the longest of them.
             let widest = (0..widths.len())
                 .filter(|&j| self.columns[j].1 == Align::Left)
@@ -119,8 +123,8 @@ impl Table {
     }
 }
 
-fn fits(widths: &[usize], gap: usize) -> bool {
-    widths.iter().sum::<usize>() + gap * widths.len().saturating_sub(1) <= WIDTH
+fn fits(widths: &[usize], gap: usize, room: usize) -> bool {
+    widths.iter().sum::<usize>() + gap * widths.len().saturating_sub(1) <= room
 }
 
 impl fmt::Display for Table {
@@ -131,10 +135,11 @@ impl fmt::Display for Table {
                 line_up(&mut rows, j);
             }
         }
-        let (widths, gap) = self.widths(&rows);
+        let window = f.width().unwrap_or(WIDTH);
+        let (widths, gap) = self.widths(&rows, window);
         let room = (widths.as_slice(), gap);
         if !self.caption.is_empty() {
-            for line in flowed(&self.caption, WIDTH) {
+            for line in flowed(&self.caption, window) {
                 writeln!(f, "{line}")?;
             }
         }
@@ -256,20 +261,25 @@ fn line_up(rows: &mut [Vec<String>], j: usize) {
 /// `head` and `text` as lines that fit [`WIDTH`], those after the first indented by `indent` columns,
 /// each with its line end.
 pub fn hanging(head: &str, text: &str, indent: usize) -> String {
-    let room = WIDTH.saturating_sub(indent.max(length(head)));
+    hanging_in(WIDTH, head, text, indent)
+}
+
+/// The same in `width` columns.
+pub(super) fn hanging_in(width: usize, head: &str, text: &str, indent: usize) -> String {
+    let room = width.saturating_sub(indent.max(length(head)));
     let lines = flowed(&escape_whole(text), room);
     head.to_owned() + &lines.join(&format!("\n{}", " ".repeat(indent))) + "\n"
 }
 
-/// `text` for a terminal: a line that is too long goes on below, further in.
-pub fn folded(text: &str) -> String {
+/// `text` for a window: a line that is too long goes on below, further in.
+pub fn folded(text: &str, width: usize) -> String {
     let fold = |line: &str| {
-        if length(line) <= WIDTH {
+        if length(line) <= width {
             return format!("{line}\n");
         }
         let words = line.trim_start();
         let margin = length(line) - length(words);
-        hanging(&" ".repeat(margin), words, margin + 2)
+        hanging_in(width, &" ".repeat(margin), words, margin + 2)
     };
     text.lines().map(fold).collect()
 }
@@ -455,10 +465,8 @@ slope_2       16         -
     #[test]
     fn a_message_is_folded_and_a_path_in_it_stays_whole() {
         let path = format!("/{}/log.csv", "folder".repeat(14));
-        let described = folded(&format!(
-            "error: no data\nhint: {} {path}\n",
-            "look ".repeat(20)
-        ));
+        let text = format!("error: no data\nhint: {} {path}\n", "look ".repeat(20));
+        let described = folded(&text, WIDTH);
         let lines: Vec<&str> = described.lines().collect();
         assert_eq!(lines[0], "error: no data");
         assert!(lines[1].starts_with("hint: look") && lines[1].len() <= WIDTH);

@@ -1,22 +1,23 @@
-//! A report as a terminal shows it: tables and paragraphs of 80 columns, without colour.
+//! A report as a terminal shows it: tables and paragraphs as wide as the window, without colour.
 
-use super::table::{WIDTH, hanging, joined};
-use super::value::{Detail, Part, Report, Shown};
+use super::table::{hanging_in, joined};
+use super::value::{Detail, Finding, Headline, Part, Report, Screen, Shown, Tone};
 
 impl Report {
     /// All that a terminal can show of the report, ending in a line end.
     pub fn text(&self) -> String {
-        self.text_for(Detail::Full)
+        self.text_for(Screen::of(Detail::Full))
     }
 
     /// The report for a terminal, ending in a line end.
-    pub fn text_for(&self, detail: Detail) -> String {
+    pub fn text_for(&self, Screen { detail, width }: Screen) -> String {
+        let shown = |part| shown(part, width);
         if detail == Detail::Full {
             let parts = self.parts(&[Shown::Terminal, Shown::Detail]);
             return parts.map(shown).collect();
         }
         let verdicts = self.parts(&[Shown::Terminal, Shown::Brief]);
-        let verdicts = verdicts.filter(|part| matches!(part, Part::Verdict { .. }));
+        let verdicts = verdicts.filter(|part| part.is_verdict());
         let brief: String = verdicts.map(shown).collect();
         if detail == Detail::Brief && !brief.is_empty() {
             return brief;
@@ -30,30 +31,69 @@ impl Report {
     }
 }
 
-fn shown(part: &Part) -> String {
+fn shown(part: &Part, width: usize) -> String {
+    let hanging = |head: &str, text: &str, indent| hanging_in(width, head, text, indent);
     match part {
+        Part::Headline(headline) => figures(headline, width),
+        Part::Found(findings) => {
+            let grades = findings.iter().map(|f| f.grade.chars().count());
+            let margin = grades.max().unwrap_or(0) + GAP;
+            // beside a narrow column of words a window of a phone has no room
+            let beside = width >= NARROW;
+            let line = |f: &Finding| match beside {
+                true => hanging(&format!("  {:<margin$}", f.grade), &f.text, margin + 2),
+                false => hanging("", &format!("{}: {}", f.grade, f.text), 2),
+            };
+            findings.iter().map(line).collect()
+        }
+        Part::Next { text, command } => {
+            let command = command.as_ref().map(|c| command_lines(c, width));
+            hanging("", text, 2) + &command.unwrap_or_default()
+        }
         Part::Verdict { text, .. } => hanging("", text, 0),
         Part::Heading(text) | Part::Line(text) => format!("{text}\n"),
         Part::Paragraph(text) => hanging("", text, 2),
         Part::Note { head, text, margin } => hanging(head, text, *margin),
         Part::List(items) => items.iter().map(|item| hanging("  ", item, 4)).collect(),
-        Part::Table(table) => table.to_string(),
-        Part::Code(command) => command_lines(command),
+        Part::Table(table) => format!("{table:width$}"),
+        Part::Code(command) => command_lines(command, width),
         // pictures, and text that a page folds away
         _ => String::new(),
     }
+}
+
+/// Columns between a grade and what was found.
+const GAP: usize = 2;
+/// Width from which on grades stand in a column of their own.
+const NARROW: usize = 60;
+/// Between two figures of a verdict.
+pub const BETWEEN: &str = "  |  ";
+
+/// The figures in one line where they fit, and of what they are.
+fn figures(headline: &Headline, width: usize) -> String {
+    let each = headline.figures.iter().map(|f| match f.tone {
+        Tone::Plain => format!("{} {}", f.label, f.value),
+        tone => format!("{} {} ({})", f.label, f.value, tone.word()),
+    });
+    let each: Vec<String> = each.collect();
+    let line = each.join(BETWEEN);
+    let line = match line.chars().count() <= width {
+        true => line,
+        false => each.join("\n"),
+    };
+    format!("{line}\n{}", hanging_in(width, "", &headline.of, 2))
 }
 
 /// Columns before a command.
 const CODE: usize = 7;
 
 /// A command in lines that a shell takes as one; none begins with the value of an option.
-fn command_lines(command: &str) -> String {
+fn command_lines(command: &str, width: usize) -> String {
     let parts = joined(command.split(' ').map(str::to_owned), |part, word| {
         part.starts_with('-') && !part.contains(' ') && !word.starts_with('-')
     });
     // room for the mark that the command goes on
-    let room = WIDTH - 2;
+    let room = width.saturating_sub(2);
     let mut parts = parts.into_iter();
     let mut lines = vec![" ".repeat(CODE) + &parts.next().unwrap_or_default()];
     for part in parts {
@@ -69,12 +109,15 @@ fn command_lines(command: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::table::WIDTH;
+    use super::super::value::Figure;
     use super::*;
 
     #[test]
     fn a_long_command_is_folded_between_its_options() {
         let lines = command_lines(
             "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 -o separate.csv",
+            WIDTH,
         );
         assert_eq!(
             lines,
@@ -82,7 +125,10 @@ mod tests {
              -o separate.csv\n"
         );
         assert!(lines.lines().all(|line| line.len() <= WIDTH));
-        assert_eq!(command_lines("cft-ident new"), "       cft-ident new\n");
+        assert_eq!(
+            command_lines("cft-ident new", WIDTH),
+            "       cft-ident new\n"
+        );
     }
 
     #[test]
@@ -106,20 +152,59 @@ mod tests {
         report.detail().line("all 58 parameters");
         report.usual().line("six of them");
         report.terminal().line("written: a.toml");
-        assert_eq!(report.text_for(Detail::Brief), "it holds\n");
+        assert_eq!(report.text_for(Screen::of(Detail::Brief)), "it holds\n");
         assert_eq!(
-            report.text_for(Detail::Usual),
+            report.text_for(Screen::of(Detail::Usual)),
             "it holds\nsix of them\nwritten: a.toml\n--verbose shows more\n"
         );
         assert_eq!(
-            report.text_for(Detail::Full),
+            report.text_for(Screen::of(Detail::Full)),
             "it holds\nall 58 parameters\nwritten: a.toml\n"
         );
         report.brief().verdict("in short", true);
-        assert_eq!(report.text_for(Detail::Brief), "it holds\nin short\n");
+        assert_eq!(
+            report.text_for(Screen::of(Detail::Brief)),
+            "it holds\nin short\n"
+        );
         assert!(!report.text().contains("in short"));
         let mut plain = Report::new("title");
         plain.terminal().line("no verdict");
-        assert_eq!(plain.text_for(Detail::Brief), "no verdict\n");
+        assert_eq!(plain.text_for(Screen::of(Detail::Brief)), "no verdict\n");
+    }
+
+    #[test]
+    fn a_verdict_is_figures_then_what_was_found_then_the_next_step() {
+        let figure = |label, value: &str, tone| Figure {
+            label,
+            value: value.to_owned(),
+            tone,
+        };
+        let mut report = Report::new("title");
+        let mut all = report.everywhere();
+        all.headline(Headline {
+            figures: vec![
+                figure("before", "10.3 %", Tone::Plain),
+                figure("after", "8.52 %", Tone::Better),
+                figure("usual", "3.1 to 13 %", Tone::Plain),
+            ],
+            of: "torque error on held-out data".to_owned(),
+        });
+        let text = "play in the gear of q1".to_owned();
+        let grade = "indicated";
+        all.found(vec![Finding { grade, text }]);
+        all.next("Next: log more.", None);
+        let narrow = |width| {
+            report.text_for(Screen {
+                detail: Detail::Usual,
+                width,
+            })
+        };
+        assert_eq!(
+            narrow(80),
+            "before 10.3 %  |  after 8.52 % (better)  |  usual 3.1 to 13 %\ntorque error on held-out data\n  \
+             indicated  play in the gear of q1\nNext: log more.\n"
+        );
+        assert!(narrow(40).starts_with("before 10.3 %\nafter 8.52 % (better)\nusual"));
+        assert_eq!(narrow(80), report.text_for(Screen::of(Detail::Brief)));
     }
 }

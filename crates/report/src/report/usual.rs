@@ -138,17 +138,10 @@ pub(super) fn drawn(torque_is: Option<TorqueIs>) -> Usual {
     }
 }
 
-/// How large errors usually are, in a sentence; of both kinds where they may be sensors'.
-pub(super) fn words(torque_is: Option<TorqueIs>) -> String {
-    let [sensors, currents] = [Measured::Sensors, Measured::Currents].map(percent);
-    match of_motors(torque_is) {
-        true => format!("Usual for torques from motor currents: {currents}."),
-        false => {
-            format!(
-                "Usual: {currents} for torques from motor currents, {sensors} for joint torque sensors."
-            )
-        }
-    }
+/// How large errors usually are, as a figure: of both kinds where they may be sensors'.
+pub(super) fn figure(torque_is: Option<TorqueIs>) -> String {
+    let [least, most] = band(torque_is).map(|error| number::significant(100.0 * error, 2));
+    format!("{least} to {most} %")
 }
 
 #[cfg(test)]
@@ -156,12 +149,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sentence_has_the_ranges_of_the_table() {
-        assert_eq!(
-            words(Some(TorqueIs::Current)),
-            "Usual for torques from motor currents: 3.1 to 13 %."
-        );
-        assert!(words(None).ends_with("1.4 to 3.2 % for joint torque sensors."));
+    fn the_figure_has_the_range_of_the_table() {
+        assert_eq!(figure(Some(TorqueIs::Current)), "3.1 to 13 %");
+        assert_eq!(figure(None), "1.4 to 13 %");
     }
 
     #[test]

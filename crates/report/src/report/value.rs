@@ -3,7 +3,7 @@
 //! shown, since a page has room for more.
 
 use super::figure::Cells;
-use super::table::Table;
+use super::table::{Table, WIDTH};
 use super::traces::Traces;
 
 /// Where a part is shown.
@@ -32,9 +32,77 @@ pub enum Detail {
     Full,
 }
 
+/// What a figure of a verdict says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tone {
+    Plain,
+    Better,
+    Worse,
+    /// Above what is usual.
+    High,
+}
+
+impl Tone {
+    /// The word that stands behind the figure; a terminal without colour has no other sign.
+    pub fn word(self) -> &'static str {
+        match self {
+            Tone::Plain => "",
+            Tone::Better => "better",
+            Tone::Worse => "worse",
+            Tone::High => "high",
+        }
+    }
+}
+
+/// A figure of a verdict with the word above it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Figure {
+    pub label: &'static str,
+    pub value: String,
+    pub tone: Tone,
+}
+
+/// The figures of a verdict: few, and of what they are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Headline {
+    pub figures: Vec<Figure>,
+    pub of: String,
+}
+
+/// One thing that was found, with a word for how firm it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    pub grade: &'static str,
+    pub text: String,
+}
+
+/// What a terminal shows of a report, and in how many columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Screen {
+    pub detail: Detail,
+    pub width: usize,
+}
+
+impl Screen {
+    /// A screen of the usual width.
+    pub fn of(detail: Detail) -> Self {
+        let width = WIDTH;
+        Screen { detail, width }
+    }
+}
+
 /// One part of a report.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Part {
+    /// The figures of the verdict.
+    Headline(Headline),
+    /// What was found.
+    Found(Vec<Finding>),
+    /// The next step, and the command for it.
+    Next {
+        text: String,
+        command: Option<String>,
+    },
     /// The verdict in words; `good` where nothing calls for attention.
     Verdict {
         text: String,
@@ -74,6 +142,14 @@ pub(super) enum Part {
         summary: String,
         text: String,
     },
+}
+
+impl Part {
+    /// Whether it belongs to the verdict, which a terminal shows even where little is asked for.
+    pub(super) fn is_verdict(&self) -> bool {
+        use Part::{Found, Headline, Next, Verdict};
+        matches!(self, Headline(_) | Found(_) | Next { .. } | Verdict { .. })
+    }
 }
 
 /// A report under construction.
@@ -150,6 +226,24 @@ impl Writer<'_> {
     pub fn verdict(&mut self, text: &str, good: bool) {
         let text = text.to_owned();
         self.push(Part::Verdict { text, good });
+    }
+
+    /// The figures of the verdict.
+    pub fn headline(&mut self, headline: Headline) {
+        self.push(Part::Headline(headline));
+    }
+
+    /// What was found; nothing where there is none.
+    pub fn found(&mut self, findings: Vec<Finding>) {
+        if !findings.is_empty() {
+            self.push(Part::Found(findings));
+        }
+    }
+
+    /// The next step.
+    pub fn next(&mut self, text: &str, command: Option<String>) {
+        let text = text.to_owned();
+        self.push(Part::Next { text, command });
     }
 
     pub fn heading(&mut self, text: &str) {

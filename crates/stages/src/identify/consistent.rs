@@ -203,7 +203,7 @@ pub(super) fn or_plain_fit(
     let found = found.ok().filter(finite);
     if found.is_none() {
         warnings.push(
-            "the search for parameters that can exist came to no end: the plain fit stands alone, and simulators may refuse it"
+            "the search for physically consistent parameters did not converge: the file holds the plain fit only, and simulators may refuse it"
                 .to_owned(),
         );
     }

@@ -192,21 +192,17 @@ impl FrictionBefore {
                 .map_or(self.known[j].law, |k| k.law);
             let covariance = of_joint(all, first + GRADIENT * j);
             let (torque, std) = (law.torque(speed), curve_std(&law, &covariance, speed));
-            let unit = machine.file.torque_unit(j);
             let position = machine.robot.joint_kind(j).position_unit();
             let shown = |x: f64| number::significant(x, 3);
             let described = match 2.0 * std > WEAK * torque.abs() {
-                true => {
-                    "; these logs cannot tell its friction at these speeds: log the joint alone as fast as it is used"
-                }
-                false => "",
+                true => "cannot be told from these logs",
+                // its deviation is that of the law, which nobody has seen there
+                false => "is continued by its law",
             };
             out.push(format!(
-                "{joint}: moves at up to {} {position}/s here, its one-joint logs at up to {}; its friction there is {} +- {} {unit}{described}",
+                "{joint}: moves at up to {} {position}/s, but its one-joint logs at up to {}; its friction beyond {described}: log the joint alone as fast as it is used",
                 shown(speed),
                 shown(covered[1]),
-                shown(torque),
-                shown(std),
             ));
         }
         out

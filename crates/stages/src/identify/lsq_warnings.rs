@@ -63,7 +63,7 @@ pub(super) fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
         .collect();
     (!shown.is_empty()).then(|| {
         format!(
-            "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted; where a joint turns its samples weigh nothing",
+            "samples at rest or at a reversal were ignored: {}; friction takes any value up to its Coulomb level there",
             shown.join(", ")
         )
     })
@@ -88,7 +88,7 @@ pub(super) fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "these data want what no machine has, friction or an inertia below zero: {}; a torque is missing or a gain is wrong (`diagnose` looks for it), or the motion does not separate these parameters from others",
+            "the fit is unphysical, friction or inertia below zero: {}; a torque is missing or a gain is wrong (`diagnose` looks for it), or the motion does not separate these parameters",
             names.join(", ")
         )
     })

@@ -2,6 +2,7 @@
 //! from its like.
 
 use cft_ident_core::effect::{Added, Place};
+use cft_ident_core::number;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::ModelFile;
@@ -18,7 +19,15 @@ pub fn separating_command(effect: &Added, robot: &Robot, model: &str) -> Option<
         Place::Actuator(_) | Place::Actuators | Place::All => return None,
     };
     let aim = format!("{}:{}", effect.name(), robot.joint_names().get(joint)?);
-    Some(command(model, &aim))
+    // strokes are laid around the width of a memory; the file may not hold an effect that is not sure
+    let numbers = effect.numbers(robot, "", None).into_iter();
+    let numbers = numbers.filter(|n| effect.law.memory.is_some() && n.value != 0.0);
+    let numbers = numbers.map(|n| format!("{}={}", n.key, number::significant(n.value, 3)));
+    let numbers = numbers.collect::<Vec<_>>().join(",");
+    Some(match numbers.as_str() {
+        "" => command(model, &aim),
+        numbers => command(model, &format!("{aim}:{numbers}")),
+    })
 }
 
 /// A motion that narrows the parameters that are not identified, and how many of how many they are; none where every

@@ -6,10 +6,15 @@ const BEGIN: &str = "<!-- table: ";
 const CLOSE: &str = " -->";
 const END: &str = "<!-- end of table -->";
 
-/// README.md and docs/*.md, in the order of their names.
+/// README.md and the pages of docs, in the order of their names.
 pub fn documents(root: &Path) -> Vec<PathBuf> {
     let mut found = vec![root.join("README.md")];
-    for folder in ["docs", "docs/measured"] {
+    for folder in [
+        "docs",
+        "docs/developers",
+        "docs/results",
+        "docs/results/measured",
+    ] {
         let entries = std::fs::read_dir(root.join(folder)).into_iter().flatten();
         let markdown = entries
             .filter_map(|entry| Some(entry.ok()?.path()))

@@ -1,4 +1,4 @@
-//! Writes the tables of README.md and docs/*.md anew from the results in docs/results:
+//! Writes the tables of README.md and docs anew from the results in docs/results:
 //! `cargo run -p cft-ident-studies --example docs_tables`. With `--check` it writes nothing and fails where one differs.
 //!
 //! A table stands between `<!-- table: KIND FILE... -->` and `<!-- end of table -->`; the kinds are

@@ -6,7 +6,7 @@
 //!
 //! `cargo run --release -p cft-ident-studies --example study_bands -- [SEEDS] [FOLDER]` writes one line per machine and per minute of
 //! simulated motion to target/study_bands.jsonl as it goes, so that a stopped study goes on where it was, and at the
-//! end the summaries into FOLDER that docs/studies.md is generated from.
+//! end the summaries into FOLDER that docs/results/studies.md is generated from.
 
 mod forces;
 mod machines;

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p cft-ident-studies --example study_one_joint -- [SEEDS] [FOLDER]` writes one line per seed to
 //! target/study_one_joint.jsonl as it goes and, at the end, FOLDER/study_one_joint.json, from which
-//! docs/studies.md has its table. The motion is integrated by the simulator; encoder and torque
+//! docs/results/studies.md has its table. The motion is integrated by the simulator; encoder and torque
 //! noise are those of a wrist's drive; the filter is given nothing but the log.
 
 mod bench;

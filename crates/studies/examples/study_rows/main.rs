@@ -6,7 +6,7 @@
 //! parameters along the TRUE motion, over the rows in which the joint moves.
 //!
 //! `cargo run --release -p cft-ident-studies --example study_rows -- [SEEDS] [FOLDER]` writes one line per seed to
-//! target/study_rows.jsonl as it goes and, at the end, into FOLDER the summary that docs/studies.md is generated from.
+//! target/study_rows.jsonl as it goes and, at the end, into FOLDER the summary that docs/results/studies.md is generated from.
 
 #[path = "../study/mod.rs"]
 #[allow(dead_code)] // each study uses its share

@@ -9,6 +9,7 @@ pub(super) mod beside;
 pub mod capsules;
 mod link;
 pub mod mesh;
+pub(super) mod mjcf;
 mod parts;
 mod possible;
 mod shapes;

@@ -1,7 +1,7 @@
 //! Effects that a declared model may lack, integrated by the plant in its own code.
 //!
 //! An effect is named on the command line as `NAME[:JOINT][:key=value,...]`; without a joint it acts on
-//! every joint, and a key that is left out takes a default that scales with the joint (docs/effects.md).
+//! every joint, and a key that is left out takes a default that scales with the joint (docs/developers/effects.md).
 //! Most effects are torques or states of the plant ([`Effect`], [`Built`]); delays and faults of the data are put
 //! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`LAWS`]. Effects of a
 //! user's own come with their formulas ([`EffectSpec::own`]).
@@ -126,7 +126,7 @@ macro_rules! catalogue {
 }
 
 catalogue! {
-    /// All effects that the simulator knows, in the order of docs/effects.md.
+    /// All effects that the simulator knows, in the order of docs/developers/effects.md.
     LAWS of
     torque_offset,
     asymmetric_friction,

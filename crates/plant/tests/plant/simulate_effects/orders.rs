@@ -345,8 +345,11 @@ fn faults_need_a_log_with_joint_channels() {
 
 #[test]
 fn the_page_of_effects_says_what_the_simulator_takes() {
-    let page = std::fs::read_to_string(format!("{}/docs/effects.md", cft_ident_support::ROOT))
-        .expect("docs/effects.md");
+    let page = std::fs::read_to_string(format!(
+        "{}/docs/developers/effects.md",
+        cft_ident_support::ROOT
+    ))
+    .expect("docs/developers/effects.md");
     let rows: Vec<&str> = page
         .lines()
         .filter(|line| line.starts_with("| `"))

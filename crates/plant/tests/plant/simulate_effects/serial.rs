@@ -89,7 +89,7 @@ fn built(truth: &Plant<3>, texts: &[&str]) -> Result<Effects, SimulateError> {
     Ok(Effects::build(&specs(texts), &Sites::of(truth)?)?.0)
 }
 
-/// Where an effect has a place, in the words of docs/effects.md.
+/// Where an effect has a place, in the words of docs/developers/effects.md.
 pub fn places(entry: &Entry) -> &'static str {
     let truth = truth([0.0, 0.0, -9.81], [0.0; STANDARD]);
     let fits = |text: &str| built(&truth, &[text]).is_ok();

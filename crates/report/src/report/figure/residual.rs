@@ -121,7 +121,7 @@ impl ResidualFigure {
         let alone = !drawn(When::After) && !drawn(When::AfterBackward);
         let [before, backward] = match alone {
             true => ["residual", "residual, backward"],
-            false => ["as given", "as given, backward"],
+            false => ["before", "before, backward"],
         };
         let names = [
             (When::Before, before),
@@ -149,7 +149,7 @@ impl ResidualPanel {
         let (what, over) = (&self.of.0, &self.over.0);
         match (before, after) {
             (Some(before), Some(after)) => format!(
-                "greatest {what} of {joint} over {over}: {} as given, {} after",
+                "greatest {what} of {joint} over {over}: {} before, {} after",
                 shown(before),
                 shown(after)
             ),
@@ -232,7 +232,7 @@ mod tests {
         assert!(svg.contains(">1.00</text>") && !svg.contains(">9.00</text>"));
         let pictures = &figure.cells()[0].pictures;
         assert_eq!(pictures.len(), 2);
-        let shown = "greatest residual of q&lt;1 over velocity: 2.00 Nm as given, 2.00 Nm after";
+        let shown = "greatest residual of q&lt;1 over velocity: 2.00 Nm before, 2.00 Nm after";
         assert!(pictures[0].contains(shown), "{}", pictures[0]);
     }
 }

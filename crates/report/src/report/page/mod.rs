@@ -8,7 +8,7 @@
 use super::encode;
 use super::figure::Cells;
 use super::table::Table;
-use super::value::{Part, Report, Shown};
+use super::value::{Figure, Finding, Headline, Part, Report, Shown, Tone};
 use cft_ident_logs::log::{Provenance, is_hidden};
 
 const STYLE: &str = include_str!("style.css");
@@ -58,6 +58,30 @@ impl Report {
 /// A part as markup, with a line end.
 fn shown(part: &Part) -> String {
     match part {
+        Part::Headline(headline) => headline_of(headline),
+        Part::Found(findings) => {
+            let item = |f: &Finding| {
+                let class = f.grade.split(' ').next().unwrap_or_default();
+                format!(
+                    "<li><b class=\"grade {}\">{}</b> {}</li>\n",
+                    escaped(class),
+                    escaped(f.grade),
+                    prose(&f.text)
+                )
+            };
+            let items: String = findings.iter().map(item).collect();
+            format!("<ul class=\"found\">\n{items}</ul>\n")
+        }
+        Part::Next { text, command } => {
+            let command = command
+                .as_ref()
+                .map(|c| format!("<pre>{}</pre>\n", whole_words(c)));
+            format!(
+                "<p class=\"next\">{}</p>\n{}",
+                prose(text),
+                command.unwrap_or_default()
+            )
+        }
         Part::Verdict { text, good } => {
             let class = if *good { "verdict" } else { "verdict bad" };
             format!("<p class=\"{class}\">{}</p>\n", prose(text))
@@ -95,6 +119,27 @@ fn shown(part: &Part) -> String {
             escaped(text)
         ),
     }
+}
+
+/// The figures of a verdict beside each other, and of what they are.
+fn headline_of(headline: &Headline) -> String {
+    let figure = |f: &Figure| {
+        let word = match f.tone {
+            Tone::Plain => String::new(),
+            tone => format!(" <em>{}</em>", tone.word()),
+        };
+        format!(
+            "<div class=\"{}\"><span>{}</span><b>{}</b>{word}</div>",
+            f.tone.word(),
+            escaped(f.label),
+            bound(&escaped(&f.value)),
+        )
+    };
+    let figures: String = headline.figures.iter().map(figure).collect();
+    format!(
+        "<div class=\"headline\">{figures}</div>\n<p class=\"of\">{}</p>\n",
+        prose(&headline.of)
+    )
 }
 
 /// Small pictures beside each other, with their title, their legend and the sentences below them.

@@ -1,12 +1,19 @@
 //! Parameters with their standard deviations and verdicts.
 
+use std::collections::BTreeMap;
+
 use crate::report::Writer;
+use crate::report::figure::{IntervalFigure, IntervalRow};
 use crate::report::table::{Align, Columns, Table};
-use crate::report::words::first_of;
+use crate::report::words::{first_of, of_joint};
 use cft_ident_core::number;
+use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
+
+/// Half of a 95 % interval in standard deviations.
+const INTERVAL_95: f64 = 1.96;
 
 /// The true value of a parameter, where it is known.
 type Truth<'a> = &'a dyn Fn(&Parameter) -> Option<f64>;
@@ -90,6 +97,7 @@ pub fn beside_truth(all: &[Parameter], truth: Truth) -> Table {
 /// The section of a page.
 pub fn section(page: &mut Writer, model: &ModelFile, truth: Truth) {
     page.heading("Parameters");
+    intervals(page, model);
     let all = &model.parameters;
     let std = |p: &Parameter| p.std.unwrap_or(f64::NAN);
     let below_zero = |p: &Parameter| p.is_below_zero() && !is_open(p);
@@ -138,6 +146,65 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: Truth) {
         );
     }
     effects(page, model);
+}
+
+/// Values of the parameters before the fit: by the masses of the robot file or its URDF, and where friction began.
+fn before(model: &ModelFile) -> BTreeMap<String, f64> {
+    let mut found = BTreeMap::new();
+    let links = &model.robot.robot.link;
+    if links.iter().any(|link| link.inertial.is_some()) {
+        let robot = model.robot.robot();
+        let mut standard = vec![0.0; robot.standard_parameters()];
+        let bodies = standard.chunks_mut(STANDARD).zip(links);
+        for (own, link) in bodies {
+            if let Some(given) = &link.inertial {
+                own.copy_from_slice(&given.body().standard());
+            }
+        }
+        let names = robot.parameters().iter().map(|info| info.name.to_string());
+        found.extend(names.zip(robot.base_of(&standard)));
+    }
+    for (joint, start) in &model.robot.friction.joint {
+        let known = [
+            ("viscous", start.viscous),
+            ("coulomb", start.coulomb),
+            ("coulomb_1", start.coulomb_1),
+            ("coulomb_2", start.coulomb_2),
+            ("slope_1", start.slope_1),
+            ("slope_2", start.slope_2),
+        ];
+        let known = known.into_iter().filter_map(|(key, x)| Some((key, x?)));
+        found.extend(known.map(|(key, x)| (format!("{key}:{joint}"), x)));
+    }
+    found
+}
+
+/// The intervals of all that the data show something of, beside the values before the fit.
+fn intervals(page: &mut Writer, model: &ModelFile) {
+    let before = before(model);
+    let shown = model.parameters.iter().filter(|p| !is_open(p));
+    let rows = shown.filter_map(|p| {
+        let std = p.std.filter(|std| *std > 0.0)?;
+        Some(IntervalRow {
+            name: of_joint(&p.name, p.joint.as_deref()),
+            words: format!("{} {}", number::plus_minus(p.value, std), p.unit),
+            value: p.value,
+            half: INTERVAL_95 * std,
+            before: before.get(&p.key()).copied(),
+            // where the two are one dot, one is drawn
+            in_use: p.consistent.filter(|x| (x - p.value).abs() > 0.2 * std),
+        })
+    });
+    let rows: Vec<IntervalRow> = rows.collect();
+    if rows.is_empty() {
+        return;
+    }
+    let figure = IntervalFigure {
+        title: "parameters with their 95 % intervals, each scaled to its largest number".to_owned(),
+        before: "robot file or URDF".to_owned(),
+        rows,
+    };
+    page.figures(figure.cells());
 }
 
 /// Effects that the model has beyond the declared structure.

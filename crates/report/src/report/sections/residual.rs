@@ -12,7 +12,7 @@ use cft_ident_stages::replay::{ResidualEvidence, ResidualPair};
 pub fn figure(machine: &LoggedRobot, of: &ResidualEvidence) -> ResidualFigure {
     let after = of.joints.iter().any(|joint| joint.after.is_some());
     let what = match after {
-        true => "Residual of the model as given, and after",
+        true => "Residual before and after",
         false => "Residual",
     };
     let joints = machine.robot.joint_names().iter().zip(&of.joints);

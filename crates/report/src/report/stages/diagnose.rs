@@ -43,12 +43,11 @@ pub struct Diagnose<'a> {
 /// The effects, their numbers, the residual that is left, and the errors before and after.
 pub fn diagnose(of: &Diagnose) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
-    let (text, good) = words(of.machine, of.found);
-    report.everywhere().verdict(&text, good);
+    words(of.machine, of.found).write(&mut report.everywhere());
     let typed = (of.refined, of.path, of.logs);
     diagnosed(&mut report, (of.machine, of.found), typed);
     let mut page = report.page();
-    first_screen::show(&mut page, (of.machine, of.found), (of.path, of.logs));
+    first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
     formulas::write(&mut page, of.machine, of.found);
     free_run::section(&mut page, of.found.free_run.as_ref());
@@ -101,6 +100,7 @@ pub(super) fn diagnosed(
     (file, path, logs): (&ModelFile, &str, &str),
 ) {
     let d = &found.diagnosis;
+    first_screen::write_next(report, (machine, found), (file, path, logs));
     report.terminal().line("");
     in_short(&mut report.usual(), machine, d);
     report
@@ -123,11 +123,7 @@ pub(super) fn diagnosed(
     formulas::in_short(&mut report.usual(), machine, found);
     formulas::write(&mut report.detail(), machine, found);
     formulas::candidates(&mut report.detail(), machine, found);
-    let mut terminal = report.terminal();
-    terminal.line("");
-    let next = first_screen::next(machine, found, (path, logs));
-    terminal.note("", &next, 2);
-    first_screen::next_motion(&mut terminal, (machine, found), (file, path));
+    first_screen::narrowing(&mut report.detail(), file, path);
 }
 
 /// Errors joint by joint, those of a screen.
@@ -306,7 +302,7 @@ pub(super) fn sections(
         names: [name.into(), format!("residual {name}").into()],
         styles,
     };
-    let before = drawn("as given", [TraceStyle::Before, TraceStyle::Before]);
+    let before = drawn("before", [TraceStyle::Before, TraceStyle::Before]);
     let after = drawn("after", [TraceStyle::Model, TraceStyle::After]);
     let models = match d.written().next() {
         None => vec![torque::ONLY],
@@ -349,7 +345,7 @@ pub(super) fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed
     let d = &found.diagnosis;
     let now = d.errors_now();
     let sides: Vec<(&str, &SplitErrors)> = match d.written().next() {
-        Some(_) => vec![(", as given", &d.before), (", after", now)],
+        Some(_) => vec![(", before", &d.before), (", after", now)],
         None => vec![("", now)],
     };
     let names = machine.robot.joint_names();

@@ -1,9 +1,10 @@
-//! The verdict of a diagnosis in a breath: the effects that were confirmed and their gain, how good the model now is,
-//! and where most is left.
+//! The verdict of a diagnosis: the error before and after beside what is usual, the effects that were found, and where
+//! most is left.
 
 use super::step_words::titled;
 use crate::report::usual;
 use crate::report::words::listed;
+use crate::report::{Figure, Finding, Headline, Tone, Writer};
 use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
@@ -12,51 +13,102 @@ use cft_ident_stages::open_loop::JointFreeRun;
 /// Effects that the verdict names; it counts the others.
 const NAMED: usize = 3;
 
-/// The verdict in words, and whether nothing calls for attention.
-pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
+/// The verdict on a diagnosis: its figures and what was found.
+pub(super) struct Words {
+    pub headline: Headline,
+    pub found: Vec<Finding>,
+}
+
+impl Words {
+    pub fn write(self, writer: &mut Writer) {
+        writer.headline(self.headline);
+        writer.found(self.found);
+    }
+}
+
+/// The verdict in figures and words.
+pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> Words {
     let d = &found.diagnosis;
     let lacking = found.verdict();
-    let mut text = match lacking {
-        DiagnosisVerdict::EffectsFound => added(machine, d),
+    let mut all = added(machine, d);
+    let said = |grade, text: String| Finding { grade, text };
+    match lacking {
+        DiagnosisVerdict::EffectsFound => {}
         _ if !d.determined => {
-            let text = "These data determine nothing: the noise is as large as the torque that the model explains.";
-            return (text.to_owned(), false);
+            let text = "these data determine nothing: the noise is as large as the torque that the model explains";
+            all = vec![said("not usable", text.to_owned())];
         }
-        _ if !d.long_enough() => format!(
-            "These logs are too short to find an effect: {} blocks of {} s, {} are needed.",
-            d.blocks,
-            number::significant(d.block_s, 2),
-            d.least_blocks
-        ),
-        DiagnosisVerdict::NothingMissing => "Nothing is missing: what is left is noise.".to_owned(),
-        _ => "No effect is sure enough to be written; more than noise is left.".to_owned(),
-    };
-    let (bought, gains_nothing) = bought(d);
-    text += &format!(" {bought}");
-    text += &taken_out(machine, d);
-    if !is_exact(d) {
-        text += &format!(" {}", usual::words(machine.file.log.torque_is));
+        _ if !d.long_enough() => all.push(said(
+            "too short",
+            format!(
+                "{} blocks of {} s do not show an effect; {} are needed",
+                d.blocks,
+                number::significant(d.block_s, 2),
+                d.least_blocks
+            ),
+        )),
+        DiagnosisVerdict::NothingMissing => {
+            all.push(said(
+                "nothing",
+                "the remaining residual is noise".to_owned(),
+            ));
+        }
+        _ => all.push(said(
+            "unknown",
+            "the residual is more than noise, and no known effect is sure enough to be written"
+                .to_owned(),
+        )),
     }
-    let unusual = errors(d.errors_now()).1.overall.mean_relative_error_moving
-        > usual::band(machine.file.log.torque_is)[1];
-    if unusual {
-        text += " That is more than usual.";
-    }
-    if let Some(left) = most_is_left(machine, d) {
-        text += &format!(" {left}");
-    }
+    all.extend(taken_out(machine, d));
+    all.extend(most_is_left(machine, d).map(|text| said("remaining", text)));
     let worse = runs_worse(found);
     if !worse.is_empty() {
-        text += &format!(
-            " Use it for feed-forward and not to simulate: driven by the measured torques, it moves worse than the \
-             given model at {worse}."
+        let text = format!(
+            "simulated from the measured torques, the new model moves worse than the given one at {worse}: use it \
+             for feed-forward, not to simulate"
         );
+        all.push(said("worse", text));
     }
-    let good = !gains_nothing
-        && worse.is_empty()
-        && !unusual
-        && !matches!(lacking, DiagnosisVerdict::UnexplainedResidual);
-    (text, good)
+    Words {
+        headline: headline(machine, d),
+        found: all,
+    }
+}
+
+/// Error before, error after and what is usual.
+fn headline(machine: &LoggedRobot, d: &Diagnosis) -> Headline {
+    let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
+    let mean = |e: &Errors| e.overall.mean_relative_error_moving;
+    let [from, to] = [before, after].map(|e| number::percent(mean(e)));
+    let changed = d.written().next().is_some();
+    let torque_is = machine.file.log.torque_is;
+    let unusual = mean(after) > usual::band(torque_is)[1];
+    let tone = match changed {
+        true if mean(after) > mean(before) && from != to => Tone::Worse,
+        _ if unusual => Tone::High,
+        true if from != to => Tone::Better,
+        _ => Tone::Plain,
+    };
+    let figure = |label, value, tone| Figure { label, value, tone };
+    let figures = vec![
+        figure("before", from, Tone::Plain),
+        figure("after", to, tone),
+        figure("usual", usual::figure(torque_is), Tone::Plain),
+    ];
+    let joints = match after.joints.len() {
+        1 => String::new(),
+        n => format!(", rms over {n} joints"),
+    };
+    let optimistic = d.selected.is_some() && changed;
+    let chosen = if optimistic {
+        "; optimistic, since these data chose the effects"
+    } else {
+        ""
+    };
+    Headline {
+        figures,
+        of: format!("relative torque error in motion, on {data}{joints}{chosen}"),
+    }
 }
 
 /// Joints that move worse, driven by the measured torques, where the model moves worse over all joints.
@@ -76,86 +128,60 @@ pub(super) fn is_exact(d: &Diagnosis) -> bool {
     errors(d.errors_now()).1.overall.mean_relative_error_moving < 0.5 * least
 }
 
-/// The effects of the written model, by how firm they are.
-fn added(machine: &LoggedRobot, d: &Diagnosis) -> String {
-    let graded = |grade: &str, steps: Vec<&FoundEffect>| {
-        let names = steps.iter().take(NAMED);
-        let mut names: Vec<String> = names.map(|s| titled(machine, &s.estimate)).collect();
+/// The effects, by how firm they are, and what of them is written.
+fn added(machine: &LoggedRobot, d: &Diagnosis) -> Vec<Finding> {
+    let graded = |grade: &'static str, what: &str, steps: Vec<&FoundEffect>| {
+        let mut all: Vec<Finding> = steps
+            .iter()
+            .take(NAMED)
+            .map(|s| Finding {
+                grade,
+                text: titled(machine, &s.estimate) + what,
+            })
+            .collect();
         if steps.len() > NAMED {
-            names.push(format!("{} more", steps.len() - NAMED));
+            all.push(Finding {
+                grade,
+                text: format!("{} more", steps.len() - NAMED),
+            });
         }
-        let count = match steps.len() {
-            1 => "One effect".to_owned(),
-            n => format!("{n} effects"),
-        };
-        (!steps.is_empty()).then(|| format!("{count} {grade}: {}.", names.join("; ")))
+        all
     };
     let by = |status: StepStatus| {
         let steps = d.written().filter(|s| !s.accepted_by_user);
         steps.filter(|s| s.status == status).collect::<Vec<_>>()
     };
     let wanted = d.written().filter(|s| s.accepted_by_user).collect();
-    let firm = match d.after.holdout {
-        Some(_) => "confirmed, on held-out data too",
-        None => "confirmed",
-    };
-    let all = [
-        graded(firm, by(StepStatus::Confirmed)),
-        graded("indicated, and written in part", by(StepStatus::Indicated)),
-        graded("written because you asked for it", wanted),
-    ];
-    all.into_iter().flatten().collect::<Vec<_>>().join(" ")
+    [
+        graded("confirmed", "", by(StepStatus::Confirmed)),
+        graded("indicated", ", written in part", by(StepStatus::Indicated)),
+        graded("accepted", ", as you asked", wanted),
+    ]
+    .concat()
 }
 
 /// The errors that count, and of which data they are: held-out ones where there are any.
 pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
     match &of.holdout {
-        Some(errors) => ("held-out error", errors),
-        None => ("error of the fitted data", &of.train),
+        Some(errors) => ("held-out data", errors),
+        None => ("the fitted data", &of.train),
     }
-}
-
-/// How the diagnosis changed the error, and whether effects were written that gain nothing.
-fn bought(d: &Diagnosis) -> (String, bool) {
-    let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
-    let mean = |e: &Errors| e.overall.mean_relative_error_moving;
-    let [from, to] = [before, after].map(|e| number::percent(mean(e)));
-    let changed = d.written().next().is_some();
-    let rises = mean(after) > mean(before);
-    let falls = from != to && !rises;
-    let goes = match changed {
-        false => format!("is {to}"),
-        true if from == to => format!("stays at {to}"),
-        true if rises => format!("RISES from {from} to {to}"),
-        true => format!("falls from {from} to {to}"),
-    };
-    let over = if after.joints.len() > 1 {
-        " (rms over the joints)"
-    } else {
-        ""
-    };
-    (format!("The {data} {goes}{over}."), changed && !falls)
 }
 
 /// The effects that held-out data took out of the model.
-fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> String {
-    let Some(selected) = &d.selected else {
-        return String::new();
-    };
+fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> Option<Finding> {
+    d.selected.as_ref()?;
     let vetoed = d.steps.iter().filter(|s| s.vetoed());
     let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
-    let names = names.join("; ");
     let error = |of: &SplitErrors| number::percent(errors(of).1.overall.mean_relative_error_moving);
-    if d.written().next().is_none() {
-        let after = error(&d.after);
-        return format!(" Not written, for held-out data are worse with it ({after}): {names}.");
-    }
-    format!(
-        " Not written, for held-out data are worse with it: {names}. The model as it is written has a {} of {}, \
-         which is optimistic, since these data chose.",
-        errors(selected).0,
-        error(selected)
-    )
+    let of = match d.written().next() {
+        None => format!(" ({})", error(&d.after)),
+        Some(_) => String::new(),
+    };
+    Some(Finding {
+        grade: "not written",
+        text: format!("{}: the held-out error rises with it{of}", names.join("; ")),
+    })
 }
 
 /// The joint with the largest share of its torque left beyond the noise.
@@ -173,9 +199,9 @@ fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let worst = worst(d)?;
     let error = number::percent(errors(d.errors_now()).1.joints[worst].headline());
     let place = match names.len() {
-        1 => format!("More than noise is left ({error} of the torque)"),
+        1 => format!("a residual with a pattern ({error} of the torque)"),
         _ => format!(
-            "Beyond noise, most is left in {} (its error is {error})",
+            "most at {} (error {error}), a residual with a pattern",
             names[worst]
         ),
     };
@@ -183,7 +209,7 @@ fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
     let on = dependence.map(|of| {
         let signals = of.signals.iter().map(|s| signal_words(names, worst, *s));
         let signals: Vec<String> = signals.collect();
-        format!("; it depends on {}", signals.join(" and "))
+        format!(" over {}", signals.join(" and "))
     });
-    Some(place + &on.unwrap_or_default() + ".")
+    Some(place + &on.unwrap_or_default())
 }

@@ -1,10 +1,11 @@
 //! The report of `excite`: a motion, judged before the robot moves.
 
+use super::diagnose_words::Words;
 use crate::report::figure::{MotionFigure, MotionPanel};
 use crate::report::table::{Columns, Table, unbroken};
 use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
 use crate::report::words::{self, condition, listed};
-use crate::report::{Report, Writer};
+use crate::report::{Figure, Finding, Headline, Report, Tone, Writer};
 use cft_ident_core::number;
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::foresee::Expected;
@@ -20,27 +21,26 @@ const PARTS: usize = 4;
 pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
-    let (text, good) = verdict(judged);
-    for described in judged.first_words() {
-        report.terminal().paragraph(described);
-        // numbers of the robot file are a caution, and no verdict
-        if judged.torques_first || described == judged.not_checked {
-            report.brief().verdict(described, false);
-        }
+    verdict(judged, &name).write(&mut report.everywhere());
+    let first = judged.first_words().into_iter();
+    // numbers of the robot file are a caution, and no verdict
+    let (urgent, others): (Vec<&str>, Vec<&str>) = first
+        .filter(|words| !words.is_empty())
+        .partition(|words| judged.torques_first || *words == judged.not_checked);
+    for described in urgent {
+        report.everywhere().verdict(described, false);
     }
-    if judged.torques_first {
-        report.page().paragraph(&judged.torques);
+    for described in others {
+        report.everywhere().paragraph(described);
     }
-    report.brief().verdict(&text, good);
-    report.page().verdict(&text, good);
-    report.page().paragraph(&judged.not_checked);
-    if !judged.torques_first {
-        report.page().paragraph(&judged.torques);
-    }
+    report.terminal().line("");
     report.terminal().table(limits(judged, path));
     report.page().table(limits(judged, &name));
     report.page().list(judged.broken());
     report.terminal().line("");
+    if judged.separates.is_some() {
+        return report;
+    }
     report.page().heading("Expected parameters");
     let rows = number::significant(judged.rows, 5);
     if let Some(law) = &judged.friction {
@@ -84,32 +84,78 @@ pub fn course(page: &mut Writer, judged: &Judgement, figure: &MotionFigure) {
     }
 }
 
-fn verdict(judged: &Judgement) -> (String, bool) {
+/// The nearest limit and the condition as figures, and whether every limit is kept.
+fn verdict(judged: &Judgement, name: &str) -> Words {
     let broken = judged.broken().len();
-    let mut text = match broken {
-        0 if judged.torques_foreseen => "The motion keeps every limit.".to_owned(),
-        0 => "The motion keeps every limit that was checked; none of torque was.".to_owned(),
-        1 => "The motion breaks a limit.".to_owned(),
-        n => format!("The motion breaks {n} limits."),
+    let (grade, text) = match broken {
+        0 if !judged.torques_foreseen => (
+            "limits kept",
+            "The motion keeps every limit that was checked; torques were not checked.".to_owned(),
+        ),
+        0 if judged.torques_first => (
+            "limits kept",
+            "The motion keeps every limit; its torques are a guess.".to_owned(),
+        ),
+        0 => ("limits kept", "The motion keeps every limit.".to_owned()),
+        1 => ("not safe", "The motion breaks a limit.".to_owned()),
+        n => ("not safe", format!("The motion breaks {n} limits.")),
     };
+    let figure = |label, value, tone| Figure { label, value, tone };
+    let mut figures = Vec::new();
     let all = judged.limits.iter();
-    let nearest = all.max_by(|a, b| a.used.total_cmp(&b.used));
-    if let Some(nearest) = nearest.filter(|_| broken == 0) {
-        text += &format!(
-            " It comes nearest to that of {} ({}), of which it uses {}.",
+    if let Some(nearest) = all.max_by(|a, b| a.used.total_cmp(&b.used)) {
+        let tone = if broken > 0 { Tone::Worse } else { Tone::Plain };
+        let value = format!(
+            "{} ({} {})",
+            number::percent(nearest.used),
             nearest.name,
-            nearest.quantity.called(&nearest.unit),
-            number::percent(nearest.used)
+            nearest.quantity.called(&nearest.unit)
         );
+        figures.push(figure("nearest limit", value, tone));
     }
-    if judged.friction.is_none() {
-        text += &format!(
-            " Condition of the regressor: {}, {} with columns scaled.",
-            condition(judged.condition.raw),
-            condition(judged.condition.normalised)
+    if judged.friction.is_none() && judged.separates.is_none() {
+        let scaled = condition(judged.condition.normalised);
+        figures.push(figure("condition", scaled, Tone::Plain));
+    }
+    let seconds = format!("{} s", number::significant(judged.seconds, 4));
+    figures.push(figure("time", seconds, Tone::Plain));
+    let mut found = vec![Finding { grade, text }];
+    if let Some(of) = &judged.separates {
+        let deviations = number::significant(of.deviations, 2);
+        figures.insert(
+            0,
+            figure(
+                "separates by",
+                format!("{deviations} std errors"),
+                Tone::Plain,
+            ),
         );
+        found.push(Finding {
+            grade: "separates",
+            text: format!(
+                "strokes of {} at {} amplitudes around a width of {} tell the two apart by {deviations} standard errors; \
+                 {} comes nearest",
+                of.joint,
+                of.amplitudes.len(),
+                number::significant(of.width, 3),
+                of.from
+            ),
+        });
+        return Words {
+            headline: Headline {
+                figures,
+                of: name.to_owned(),
+            },
+            found,
+        };
     }
-    (text, broken == 0)
+    Words {
+        headline: Headline {
+            figures,
+            of: format!("{name}; condition of the regressor with columns scaled"),
+        },
+        found,
+    }
 }
 
 fn limits(judged: &Judgement, name: &str) -> Table {
@@ -159,18 +205,21 @@ fn expected(
         .into()
 }
 
-/// The combination of parameters that the motion hardly separates.
+/// The combination of parameters that the motion separates least.
 fn apart(report: &mut Report, judged: &Judgement) {
     let parts = judged.weakest_direction.iter();
     let words = parts.clone().take(PARTS);
     let words = words.map(|part| format!("{:+.2} {}", part.weight, part.parameter));
     let words = words.collect::<Vec<_>>().join(" ");
-    let line = format!("weakest direction: {words}");
+    let line = format!("least certain combination: {words}");
     report.terminal().line(&line);
     let large = parts.take_while(|part| part.weight.abs() > 0.1);
-    let columns = Columns::new("weakest direction, of columns scaled to norm 1", large)
-        .words("parameter", |part| &part.parameter)
-        .words("part", |part| format!("{:+.2}", part.weight));
+    let columns = Columns::new(
+        "least certain combination, of columns scaled to norm 1",
+        large,
+    )
+    .words("parameter", |part| &part.parameter)
+    .words("part", |part| format!("{:+.2}", part.weight));
     report.page().table(columns);
     if let Some(pair) = &judged.confounded {
         let (first, second) = (&pair.first, &pair.second);

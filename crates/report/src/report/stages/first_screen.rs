@@ -2,21 +2,28 @@
 
 use super::diagnose_words::{errors as errors_of, is_exact, worst};
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
-use crate::report::{Writer, usual};
+use crate::report::{Report, Writer, usual};
 use cft_ident_core::diagnose::{Errors, FoundEffect};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, separating_command};
 
-/// Errors per joint as bars, and the next thing to do.
-pub(super) fn show(
-    page: &mut Writer,
-    (machine, found): (&LoggedRobot, &Diagnosed),
-    (path, logs): (&str, &str),
-) {
+/// Errors per joint as bars.
+pub(super) fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     page.figure(bars(machine, found).svg());
-    let typed = (&*local(path), &*local(logs));
-    page.paragraph(&next(machine, found, typed));
+}
+
+/// The next step, for a terminal and for a page.
+pub(super) fn write_next(
+    report: &mut Report,
+    (machine, found): (&LoggedRobot, &Diagnosed),
+    (file, path, logs): (&ModelFile, &str, &str),
+) {
+    let of = (machine, found);
+    let (text, command) = next(of, file, (path, logs));
+    report.terminal().next(&text, command);
+    let (text, command) = next(of, file, (&*local(path), &*local(logs)));
+    report.page().next(&text, command);
 }
 
 /// Paths of a command as a page has them: an absolute one by its last part, for a page is the same on every machine.
@@ -48,7 +55,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
     });
     ErrorFigure {
         title: format!("Relative torque error on {data}"),
-        names: ["as given", "after"].map(str::to_owned),
+        names: ["before", "after"].map(str::to_owned),
         joints: joints.collect(),
         limit: None,
         usual: (!is_exact(d)).then(|| usual::drawn(machine.file.log.torque_is)),
@@ -61,75 +68,82 @@ fn unclear(found: &Diagnosed) -> Option<&FoundEffect> {
     written.find(|step| !step.alternatives.is_empty())
 }
 
-/// The next motion to record, as a command: it separates an effect from its like, or narrows weak parameters.
-pub(super) fn next_motion(
-    writer: &mut Writer,
-    (machine, found): (&LoggedRobot, &Diagnosed),
-    (file, path): (&ModelFile, &str),
-) {
-    let d = &found.diagnosis;
-    // limits of the motion are the positions and speeds of the logs
-    if !d.determined || file.held_out.is_empty() {
-        return;
-    }
-    let separating =
-        unclear(found).and_then(|s| separating_command(&s.estimate, &machine.robot, path));
-    match separating {
-        Some(command) => writer.code(&command),
-        None => narrowing(writer, file, path),
-    }
-}
-
 /// The motion that narrows the weak parameters of a model, where there are some.
 pub(super) fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
     if let Some(([open, all], command)) = narrowing_command(file, path) {
         let words =
-            format!("{open} of {all} parameters are weak; a motion to record that narrows them:");
+            format!("{open} of {all} parameters are not identified. A motion that narrows them:");
         writer.note("", &words, 2);
         writer.code(&command);
     }
 }
 
-/// The next step; the paths of the model and of the logs are those that a shell takes.
-pub(super) fn next(machine: &LoggedRobot, found: &Diagnosed, (path, logs): (&str, &str)) -> String {
+/// The next step, and the command for it where there is one; the paths of the model and of the logs are those that a
+/// shell takes.
+fn next(
+    (machine, found): (&LoggedRobot, &Diagnosed),
+    file: &ModelFile,
+    (path, logs): (&str, &str),
+) -> (String, Option<String>) {
     let d = &found.diagnosis;
+    let alone = |text: String| (text, None);
     if let Some(contact) = found.contacts.first() {
-        return format!("Next: see whether something touched the robot. {contact}.");
+        return alone(format!(
+            "Next: see whether something touched the robot. {contact}."
+        ));
     }
     if !d.determined {
-        return "Next: move the joints faster and farther, or log a torque with less noise."
-            .to_owned();
+        return alone(
+            "Next: move the joints faster and farther, or log a torque with less noise.".to_owned(),
+        );
     }
     if !d.long_enough() && d.written().next().is_none() {
-        return format!(
-            "Next: log for longer: {} s at least ({} blocks of {} s).",
+        return alone(format!(
+            "Next: log for at least {} s ({} blocks of {} s).",
             number::significant(d.block_s * d.least_blocks as f64, 2),
             d.least_blocks,
             number::significant(d.block_s, 2)
-        );
+        ));
     }
     if let Some(step) = unclear(found) {
         let effect = &step.estimate;
-        return format!(
-            "Next: {}. That separates {} from {}.",
-            effect.law.entry.separate_by,
-            effect.title(&machine.robot),
-            step.alternatives[0].title(&machine.robot)
-        );
+        let like = &step.alternatives[0];
+        let (name, other) = match effect.place == like.place {
+            // the joint is said once
+            true => (effect.name().to_owned(), like.title(&machine.robot)),
+            false => (effect.title(&machine.robot), like.title(&machine.robot)),
+        };
+        // limits of the motion are the positions and speeds of the logs
+        let command = match file.held_out.is_empty() {
+            true => None,
+            false => separating_command(effect, &machine.robot, path),
+        };
+        return match command {
+            Some(command) => (
+                format!("Next: log the motion that separates {name} from {other}:"),
+                Some(command),
+            ),
+            None => alone(format!(
+                "Next: {}. That separates {name} from {other}.",
+                effect.law.entry.separate_by
+            )),
+        };
     }
     match worst(d).map(|j| &machine.robot.joint_names()[j]) {
-        Some(joint) if !found.searched => format!(
-            "Next: search a formula for what is left of {joint}: `cft-ident diagnose {logs} -m {path} --search`."
+        Some(joint) if !found.searched => (
+            format!("Next: search a formula for the residual of {joint}:"),
+            Some(format!("cft-ident diagnose {logs} -m {path} --search")),
         ),
-        Some(joint) => format!(
-            "Next: look at the residual of {joint}, which has a pattern that no known effect explains, and \
-             log it at other speeds and loads."
+        Some(joint) => alone(format!(
+            "Next: look at the residual of {joint} in the report, and log it at other speeds and loads."
+        )),
+        None if d.written().next().is_none() => (
+            "Next: use the model:".to_owned(),
+            Some(format!("cft-ident export -m {path} --c model.h")),
         ),
-        None if d.written().next().is_none() => {
-            format!("Next: use the model: `cft-ident export -m {path} --c model.h`.")
-        }
-        None => format!(
-            "Next: try the refined model on a log of another motion: `cft-ident validate LOG -m {path}`."
+        None => (
+            "Next: test the new model on a log of another motion:".to_owned(),
+            Some(format!("cft-ident validate LOG -m {path}")),
         ),
     }
 }

@@ -51,8 +51,7 @@ impl Identify<'_> {
                 page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
             }
             Ok(DiagnoseEnd::Diagnosed(found)) => {
-                let (text, good) = diagnose_words::words(self.machine, found);
-                page.verdict(&text, good);
+                diagnose_words::words(self.machine, found).write(page);
             }
             _ => {}
         }
@@ -61,12 +60,9 @@ impl Identify<'_> {
             Some(_) if self.diagnosed().is_some() && self.limit.is_none() => {}
             Some(validated) => {
                 let errors = validated.judged();
-                let (text, good) = validate::verdict(errors, self.limit, &escaped(self.unseen));
-                let given = match self.found.refined {
-                    Some(_) => text.replacen("The model", "The model before the diagnosis", 1),
-                    None => text,
-                };
-                page.verdict(&given, good);
+                let torque_is = self.machine.file.log.torque_is;
+                let words = validate::words(errors, (self.limit, torque_is), &escaped(self.unseen));
+                words.write(page);
             }
             None => page.verdict(
                 "There is no validation log: the held-out error is not known.",
@@ -81,7 +77,6 @@ pub fn identify(of: &Identify) -> Report {
     let (machine, found) = (of.machine, of.found);
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
     of.verdicts(&mut report.everywhere());
-    guesses(&mut report.terminal(), of.guesses);
     if let Some(diagnosed) = of.diagnosed() {
         let typed = (of.model(), of.path, of.logs);
         diagnose::diagnosed(&mut report, (machine, diagnosed), typed);
@@ -106,11 +101,12 @@ pub fn identify(of: &Identify) -> Report {
     detail.line("");
     quality_of_fit::condition(&mut detail, &found.dynamics);
     quality_of_fit::fit_quality(&mut detail, &found.dynamics);
+    guesses(&mut report.terminal(), of.guesses);
     report.terminal().line("");
     let mut page = report.page();
     match (of.diagnosed(), &found.validated) {
         (Some(diagnosed), _) => {
-            first_screen::show(&mut page, (machine, diagnosed), (of.path, of.logs));
+            first_screen::show(&mut page, machine, diagnosed);
             diagnose::errors(&mut page, machine, diagnosed);
         }
         (None, Some(validated)) => {
@@ -128,11 +124,12 @@ pub fn identify(of: &Identify) -> Report {
     report
 }
 
-/// The guesses in the robot file, as one verdict.
+/// The guesses in the robot file, one after the other.
 fn guesses(writer: &mut Writer, guesses: &[String]) {
     if !guesses.is_empty() {
-        let text = format!("Guessed, CHECK IT: {}.", guesses.join("; "));
-        writer.verdict(&text, false);
+        writer.line("");
+        writer.paragraph("Guessed, please check (CHECK IT in robot.toml):");
+        writer.list(guesses);
     }
 }
 

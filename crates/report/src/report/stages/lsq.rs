@@ -1,5 +1,6 @@
 //! The report of `lsq`.
 
+use super::diagnose_words::Words;
 use super::first_screen;
 use super::quality_of_fit::{bodies, condition, consistent, fit_quality};
 use crate::report::figure::{ErrorFigure, JointBars};
@@ -7,9 +8,9 @@ use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::Columns;
 use crate::report::words::{escaped, listed};
-use crate::report::{Report, Writer, summary, usual};
+use crate::report::{Figure, Finding, Headline, Report, Tone, Writer, summary, usual};
 use cft_ident_core::number;
-use cft_ident_core::verdict::{IDENTIFIED, Verdict};
+use cft_ident_core::verdict::IDENTIFIED;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::Provenance;
 use cft_ident_stages::identify::{
@@ -37,8 +38,9 @@ const MAX_PARAMETERS_ON_SCREEN: usize = 8;
 /// The verdict, the residual of the fit, the parameters and the quality of the fit.
 pub fn lsq(of: &Lsq) -> Report {
     let mut report = Report::new(&format!("Least squares fit to {}", escaped(of.logs)));
-    let (text, good) = words(of);
-    report.everywhere().verdict(&text, good);
+    words(of).write(&mut report.everywhere());
+    next(&mut report.terminal(), of.path);
+    next(&mut report.page(), &first_screen::local(of.path));
     report.terminal().line("");
     gains(&mut report.terminal(), &of.found.gains);
     let relative: Vec<f64> = of.found.joints.iter().map(|e| e.relative_error).collect();
@@ -49,8 +51,6 @@ pub fn lsq(of: &Lsq) -> Report {
     }
     let all: Vec<usize> = (0..relative.len()).collect();
     residuals(&mut report.detail(), of.found, &all);
-    let (tally, _) = parameters::tally(of.file);
-    report.detail().paragraph(&format!("{tally}."));
     let mut parameters = match of.found.unknowns.len() <= MAX_PARAMETERS_ON_SCREEN {
         true => report.terminal(),
         false => report.detail(),
@@ -70,9 +70,13 @@ pub fn lsq(of: &Lsq) -> Report {
         detail.table(bodies(links));
         consistent(&mut detail, links);
     }
-    report.terminal().line("");
-    report.terminal().note("", &next(of.typed, of.path), 2);
-    first_screen::narrowing(&mut report.terminal(), of.file, of.path);
+    let mut detail = report.detail();
+    detail.paragraph("What the model lacks:");
+    detail.code(&format!(
+        "cft-ident diagnose {} -m {} -o refined.toml",
+        of.typed, of.path
+    ));
+    first_screen::narrowing(&mut detail, of.file, of.path);
     let mut page = report.page();
     gains(&mut page, &of.found.gains);
     known_friction(&mut page, &of.found.friction);
@@ -80,10 +84,7 @@ pub fn lsq(of: &Lsq) -> Report {
         motion(&mut page, fit);
     }
     page.figure(bars(of).svg());
-    let [logs, model] = [of.typed, of.path].map(first_screen::local);
-    page.paragraph(&next(&logs, &model));
     residuals(&mut page, of.found, &all);
-    page.paragraph(&format!("{tally}."));
     report
 }
 
@@ -129,58 +130,69 @@ pub fn pictures(
     provenance::section(page, file, &inputs, &[], summary, command);
 }
 
-/// The next step with the model at a path that was fitted to these logs.
-fn next(fitted: &str, path: &str) -> String {
-    format!(
-        "Next: `cft-ident validate LOG -m {path}` on a log that was not fitted, for this error is of the data that \
-         were; `cft-ident diagnose {fitted} -m {path} -o refined.toml` finds what the model lacks."
-    )
+/// The next step with the model at a path.
+fn next(writer: &mut Writer, path: &str) {
+    let text = "Next: test the model on a log that was not fitted:";
+    writer.next(text, Some(format!("cft-ident validate LOG -m {path}")));
 }
 
-/// The error of the fit, how good that is and whether the model can be used; and whether nothing calls for attention.
-fn words(of: &Lsq) -> (String, bool) {
+/// The error of the fit beside what is usual, and whether the model can be used.
+fn words(of: &Lsq) -> Words {
     let joints: Vec<&JointResidual> = of.found.joints.iter().filter(|j| j.moves()).collect();
     let square: f64 = joints.iter().map(|j| j.relative_error.powi(2)).sum();
     let rms = (square / joints.len().max(1) as f64).sqrt();
-    let unusual = rms > usual::range(usual::Measured::Currents)[1];
-    let rms = number::percent(rms);
-    let worst = joints.iter();
-    let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
-    let mut text = match worst.filter(|_| joints.len() > 1) {
-        Some(worst) => format!(
-            "The fit leaves {rms} of the torque (rms over the joints), most at {}: {}.",
-            worst.joint,
-            number::percent(worst.relative_error)
-        ),
-        None => format!("The fit leaves {rms} of the torque."),
-    };
-    let resting = of.found.joints.iter().filter(|j| !j.moves());
-    text += &super::validate::still(resting.map(|j| &*j.joint));
-    text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
+    let torque_is = of.machine.file.log.torque_is;
+    let unusual = rms > usual::band(torque_is)[1];
     let useless = joints.iter().filter(|j| j.relative_error >= 1.0);
     let useless = listed(useless.map(|j| j.joint.as_str()));
-    let apart = far_off(of.found);
-    let good = useless.is_empty() && apart.is_empty() && !unusual;
-    text += &if !useless.is_empty() {
-        format!(" The model cannot be used for {useless}: no torque at all would be as near.")
-    } else if !apart.is_empty() {
-        apart
-    } else if unusual {
-        " That is more than usual: look at what the model lacks before it is used.".to_owned()
-    } else {
-        " The model can be used for motions like these.".to_owned()
+    let figure = |label, value, tone| Figure { label, value, tone };
+    let tone = match (useless.is_empty(), unusual) {
+        (false, _) => Tone::Worse,
+        (true, true) => Tone::High,
+        _ => Tone::Plain,
     };
-    let unknowns = of.found.unknowns.iter();
-    let open = unknowns
-        .filter(|u| u.verdict == Verdict::NotIdentifiable)
-        .count();
-    if open > 0 {
-        text += &format!(
-            " Use its torques, and not its single numbers: {open} of {} parameters are not determined one by one.",
-            of.found.unknowns.len()
+    let mut figures = vec![figure("error", number::percent(rms), tone)];
+    let worst = joints.iter();
+    let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
+    let mut over = String::new();
+    if let Some(worst) = worst.filter(|_| joints.len() > 1) {
+        let value = format!(
+            "{} ({})",
+            number::percent(worst.relative_error),
+            worst.joint
         );
+        figures.push(figure("largest", value, Tone::Plain));
+        over = format!(", rms over {} joints", joints.len());
     }
-    (text, good)
+    figures.push(figure("usual", usual::figure(torque_is), Tone::Plain));
+    let resting = of.found.joints.iter().filter(|j| !j.moves());
+    let mut found = super::validate::still(resting.map(|j| &*j.joint));
+    let mut say = |grade, text| found.push(Finding { grade, text });
+    if !useless.is_empty() {
+        let text = format!("{useless}: no torque at all would be as close");
+        say("not usable", text);
+    } else {
+        let apart = far_off(of.found);
+        let none = apart.is_empty();
+        apart.into_iter().for_each(|text| say("not usable", text));
+        match (none, unusual) {
+            (true, true) => say(
+                "high",
+                "look at what the model lacks before you use it".to_owned(),
+            ),
+            (true, false) => say("usable", "for motions like these".to_owned()),
+            _ => {}
+        }
+    }
+    let (tally, all) = parameters::tally(of.file);
+    say(if all { "known" } else { "partly known" }, tally);
+    Words {
+        headline: Headline {
+            figures,
+            of: format!("relative torque error of the fit, on the fitted data{over}"),
+        },
+        found,
+    }
 }
 
 /// A joint's error is far above the others from so many times their median on, and from so much.
@@ -188,7 +200,7 @@ const OUTLYING_RATIO: f64 = 3.0;
 const OUTLYING_ERROR: f64 = 0.05;
 
 /// Joints whose error is far above those of the others, a sentence each.
-fn far_off(found: &IdentifiedDynamics) -> String {
+fn far_off(found: &IdentifiedDynamics) -> Vec<String> {
     let error = |j: usize| found.joints[j].relative_error;
     let moving = || (0..found.joints.len()).filter(|j| found.joints[*j].moves());
     let median = |without: usize| {
@@ -201,7 +213,7 @@ fn far_off(found: &IdentifiedDynamics) -> String {
         let median = median(j)?;
         (error(j) > OUTLYING_ERROR && error(j) > OUTLYING_RATIO * median).then(|| {
             format!(
-                " Do not use it for {} before that is explained: its error of {} is far above the others', {} in the median.",
+                "{}: its error of {} is far above that of the others ({} in the median)",
                 found.joints[j].joint,
                 number::percent(error(j)),
                 number::percent(median)

@@ -65,7 +65,10 @@ fn open_directions(terminal: &mut Writer, found: &IdentifiedDynamics) {
         return;
     }
     let all = found.unknowns.len();
-    let noise = format!("a standard deviation above {:.0} %", 100.0 * WEAK);
+    let noise = format!(
+        "a standard deviation above {:.0} % of their value",
+        100.0 * WEAK
+    );
     terminal.paragraph(&match all.saturating_sub(found.fit.rank) {
         0 => format!("all {all} base parameters are excited; {open} have {noise}"),
         missing => format!(
@@ -95,7 +98,7 @@ fn account(terminal: &mut Writer, account: &Account) {
     };
     let shares = each(&|of| of.down_weighted.map(number::percent));
     if !shares.is_empty() {
-        terminal.line(&format!("rows of less than half weight: {shares}"));
+        terminal.line(&format!("samples of less than half weight: {shares}"));
     }
     if let Some(simulated) = &account.simulated {
         let gains = each(&|of| {
@@ -115,7 +118,8 @@ fn account(terminal: &mut Writer, account: &Account) {
 
 /// Links that can exist.
 pub(super) fn bodies(found: &ConsistentLinks) -> Table {
-    let caption = "links that can exist: kg, centre of gravity in m, moments about it in kg m^2";
+    let caption =
+        "physically consistent links: kg, centre of gravity in m, moments about it in kg m^2";
     let mut columns = Columns::new(caption, &found.links)
         .words("link", |link| &link.name)
         .digits("mass", 4, |link| link.mass);

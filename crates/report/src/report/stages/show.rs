@@ -1,16 +1,17 @@
 //! The report of `show`: a model file as a person wants to know it.
 
+use super::diagnose_words::Words;
 use crate::report::sections::parameters;
 use crate::report::table::Columns;
 use crate::report::words::listed;
-use crate::report::{Report, Writer};
+use crate::report::{Figure, Finding, Headline, Report, Tone, Writer};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::escape;
-use cft_ident_stages::identify::{BANDWIDTH_HZ, JointInUse, LoggedRobot};
+use cft_ident_stages::identify::{JointInUse, LoggedRobot};
 
 /// The parts of the report.
 pub struct Show<'a> {
@@ -25,8 +26,7 @@ pub struct Show<'a> {
 pub fn show(of: &Show) -> Report {
     let name = escape(&of.machine.name);
     let mut report = Report::new(&format!("Model {name}"));
-    let (text, good) = verdict(of);
-    report.everywhere().verdict(&text, good);
+    verdict(of).write(&mut report.everywhere());
     report.terminal().line("");
     let mut all = report.everywhere();
     if let Some((joints, point)) = of.in_use {
@@ -42,41 +42,74 @@ pub fn show(of: &Show) -> Report {
     report
 }
 
-fn verdict(of: &Show) -> (String, bool) {
+/// Error in use and parameters as figures.
+fn verdict(of: &Show) -> Words {
     let joints = of.machine.robot.joint_names();
-    let (tally, good) = parameters::tally(of.file);
-    let kind = of.file.robot.robot.model.name();
-    let mut text = format!(
-        "{kind} robot, {} joint{}: {}. {tally}.",
-        joints.len(),
-        if joints.len() == 1 { "" } else { "s" },
-        escape(&joints.join(", "))
-    );
-    text += match of.file.is_consistent() {
-        true => " Torques are computed with physically consistent parameters beside the plain fit.",
-        false => " It holds the plain fit alone.",
+    let figure = |label, value| Figure {
+        label,
+        value,
+        tone: Tone::Plain,
     };
-    let hidden = of.in_use.and_then(|(joints, point)| {
-        let forces = joints.iter();
-        let forces = forces.filter_map(|j| Some((j.hidden_force_n?, &j.joint)));
-        let (force, joint) = forces.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(format!(
-            " The smallest force at the {} that it can show is {} N, by {joint}.",
-            escape(point),
-            number::significant(force, 2)
-        ))
+    let mut figures = Vec::new();
+    let mut found = Vec::new();
+    match of.in_use {
+        Some((used, point)) => {
+            let part = |j: &JointInUse| j.half_width_95 / j.torque_seen;
+            let parts: Vec<f64> = used.iter().map(part).filter(|x| x.is_finite()).collect();
+            let square: f64 = parts.iter().map(|x| x * x).sum();
+            let rms = (square / parts.len().max(1) as f64).sqrt();
+            figures.push(figure(
+                "95 % band",
+                format!("\u{b1} {} of the torque", number::percent(rms)),
+            ));
+            let forces = used.iter();
+            let forces = forces.filter_map(|j| Some((j.hidden_force_n?, &j.joint)));
+            if let Some((force, joint)) = forces.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                let force = number::significant(force, 2);
+                figures.push(figure("smallest force", format!("{force} N ({joint})")));
+                found.push(Finding {
+                    grade: "force",
+                    text: format!("smallest detectable force at the {}", escape(point)),
+                });
+            }
+        }
+        None => found.push(Finding {
+            grade: "not known",
+            text: "how far its torques are off: the file holds no [[held_out]]; fit it again"
+                .to_owned(),
+        }),
+    }
+    let (tally, all) = parameters::tally(of.file);
+    found.push(Finding {
+        grade: if all { "known" } else { "partly known" },
+        text: tally,
     });
-    text += hidden.as_deref().unwrap_or(
-        " How far its torques are off is not known: the file holds no [[held_out]]; fit it again.",
-    );
-    (text, good && of.in_use.is_some())
+    found.push(Finding {
+        grade: "torques by",
+        text: match of.file.is_consistent() {
+            true => "physically consistent parameters",
+            false => "the plain fit",
+        }
+        .to_owned(),
+    });
+    figures.push(figure("joints", joints.len().to_string()));
+    Words {
+        headline: Headline {
+            figures,
+            of: format!(
+                "{} robot: {}",
+                of.file.robot.robot.model.name(),
+                escape(&joints.join(", "))
+            ),
+        },
+        found,
+    }
 }
 
 /// The error in use.
 fn uses(to: &mut Writer, joints: &[JointInUse], point: &str) {
     let caption = format!(
-        "what the error means: 95 % band of the torque, the force at the {} that it hides, and the lag that \
-         feed-forward leaves to a position loop of {BANDWIDTH_HZ} Hz",
+        "what the error means: 95 % band of the torque, and the smallest force at the {} that shows",
         escape(point)
     );
     let columns = Columns::new(&caption, joints)
@@ -84,9 +117,7 @@ fn uses(to: &mut Writer, joints: &[JointInUse], point: &str) {
         .digits("band +-", 3, |j| j.half_width_95)
         .percent("of torque", |j| j.half_width_95 / j.torque_seen)
         .words("unit", |j| &j.unit)
-        .digits("hides [N]", 2, |j| j.hidden_force_n)
-        .digits("lag", 2, |j| j.lag.map(|lag| 1e3 * lag))
-        .words("of", |j| if j.position_unit == "m" { "mm" } else { "mrad" });
+        .digits("force [N]", 2, |j| j.hidden_force_n);
     to.table(columns);
 }
 

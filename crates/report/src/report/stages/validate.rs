@@ -1,18 +1,19 @@
 //! The report of `validate`.
 
+use super::diagnose_words::Words;
 use crate::report::figure::{ErrorFigure, JointBars, JointTorque, TorqueFigure, parted};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{
     fit, free_run, friction, parameters, provenance, residual, sketch, torque,
 };
 use crate::report::table::{Columns, unbroken};
-use crate::report::words::{self, escaped, listed};
-use crate::report::{Report, Writer, summary, usual};
+use crate::report::words::{escaped, listed, percent as known_percent, r2};
+use crate::report::{Figure, Finding, Headline, Report, Tone, Writer, summary, usual};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
 use cft_ident_core::validate::{JointError, TorqueErrors, Validation};
 use cft_ident_files::config::ModelFile;
-use cft_ident_logs::log::{Provenance, escape};
+use cft_ident_logs::log::{Provenance, TorqueIs, escape};
 use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for};
 use cft_ident_stages::replay::Replayed;
 
@@ -40,14 +41,17 @@ pub fn validate(of: &Validate) -> Report {
     ));
     let by_use = of.found.by_use.as_ref();
     let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
-    let (mut text, mut good) = verdict(judged, of.limit, &escaped(logs));
-    text += &format!(" {}", usual::words(of.machine.file.log.torque_is));
+    let torque_is = of.machine.file.log.torque_is;
+    let mut said = words(judged, (of.limit, torque_is), &escaped(logs));
     if let Some(shown) = not_a_validation(judged) {
-        text = format!("NOT A VALIDATION: {shown}.");
-        good = false;
+        let grade = "not a validation";
+        said.found.insert(0, Finding { grade, text: shown });
     }
-    report.everywhere().verdict(&text, good);
+    said.write(&mut report.everywhere());
     used_before(&mut report.everywhere(), of);
+    let next =
+        "Next: find what the model lacks: `cft-ident diagnose` with this log as `--holdout`.";
+    report.everywhere().next(next, None);
     report.terminal().line("");
     let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
     let whole = caption(logs);
@@ -104,9 +108,6 @@ pub fn pictures(
 ) {
     let validation = &of.found.validation;
     let title = escaped(of.logs);
-    page.paragraph(
-        "Next: `cft-ident diagnose` with this log as `--holdout` finds the effects that the model lacks.",
-    );
     parameters::section(page, of.file, &|_| None);
     match replayed {
         Some(replayed) => {
@@ -173,8 +174,8 @@ fn at_rest(of: &TorqueErrors) -> Option<String> {
         unbroken(&format!(
             "{} {} moving, {} at rest ({} of its rows)",
             e.joint,
-            words::percent(e.relative_error_moving),
-            words::percent(e.relative_error_rest),
+            known_percent(e.relative_error_moving),
+            known_percent(e.relative_error_rest),
             number::percent(e.resting as f64 / e.samples as f64)
         ))
     });
@@ -185,45 +186,72 @@ fn at_rest(of: &TorqueErrors) -> Option<String> {
 }
 
 /// The joints that stand still, which count in no error.
-pub(super) fn still<'a>(joints: impl Iterator<Item = &'a str>) -> String {
+pub(super) fn still<'a>(joints: impl Iterator<Item = &'a str>) -> Vec<Finding> {
     let names: Vec<&str> = joints.collect();
-    match names.as_slice() {
-        [] => String::new(),
-        [one] => format!(" {one} stands still and is not counted."),
-        all => format!(" {} stand still and are not counted.", all.join(", ")),
-    }
+    let text = match names.as_slice() {
+        [] => return Vec::new(),
+        [one] => format!("{one} stands still and is not counted"),
+        all => format!("{} stand still and are not counted", all.join(", ")),
+    };
+    vec![Finding {
+        grade: "at rest",
+        text,
+    }]
 }
 
-/// The verdict in words, and whether nothing calls for attention.
-pub(super) fn verdict(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, bool) {
-    let mut text = format!(
-        "The model misses {} of the torque of {title}",
-        number::percent(of.overall.mean_relative_error)
-    );
-    let joints = of.joints.iter().filter(|e| e.moves());
-    if let Some(worst) = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))
-        && of.joints.len() > 1
-    {
-        text += &format!(
-            " (rms over the joints), most at {}: {}",
-            worst.joint,
-            number::percent(worst.relative_error)
-        );
-    }
-    text += ".";
-    text += &still(of.joints.iter().filter(|e| !e.moves()).map(|e| &*e.joint));
-    let Some(limit) = limit else {
-        return (text, true);
+/// The verdict: the error over the joints, that of the worst joint, what is usual, and the limit that the user set.
+pub(super) fn words(
+    of: &TorqueErrors,
+    (limit, torque_is): (Option<f64>, Option<TorqueIs>),
+    title: &str,
+) -> Words {
+    let figure = |label, value, tone| Figure { label, value, tone };
+    let error = of.overall.mean_relative_error;
+    let beyond = |e: &&JointError| {
+        limit.is_some_and(|limit| e.relative_error.is_nan() || e.relative_error > limit)
     };
-    let beyond = |e: &&JointError| e.relative_error.is_nan() || e.relative_error > limit;
     let beyond = of.joints.iter().filter(|e| e.moves()).filter(beyond);
     let beyond = listed(beyond.map(|e| e.joint.as_str()));
-    let limit = number::percent(limit);
-    text += &match beyond.is_empty() {
-        true => format!(" Every joint keeps the limit of {limit}."),
-        false => format!(" The limit of {limit} is missed by {beyond}."),
+    let tone = match (beyond.is_empty(), error > usual::band(torque_is)[1]) {
+        (false, _) => Tone::Worse,
+        (true, true) => Tone::High,
+        _ => Tone::Plain,
     };
-    (text, beyond.is_empty())
+    let mut figures = vec![figure("error", number::percent(error), tone)];
+    let joints = of.joints.iter().filter(|e| e.moves());
+    let worst = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
+    let mut over = String::new();
+    if let Some(worst) = worst.filter(|_| of.joints.len() > 1) {
+        let value = format!(
+            "{} ({})",
+            number::percent(worst.relative_error),
+            worst.joint
+        );
+        figures.push(figure("largest", value, Tone::Plain));
+        over = format!(", rms over {} joints", of.joints.len());
+    }
+    figures.push(figure("usual", usual::figure(torque_is), Tone::Plain));
+    let mut found = still(of.joints.iter().filter(|e| !e.moves()).map(|e| &*e.joint));
+    if let Some(limit) = limit {
+        let limit = number::percent(limit);
+        found.push(match beyond.is_empty() {
+            true => Finding {
+                grade: "limit kept",
+                text: format!("every joint is within {limit}"),
+            },
+            false => Finding {
+                grade: "limit missed",
+                text: format!("{beyond} above {limit}"),
+            },
+        });
+    }
+    Words {
+        headline: Headline {
+            figures,
+            of: format!("relative torque error on {title}{over}"),
+        },
+        found,
+    }
 }
 
 /// The errors of every joint.
@@ -234,7 +262,7 @@ fn errors(page: &mut Writer, of: &TorqueErrors, caption: &str) {
         .percent("relative error", |e| e.relative_error)
         .words("rms error", |e| torque(e.rmse, e))
         .words("largest", |e| torque(e.max_abs, e))
-        .words("R\u{b2}", |e| words::r2(e.r2))
+        .words("R\u{b2}", |e| r2(e.r2))
         .percent("moving", |e| e.relative_error_moving)
         .percent("at rest", |e| e.relative_error_rest)
         .percent("relative error before the filter", |e| e.relative_error_raw)

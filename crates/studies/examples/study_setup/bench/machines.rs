@@ -128,7 +128,7 @@ pub fn machine(name: &str, folder: &Path) -> Option<Machine> {
     };
     if found.is_none() {
         eprintln!(
-            "SKIPPED: the log of {name} is not there (docs/measured/data.md says where it is from)"
+            "SKIPPED: the log of {name} is not there (docs/results/measured/data.md says where it is from)"
         );
     }
     found
