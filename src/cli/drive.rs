@@ -7,10 +7,10 @@ use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_drive::drive::drive_file::DriveFile;
 use cft_ident_drive::drive::identify::{DriveData, identify, joined_courses};
-use cft_ident_drive::drive::law::{DriveKind, Firmware};
-use cft_ident_drive::drive::outcome::Drives;
+use cft_ident_drive::drive::law::{DriveKind, ServoFirmware};
+use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_drive::drive::read::bam::RigGiven;
-use cft_ident_drive::drive::read::{self, Told};
+use cft_ident_drive::drive::read::{self, ReadRequest};
 use cft_ident_drive::drive::track::DriveLog;
 use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{DataRole, LogSpec, Provenance, escape};
@@ -87,14 +87,14 @@ fn fact(text: &str) -> Result<(String, f64), String> {
 }
 
 /// A robot whose links are known.
-struct Links {
+struct KnownLinks {
     robot: Robot,
     theta: Vec<f64>,
     joints: Vec<String>,
     provenance: Provenance,
 }
 
-fn links(path: &Path) -> Result<Links, CliError> {
+fn links(path: &Path) -> Result<KnownLinks, CliError> {
     let urdf = path
         .extension()
         .is_some_and(|end| end == "urdf" || end == "xml");
@@ -127,7 +127,7 @@ fn links(path: &Path) -> Result<Links, CliError> {
             .hint("give a robot file whose URDF has inertials")
             .hint("or leave -r out: torques are then ratios to the inertia"));
     }
-    Ok(Links {
+    Ok(KnownLinks {
         theta: robot.base_of(&standard),
         joints: file.joint_names(),
         robot,
@@ -145,7 +145,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     ];
     context.check_outputs(inputs, outputs.into_iter().flatten())?;
     let links = args.robot.as_deref().map(links).transpose()?;
-    let told = Told {
+    let told = ReadRequest {
         rig: RigGiven {
             arm_mass: args.arm_mass,
             kp: args.kp,
@@ -209,7 +209,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             .map(|of| (of.robot.clone(), of.theta.clone())),
         kind: match torque {
             true => DriveKind::Torque,
-            false => DriveKind::Volts(Firmware {
+            false => DriveKind::Volts(ServoFirmware {
                 gain: args.firmware_gain,
                 duty_max: args.duty_max,
             }),
@@ -223,7 +223,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     drop(bar);
     context.check()?;
-    let Some(drives) = Drives::joined(&each) else {
+    let Some(drives) = DriveResult::joined(&each) else {
         return Err(CliError::input("the logs hold no joint"));
     };
     let courses = joined_courses(&each);

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{CliError, Context, Outcome, campaign};
 use cft_ident_files::config;
 use cft_ident_logs::log::unpacked;
-use cft_ident_plant::simulate::servo::{BenchMotion, Rig, Servo, run_servo};
+use cft_ident_plant::simulate::servo::{BenchMotion, ServoPlant, ServoRig, run_servo};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 
@@ -159,12 +159,12 @@ static SERVO: Machine = Machine {
 
 /// The logs of its rig by name.
 fn servo_logs() -> Vec<(String, Vec<u8>)> {
-    let servo = Servo {
+    let servo = ServoPlant {
         speed_limit: Some(4.8),
         command_delay: 0.032,
-        ..Servo::HOBBY
+        ..ServoPlant::HOBBY
     };
-    let rig = Rig {
+    let rig = ServoRig {
         mass: 0.6,
         arm_mass: 0.05,
         length: 0.15,

@@ -9,8 +9,8 @@ use std::collections::HashMap;
 use cft_ident_core::robot::Robot;
 
 use super::law::{DriveKind, MachineLaw};
-use super::roll_out::{Drive, Past, first_speed, steps};
-use super::set_point::{Follower, Integral};
+use super::roll_out::{Drive, PastStates, first_speed, steps};
+use super::set_point::{CommandIntegral, Follower};
 use super::track::DriveLog;
 
 /// Sweeps in which the impulses of friction settle.
@@ -21,7 +21,7 @@ const LOST: f64 = 1e3;
 
 /// A robot whose links are known, and its inertia along some logs.
 #[derive(Debug)]
-pub struct Chains {
+pub struct RobotChains {
     robot: Robot,
     theta: Vec<f64>,
     /// Joints that move each other's links, group by group.
@@ -30,7 +30,7 @@ pub struct Chains {
     inertia: HashMap<String, Vec<f64>>,
 }
 
-impl Chains {
+impl RobotChains {
     /// Of a robot with base parameters, along logs.
     pub fn new(robot: &Robot, theta: &[f64], logs: &[&DriveLog]) -> Self {
         let n = robot.joints();
@@ -47,7 +47,7 @@ impl Chains {
             }
             inertia.insert(log.name.clone(), all);
         }
-        Chains {
+        RobotChains {
             robot: robot.clone(),
             theta: theta.to_vec(),
             groups: groups(&coupled, n),
@@ -97,9 +97,9 @@ impl Chains {
             v[j] = first_speed(t, &track.position);
             out[j][0] = track.position[0];
             sides.push(Side {
-                command: Integral::new(t, &track.command, log.command_is, t[0] - late),
+                command: CommandIntegral::new(t, &track.command, log.command_is, t[0] - late),
                 follower: Follower::new(track.command[0], of.slowness),
-                past: Past::new(law.loop_delay, q[j], v[j]),
+                past: PastStates::new(law.loop_delay, q[j], v[j]),
             });
         }
         let still = vec![0.0; n];
@@ -159,9 +159,9 @@ impl Chains {
 
 /// What stands before a controller.
 struct Side<'a> {
-    command: Integral<'a>,
+    command: CommandIntegral<'a>,
     follower: Follower,
-    past: Past,
+    past: PastStates,
 }
 
 /// Numbers of one kick.

@@ -108,7 +108,7 @@ fn stops(track: &Track, ends: [f64; 2]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::track::{CommandIs, Load};
+    use crate::drive::track::{CommandIs, DriveLoad};
 
     fn log(position: impl Fn(f64) -> f64, command: impl Fn(f64) -> f64) -> DriveLog {
         let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
@@ -125,7 +125,7 @@ mod tests {
                 ..Track::default()
             }],
             t,
-            load: Load::Unknown,
+            load: DriveLoad::Unknown,
             findings: Vec::new(),
         }
     }

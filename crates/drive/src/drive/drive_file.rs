@@ -4,7 +4,7 @@ use cft_ident_logs::log::Provenance;
 use serde::{Deserialize, Serialize};
 
 use super::error::DriveError;
-use super::outcome::{DeclaredDrive, DriveParameter, DriveStep, Drives, GivenParameter};
+use super::outcome::{DeclaredDrive, DriveParameter, DriveResult, DriveStep, GivenParameter};
 
 /// What stands in the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub struct DriveProvenance {
 
 impl DriveFile {
     /// Of a result.
-    pub fn new(drives: &Drives, version: &str, inputs: &[Provenance]) -> Self {
+    pub fn new(drives: &DriveResult, version: &str, inputs: &[Provenance]) -> Self {
         let written = drives.steps.iter().filter(|step| step.written);
         DriveFile {
             drive: drives.drive.clone(),

@@ -6,9 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::chain::Chains;
+use super::chain::RobotChains;
 use super::roll_out::roll_axis;
-use super::track::{DriveLog, Load};
+use super::track::{DriveLoad, DriveLog};
 use super::unknown::{Frame, Sizes, Unknown};
 
 /// The numbers that decide in a fit.
@@ -49,7 +49,7 @@ pub struct Problem<'a> {
     pub sizes: Vec<Sizes>,
     pub pieces: Vec<Piece>,
     pub blocks: usize,
-    pub chains: Option<&'a Chains>,
+    pub chains: Option<&'a RobotChains>,
 }
 
 /// Sums over a piece: H = sum w J J', g = sum w J r, and the loss.
@@ -82,7 +82,7 @@ impl Sums {
 }
 
 /// Scales of the residuals, by log and joint [rad].
-pub type Scales = Vec<Vec<f64>>;
+pub type ResidualScales = Vec<Vec<f64>>;
 
 /// Where a fit ended.
 #[derive(Debug, Clone)]
@@ -105,7 +105,7 @@ impl Problem<'_> {
     /// Predicted positions of a log, joint after joint.
     pub fn positions(&self, log: &DriveLog, unknowns: &[Unknown], values: &[f64]) -> Vec<Vec<f64>> {
         let law = self.frame.law(unknowns, values);
-        if let (Load::Robot, Some(chains)) = (log.load, self.chains) {
+        if let (DriveLoad::Robot, Some(chains)) = (log.load, self.chains) {
             return chains.roll(log, self.frame.kind, &law);
         }
         let joints = 0..log.joints.len();
@@ -129,9 +129,9 @@ impl Problem<'_> {
     }
 
     /// Scales of residuals: the middle of their size, no smaller than that of all logs together would make it.
-    pub fn scales(&self, unknowns: &[Unknown], values: &[f64]) -> Scales {
+    pub fn scales(&self, unknowns: &[Unknown], values: &[f64]) -> ResidualScales {
         let residuals = self.residuals(unknowns, values);
-        let own: Scales = residuals
+        let own: ResidualScales = residuals
             .iter()
             .map(|log| log.iter().map(|r| NORMAL * median_size(r)).collect())
             .collect();
@@ -147,7 +147,7 @@ impl Problem<'_> {
     }
 
     /// The loss at values.
-    pub fn loss(&self, unknowns: &[Unknown], values: &[f64], scales: &Scales) -> f64 {
+    pub fn loss(&self, unknowns: &[Unknown], values: &[f64], scales: &ResidualScales) -> f64 {
         let losses: Vec<f64> = (self.logs.par_iter().zip(scales))
             .map(|(log, scales)| {
                 let mut r = self.positions(log, unknowns, values);
@@ -184,7 +184,12 @@ impl Problem<'_> {
     }
 
     /// Sums of every piece at values, in the order of the pieces.
-    pub fn linearised(&self, unknowns: &[Unknown], values: &[f64], scales: &Scales) -> Vec<Sums> {
+    pub fn linearised(
+        &self,
+        unknowns: &[Unknown],
+        values: &[f64],
+        scales: &ResidualScales,
+    ) -> Vec<Sums> {
         let p = unknowns.len();
         let steps = self.differences(unknowns, values);
         let together = self.together(unknowns);
@@ -253,7 +258,13 @@ impl Problem<'_> {
     }
 
     /// Fits from a start, at most so many steps.
-    pub fn fit(&self, unknowns: &[Unknown], start: &[f64], scales: &Scales, most: usize) -> Fitted {
+    pub fn fit(
+        &self,
+        unknowns: &[Unknown],
+        start: &[f64],
+        scales: &ResidualScales,
+        most: usize,
+    ) -> Fitted {
         let bounds: Vec<[f64; 2]> = unknowns.iter().map(Unknown::bounds).collect();
         let mut values = start.to_vec();
         let mut loss = self.loss(unknowns, &values, scales);

@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 use cft_ident_core::robot::Robot;
 
 use super::candidate::Effect;
-use super::chain::Chains;
+use super::chain::RobotChains;
 use super::error::DriveError;
 use super::fit::{Piece, Problem, median};
 use super::judge::NUMBERS;
 use super::law::DriveKind;
-use super::search::{self, Found, Solution, Status};
+use super::search::{self, Found, LawEstimate, StepCertainty};
 use super::start;
-use super::track::{DriveLog, Load};
+use super::track::{DriveLoad, DriveLog};
 use super::unknown::{Frame, Quantity, Unknown};
 
 /// Logs by what they are for.
@@ -118,7 +118,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, Dr
     same_joints(&all)?;
     let first = fitted[0];
     let links = data.links.as_ref();
-    let chains = links.map(|(robot, theta)| Chains::new(robot, theta, &all));
+    let chains = links.map(|(robot, theta)| RobotChains::new(robot, theta, &all));
     let chains = chains.as_ref();
     let kind = data.kind;
     let sizes = start::sizes(&fitted, kind, chains);
@@ -146,14 +146,16 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, Dr
         chains,
     };
     let gravity = match first.load {
-        Load::Pendulum(_) => true,
-        Load::Robot => chains.is_some_and(|c| c.gravity(first, 0).iter().any(|g| g.abs() > 1e-9)),
-        Load::Unknown => false,
+        DriveLoad::PendulumRig(_) => true,
+        DriveLoad::Robot => {
+            chains.is_some_and(|c| c.gravity(first, 0).iter().any(|g| g.abs() > 1e-9))
+        }
+        DriveLoad::Unknown => false,
     };
     doing("gain, damping, friction");
     let unknowns = start::declared(&fitted, kind);
     let given = search::declared(&problem, &unknowns);
-    let possible = Effect::possible(kind, gravity, first.load != Load::Unknown);
+    let possible = Effect::possible(kind, gravity, first.load != DriveLoad::Unknown);
     let mut found = search::search(&problem, given, &possible, doing);
     let held_out: Vec<&DriveLog> = data.held_out.iter().collect();
     confirm_held_out(&problem, &mut found, &held_out);
@@ -186,7 +188,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, Dr
         .collect();
     Ok(Identified {
         joints: first.joints.iter().map(|j| j.joint.clone()).collect(),
-        ratios: first.load == Load::Unknown,
+        ratios: first.load == DriveLoad::Unknown,
         frame: problem.frame.clone(),
         found,
         blocks_are,
@@ -306,7 +308,7 @@ fn pieces(logs: &[&DriveLog]) -> (Vec<Piece>, usize, BlocksAre) {
 }
 
 /// Errors of a solution on logs.
-pub fn errors_on(problem: &Problem, at: &Solution, logs: &[&DriveLog]) -> PositionErrors {
+pub fn errors_on(problem: &Problem, at: &LawEstimate, logs: &[&DriveLog]) -> PositionErrors {
     let on = Problem {
         logs,
         pieces: Vec::new(),
@@ -327,7 +329,7 @@ pub fn errors_on(problem: &Problem, at: &Solution, logs: &[&DriveLog]) -> Positi
     }
 }
 
-fn errors(problem: &Problem, at: &Solution, held_out: &[&DriveLog]) -> ErrorsByUse {
+fn errors(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> ErrorsByUse {
     ErrorsByUse {
         train: errors_on(problem, at, problem.logs),
         holdout: (!held_out.is_empty()).then(|| errors_on(problem, at, held_out)),
@@ -336,7 +338,7 @@ fn errors(problem: &Problem, at: &Solution, held_out: &[&DriveLog]) -> ErrorsByU
 }
 
 /// Errors on held-out logs, each by a fit without its motion; none where no motion was fitted.
-fn unseen(problem: &Problem, at: &Solution, held_out: &[&DriveLog]) -> Option<PositionErrors> {
+fn unseen(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> Option<PositionErrors> {
     let motions: BTreeSet<&str> = held_out.iter().map(|log| log.motion.as_str()).collect();
     let mut logs = Vec::new();
     for motion in motions {
@@ -359,7 +361,7 @@ fn unseen(problem: &Problem, at: &Solution, held_out: &[&DriveLog]) -> Option<Po
             false => {
                 let scales = without.scales(&at.unknowns, &at.values);
                 let fitted = without.fit(&at.unknowns, &at.values, &scales, UNSEEN_STEPS);
-                Solution {
+                LawEstimate {
                     values: fitted.values,
                     ..at.clone()
                 }
@@ -390,7 +392,7 @@ fn confirm_held_out(problem: &Problem, found: &mut Found, held_out: &[&DriveLog]
         let less = search::without(problem, &found.refined, found.steps[at].effect);
         let with = errors_on(problem, &found.refined, held_out).mae(None);
         if with > errors_on(problem, &less, held_out).mae(None) {
-            found.steps[at].status = Status::HeldOutWorse;
+            found.steps[at].status = StepCertainty::HeldOutWorse;
             found.refined = less;
         }
     }
@@ -399,7 +401,7 @@ fn confirm_held_out(problem: &Problem, found: &mut Found, held_out: &[&DriveLog]
 /// Shapes of friction that are not confirmed are held at s times their estimate, everything else fitted around them.
 fn shrink(problem: &mut Problem, found: &mut Found) {
     let steps = found.steps.iter().filter(|step| step.written());
-    let indicated = steps.filter(|step| step.status == Status::Indicated);
+    let indicated = steps.filter(|step| step.status == StepCertainty::Indicated);
     let smaller: Vec<_> = indicated
         .map(|step| {
             let s = step.judged.shrinkage;

@@ -51,7 +51,7 @@ pub fn floor(k: usize, n: f64) -> f64 {
 
 /// Changes of the unknowns by each block left out.
 #[derive(Debug, Clone)]
-pub struct Jackknife {
+pub struct BlockJackknife {
     /// Unknown by unknown, block by block.
     pub changes: Vec<DVector<f64>>,
     pub covariance: DMatrix<f64>,
@@ -59,7 +59,7 @@ pub struct Jackknife {
     pub free: Vec<bool>,
 }
 
-impl Jackknife {
+impl BlockJackknife {
     /// At a fitted point.
     pub fn new(unknowns: &[Unknown], values: &[f64], blocks: &[Sums]) -> Self {
         let p = unknowns.len();
@@ -89,7 +89,7 @@ impl Jackknife {
             covariance += (n - 1.0) / n * &change * change.transpose();
             changes.push(change);
         }
-        Jackknife {
+        BlockJackknife {
             changes,
             covariance,
             free,

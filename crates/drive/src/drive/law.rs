@@ -11,7 +11,7 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DriveKind {
     /// A voltage behind a resistance.
-    Volts(Firmware),
+    Volts(ServoFirmware),
     /// A torque in N m: the log's gains are N m/rad and N m s/rad.
     Torque,
 }
@@ -28,7 +28,7 @@ impl DriveKind {
 
 /// What is declared of the firmware of a volts drive.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Firmware {
+pub struct ServoFirmware {
     /// Duty per radian and unit of kp.
     pub gain: Option<f64>,
     /// Largest duty.

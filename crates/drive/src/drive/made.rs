@@ -1,4 +1,4 @@
-//! What was identified -> [`Drives`].
+//! What was identified -> [`DriveResult`].
 
 use cft_ident_core::number::{plus_minus, significant};
 use cft_ident_core::verdict::Verdict;
@@ -8,11 +8,11 @@ use super::identify::{self, BlocksAre, ErrorsByUse, Identified};
 use super::law::DriveKind;
 use super::numbers::{given, parameter, part, step};
 use super::outcome::{
-    Amplitude, DeclaredDrive, DriveParameter, DriveStep, DriveVerdict, Drives, JointPositionError,
-    LogPositionError, PositionError, PositionErrorsByUse, TriedEffect, VerdictKind,
+    DeclaredDrive, DriveParameter, DriveResult, DriveStep, DriveVerdict, JointPositionError,
+    LogPositionError, PositionError, PositionErrorsByUse, StepAmplitude, TriedEffect, VerdictKind,
 };
 
-impl Drives {
+impl DriveResult {
     /// Of what was identified.
     pub fn new(of: &Identified) -> Self {
         let volts = matches!(of.frame.kind, DriveKind::Volts(_));
@@ -57,7 +57,7 @@ impl Drives {
             gain: part(tried.gain),
         });
         let (before, after) = (by_use(of, &of.before), by_use(of, &of.after));
-        Drives {
+        DriveResult {
             verdict: verdict(&steps, &before, &after),
             drive,
             parameters,
@@ -77,13 +77,13 @@ impl Drives {
 
     /// Of joints that were identified one by one: what concerns a joint alone has its name.
     pub fn joined(each: &[Identified]) -> Option<Self> {
-        let all: Vec<Drives> = each.iter().map(Drives::new).collect();
+        let all: Vec<DriveResult> = each.iter().map(DriveResult::new).collect();
         let (first, rest) = all.split_first()?;
         if rest.is_empty() {
             return Some(first.clone());
         }
         let mut out = first.clone();
-        let named = |drives: &Drives| {
+        let named = |drives: &DriveResult| {
             let joint = drives.drive.joints.first().cloned();
             let mut drives = drives.clone();
             for parameter in &mut drives.parameters {
@@ -94,7 +94,7 @@ impl Drives {
             }
             drives
         };
-        let all: Vec<Drives> = all.iter().map(named).collect();
+        let all: Vec<DriveResult> = all.iter().map(named).collect();
         out.drive.joints = all.iter().flat_map(|d| d.drive.joints.clone()).collect();
         out.drive.stribeck_speed = all
             .iter()
@@ -222,7 +222,7 @@ fn verdict(
 }
 
 /// An amplitude in the unit that people use.
-fn worded(effect: Effect, amplitude: &Amplitude) -> String {
+fn worded(effect: Effect, amplitude: &StepAmplitude) -> String {
     let (factor, unit) = match effect {
         Effect::CommandDelay | Effect::LoopDelay => (1e3, "ms"),
         Effect::EncoderBias => (1e3, "mrad"),

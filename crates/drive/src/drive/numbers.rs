@@ -4,9 +4,9 @@ use cft_ident_core::verdict::{Verdict, verdict_of};
 
 use super::identify::Identified;
 use super::outcome::{
-    Amplitude, DeclaredDrive, DriveParameter, DriveStep, GainSe, GivenParameter, StepStatus,
+    DeclaredDrive, DriveParameter, DriveStep, GainSe, GivenParameter, StepAmplitude, StepStatus,
 };
-use super::search::{Status, Step};
+use super::search::{Step, StepCertainty};
 use super::unknown::{Quantity, Unknown};
 
 /// Name, unit and meaning of a quantity, and the value that is shown of it with its slope.
@@ -224,17 +224,17 @@ pub(super) fn step(of: &Identified, volts: bool, step: &Step) -> DriveStep {
             false => (*value, *std),
         };
         let unit = unit.to_owned();
-        Some((name, Amplitude { value, std, unit }))
+        Some((name, StepAmplitude { value, std, unit }))
     });
     let written = step.written();
     let reason = match step.status {
-        Status::HeldOutWorse => Some("held-out logs get worse by it".to_owned()),
-        Status::Seen if step.judged.floor.is_infinite() => Some(format!(
+        StepCertainty::HeldOutWorse => Some("held-out logs get worse by it".to_owned()),
+        StepCertainty::Seen if step.judged.floor.is_infinite() => Some(format!(
             "{} blocks are too few to judge: log more motions, or the same at more gains",
             of.blocks
         )),
-        Status::Seen => Some("not sure enough over motions and gains".to_owned()),
-        Status::Indicated if !written => {
+        StepCertainty::Seen => Some("not sure enough over motions and gains".to_owned()),
+        StepCertainty::Indicated if !written => {
             Some("what can be measured is written when it is confirmed".to_owned())
         }
         _ => None,
@@ -247,9 +247,9 @@ pub(super) fn step(of: &Identified, volts: bool, step: &Step) -> DriveStep {
         },
         parameters: parameters.collect(),
         status: match step.status {
-            Status::Confirmed => StepStatus::Confirmed,
-            Status::Indicated => StepStatus::Indicated,
-            Status::Seen | Status::HeldOutWorse => StepStatus::Seen,
+            StepCertainty::Confirmed => StepStatus::Confirmed,
+            StepCertainty::Indicated => StepStatus::Indicated,
+            StepCertainty::Seen | StepCertainty::HeldOutWorse => StepStatus::Seen,
         },
         written,
         reason,

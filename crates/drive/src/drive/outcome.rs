@@ -39,7 +39,7 @@ pub struct GivenParameter {
 
 /// An amplitude of a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Amplitude {
+pub struct StepAmplitude {
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
@@ -68,7 +68,7 @@ pub struct DriveStep {
     /// Null where it concerns all joints.
     pub joint: Option<String>,
     /// Amplitudes as estimated, by joint where there are several.
-    pub parameters: BTreeMap<String, Amplitude>,
+    pub parameters: BTreeMap<String, StepAmplitude>,
     pub status: StepStatus,
     /// Whether it stands in the model.
     pub written: bool,
@@ -168,7 +168,7 @@ pub struct DeclaredDrive {
 
 /// The document of `drive`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Drives {
+pub struct DriveResult {
     pub drive: DeclaredDrive,
     pub verdict: DriveVerdict,
     pub parameters: Vec<DriveParameter>,
@@ -183,7 +183,7 @@ pub struct Drives {
     pub blocks: usize,
     pub blocks_are: String,
 }
-impl Drives {
+impl DriveResult {
     /// A parameter of a joint, or of the machine.
     pub fn find(&self, name: &str, joint: Option<&str>) -> Option<f64> {
         let mut all = self.parameters.iter();

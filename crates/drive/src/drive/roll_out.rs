@@ -5,8 +5,8 @@
 //! against the motion (Moreau 1988): a joint that rests stays at rest, and the motion is continuous in every number.
 
 use super::law::{DriveKind, JointLaw, MachineLaw};
-use super::set_point::{Follower, Integral};
-use super::track::{DriveLog, Load};
+use super::set_point::{CommandIntegral, Follower};
+use super::track::{DriveLoad, DriveLog};
 
 /// Longest step [s]. Half: positions of the measured servo move by under 0.1 mrad; twice: by 0.5 mrad.
 pub const LONGEST_STEP: f64 = 2.5e-3;
@@ -80,16 +80,16 @@ impl Drive {
 pub fn roll_axis(log: &DriveLog, kind: DriveKind, law: &MachineLaw, joint: usize, out: &mut [f64]) {
     let (track, of) = (&log.joints[joint], &law.joints[joint]);
     let (inertia, gravity) = match log.load {
-        Load::Pendulum(rig) => (rig.inertia() + of.armature, rig.gravity()),
-        Load::Unknown | Load::Robot => (1.0, 0.0),
+        DriveLoad::PendulumRig(rig) => (rig.inertia() + of.armature, rig.gravity()),
+        DriveLoad::Unknown | DriveLoad::Robot => (1.0, 0.0),
     };
     let t = &log.t;
     let late = law.command_delay + law.loop_delay;
-    let mut command = Integral::new(t, &track.command, log.command_is, t[0] - late);
+    let mut command = CommandIntegral::new(t, &track.command, log.command_is, t[0] - late);
     let mut follower = Follower::new(track.command[0], of.slowness);
     let mut q = track.position[0] + of.bias;
     let mut v = first_speed(t, &track.position);
-    let mut past = Past::new(law.loop_delay, q, v);
+    let mut past = PastStates::new(law.loop_delay, q, v);
     out[0] = q - of.bias;
     for k in 1..t.len() {
         let dt = t[k] - t[k - 1];
@@ -142,20 +142,20 @@ pub struct Seen {
 
 /// The last states of an axis.
 #[derive(Debug, Clone)]
-pub struct Past {
+pub struct PastStates {
     late: f64,
     states: Vec<[f64; 3]>,
     from: usize,
 }
 
-impl Past {
+impl PastStates {
     pub fn new(late: f64, q: f64, v: f64) -> Self {
         let states = if late > 0.0 {
             vec![[f64::NEG_INFINITY, q, v]]
         } else {
             Vec::new()
         };
-        Past {
+        PastStates {
             late,
             states,
             from: 0,

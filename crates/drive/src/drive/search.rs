@@ -9,28 +9,33 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::candidate::Effect;
-use super::fit::{NUMBERS as FIT, Problem, Scales, Sums};
-use super::judge::{self, Jackknife, Judged, NUMBERS};
+use super::fit::{NUMBERS as FIT, Problem, ResidualScales, Sums};
+use super::judge::{self, BlockJackknife, Judged, NUMBERS};
 use super::start;
 use super::unknown::{Quantity, Unknown};
 
 /// A fitted law with its deviations.
 #[derive(Debug, Clone)]
-pub struct Solution {
+pub struct LawEstimate {
     pub unknowns: Vec<Unknown>,
     pub values: Vec<f64>,
     pub converged: bool,
-    pub scales: Scales,
+    pub scales: ResidualScales,
     pub blocks: Vec<Sums>,
-    pub jackknife: Jackknife,
+    pub jackknife: BlockJackknife,
 }
 
-impl Solution {
+impl LawEstimate {
     /// Of values that a fit ended at.
-    fn at(problem: &Problem, unknowns: &[Unknown], values: Vec<f64>, scales: &Scales) -> Self {
+    fn at(
+        problem: &Problem,
+        unknowns: &[Unknown],
+        values: Vec<f64>,
+        scales: &ResidualScales,
+    ) -> Self {
         let blocks = problem.by_block(&problem.linearised(unknowns, &values, scales));
-        Solution {
-            jackknife: Jackknife::new(unknowns, &values, &blocks),
+        LawEstimate {
+            jackknife: BlockJackknife::new(unknowns, &values, &blocks),
             unknowns: unknowns.to_vec(),
             values,
             converged: true,
@@ -56,7 +61,7 @@ impl Solution {
 
 /// How sure a step is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
+pub enum StepCertainty {
     Confirmed,
     Indicated,
     /// It fits, and is not sure: not written.
@@ -74,7 +79,7 @@ pub struct Step {
     pub values: Vec<f64>,
     pub stds: Vec<Option<f64>>,
     pub judged: Judged,
-    pub status: Status,
+    pub status: StepCertainty,
     /// Mean ln(before / after) of the loss of blocks left out, and its standard error.
     pub gain: [f64; 2],
     /// Effects that do nearly as well in its place.
@@ -84,16 +89,16 @@ pub struct Step {
 impl Step {
     pub fn written(&self) -> bool {
         match self.status {
-            Status::Confirmed => true,
-            Status::Indicated => !self.effect.measurable(),
-            Status::Seen | Status::HeldOutWorse => false,
+            StepCertainty::Confirmed => true,
+            StepCertainty::Indicated => !self.effect.measurable(),
+            StepCertainty::Seen | StepCertainty::HeldOutWorse => false,
         }
     }
 }
 
 /// An effect that was tried.
 #[derive(Debug, Clone)]
-pub struct Tried {
+pub struct TriedStep {
     pub effect: Effect,
     pub gain: [f64; 2],
 }
@@ -102,12 +107,12 @@ pub struct Tried {
 #[derive(Debug, Clone)]
 pub struct Found {
     /// Without any effect.
-    pub given: Solution,
+    pub given: LawEstimate,
     /// With all that are written.
-    pub refined: Solution,
+    pub refined: LawEstimate,
     pub steps: Vec<Step>,
     /// Those that were tried last and not taken.
-    pub tried: Vec<Tried>,
+    pub tried: Vec<TriedStep>,
 }
 
 /// Steps of a fit of a candidate from the best of its starts on.
@@ -118,8 +123,8 @@ pub fn fit(
     problem: &Problem,
     unknowns: &[Unknown],
     start: &[f64],
-    scales: Option<&Scales>,
-) -> Solution {
+    scales: Option<&ResidualScales>,
+) -> LawEstimate {
     let mut values = start.to_vec();
     let first = match scales {
         Some(scales) => scales.clone(),
@@ -133,7 +138,7 @@ pub fn fit(
         converged = fitted.converged;
         scales = problem.scales(unknowns, &values);
     }
-    let mut solution = Solution::at(problem, unknowns, values, &scales);
+    let mut solution = LawEstimate::at(problem, unknowns, values, &scales);
     // a limit that is never reached is none
     for (i, unknown) in unknowns.iter().enumerate() {
         let seen = solution.blocks.iter().any(|block| block.h[(i, i)] > 0.0);
@@ -149,8 +154,8 @@ pub fn fit(
 const ROUNDS: usize = 3;
 
 /// The declared drive, from several starts.
-pub fn declared(problem: &Problem, unknowns: &[Unknown]) -> Solution {
-    let mut best: Option<(f64, Solution)> = None;
+pub fn declared(problem: &Problem, unknowns: &[Unknown]) -> LawEstimate {
+    let mut best: Option<(f64, LawEstimate)> = None;
     for start in start::starts(problem, unknowns) {
         let scales = problem.scales(unknowns, &start);
         let first = problem.fit(unknowns, &start, &scales, FIT.steps);
@@ -166,7 +171,7 @@ pub fn declared(problem: &Problem, unknowns: &[Unknown]) -> Solution {
 }
 
 /// The best of the starts of an effect, fitted beside a solution with its scales.
-pub fn with(problem: &Problem, beside: &Solution, effect: Effect) -> Solution {
+pub fn with(problem: &Problem, beside: &LawEstimate, effect: Effect) -> LawEstimate {
     let mut unknowns = beside.unknowns.clone();
     unknowns.extend(effect.unknowns(problem.frame.joints));
     let mut best: Option<(f64, Vec<f64>)> = None;
@@ -185,13 +190,13 @@ pub fn with(problem: &Problem, beside: &Solution, effect: Effect) -> Solution {
             .fit(&unknowns, &values, &beside.scales, SHORT)
             .values;
     }
-    Solution::at(problem, &unknowns, values, &beside.scales)
+    LawEstimate::at(problem, &unknowns, values, &beside.scales)
 }
 
 /// The search, from the declared drive on.
 pub fn search(
     problem: &Problem,
-    given: Solution,
+    given: LawEstimate,
     possible: &[Effect],
     doing: &dyn Fn(&str),
 ) -> Found {
@@ -210,7 +215,7 @@ pub fn search(
             let with = with(problem, &at, *effect);
             let after = with.left_out();
             let [gain, se] = judge::gain(&before, &after);
-            tried.push(Tried {
+            tried.push(TriedStep {
                 effect: *effect,
                 gain: [gain, se],
             });
@@ -224,7 +229,7 @@ pub fn search(
         let Some((effect, gain, se, with, after)) = fitted.first() else {
             break;
         };
-        let near = |other: &&(Effect, f64, f64, Solution, Vec<f64>)| {
+        let near = |other: &&(Effect, f64, f64, LawEstimate, Vec<f64>)| {
             let [less, se] = judge::gain(&other.4, after);
             less < NUMBERS.screen * se
         };
@@ -244,8 +249,8 @@ pub fn search(
 /// Lets what is not sure leave, the least sure first, until all that stand pass.
 fn settle(
     problem: &Problem,
-    given: Solution,
-    mut at: Solution,
+    given: LawEstimate,
+    mut at: LawEstimate,
     joined: Vec<(Effect, [f64; 2], Vec<Effect>)>,
 ) -> Found {
     let mut steps: BTreeMap<usize, Step> = BTreeMap::new();
@@ -278,7 +283,7 @@ fn settle(
 }
 
 /// A solution fitted anew without an effect.
-pub fn without(problem: &Problem, at: &Solution, effect: Effect) -> Solution {
+pub fn without(problem: &Problem, at: &LawEstimate, effect: Effect) -> LawEstimate {
     let gone = effect.unknowns(problem.frame.joints);
     let pairs = at.unknowns.iter().zip(&at.values);
     let kept = pairs.filter(|(unknown, _)| !gone.contains(unknown));
@@ -288,7 +293,7 @@ pub fn without(problem: &Problem, at: &Solution, effect: Effect) -> Solution {
 
 fn judged(
     problem: &Problem,
-    at: &Solution,
+    at: &LawEstimate,
     effect: Effect,
     gain: [f64; 2],
     alternatives: &[Effect],
@@ -307,9 +312,9 @@ fn judged(
     });
     let judged = Judged::new(&amplitude, v, problem.blocks);
     let status = match judged.shrinkage {
-        s if s > NUMBERS.confirmed => Status::Confirmed,
-        s if s > 0.0 => Status::Indicated,
-        _ => Status::Seen,
+        s if s > NUMBERS.confirmed => StepCertainty::Confirmed,
+        s if s > 0.0 => StepCertainty::Indicated,
+        _ => StepCertainty::Seen,
     };
     Step {
         effect,

@@ -7,7 +7,7 @@ use super::track::CommandIs;
 
 /// The running integral of a command.
 #[derive(Debug, Clone)]
-pub struct Integral<'a> {
+pub struct CommandIntegral<'a> {
     t: &'a [f64],
     x: &'a [f64],
     kind: CommandIs,
@@ -17,7 +17,7 @@ pub struct Integral<'a> {
     last: (f64, f64),
 }
 
-impl<'a> Integral<'a> {
+impl<'a> CommandIntegral<'a> {
     /// From a time on.
     pub fn new(t: &'a [f64], x: &'a [f64], kind: CommandIs, from: f64) -> Self {
         let mut sums = Vec::with_capacity(t.len());
@@ -32,7 +32,7 @@ impl<'a> Integral<'a> {
             }
             sums.push(sum);
         }
-        let mut out = Integral {
+        let mut out = CommandIntegral {
             t,
             x,
             kind,
@@ -126,7 +126,7 @@ mod tests {
     fn the_mean_over_a_step_is_exact_for_jumps_and_ramps() {
         let t = [0.0, 1.0, 2.0];
         let mean = |x: &[f64], kind, [from, to]: [f64; 2]| {
-            Integral::new(&t, x, kind, from).mean_up_to(to).0
+            CommandIntegral::new(&t, x, kind, from).mean_up_to(to).0
         };
         let (held, ramp) = (CommandIs::Held, CommandIs::Linear);
         for (kind, span, expected) in [
@@ -151,7 +151,7 @@ mod tests {
         let x: Vec<f64> = t.iter().map(|t| if *t < 0.2 { 0.0 } else { 1.0 }).collect();
         let (h, step) = (2.5e-3, 1e-6);
         let total = |late: f64| -> f64 {
-            let mut command = Integral::new(&t, &x, CommandIs::Held, -late);
+            let mut command = CommandIntegral::new(&t, &x, CommandIs::Held, -late);
             let ends = (1..190).map(|k| f64::from(k) * h);
             ends.map(|end| command.mean_up_to(end - late).0).sum()
         };

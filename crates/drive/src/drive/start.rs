@@ -1,9 +1,9 @@
 //! Sizes of a machine's numbers, and values from which a fit begins.
 
-use super::chain::Chains;
+use super::chain::RobotChains;
 use super::fit::{Problem, median};
 use super::law::DriveKind;
-use super::track::{DriveLog, Load, Track};
+use super::track::{DriveLoad, DriveLog, Track};
 use super::unknown::{Quantity, Sizes, Unknown};
 
 /// Starts that are fitted, best first.
@@ -31,9 +31,9 @@ fn speeds(t: &[f64], q: &[f64]) -> Vec<f64> {
 }
 
 /// Sizes of every joint over logs.
-pub fn sizes(logs: &[&DriveLog], kind: DriveKind, chains: Option<&Chains>) -> Vec<Sizes> {
+pub fn sizes(logs: &[&DriveLog], kind: DriveKind, chains: Option<&RobotChains>) -> Vec<Sizes> {
     let joints = logs.first().map_or(0, |log| log.joints.len());
-    let links = chains.map(Chains::usual_inertia);
+    let links = chains.map(RobotChains::usual_inertia);
     (0..joints)
         .map(|j| {
             let tracks = || logs.iter().map(move |log| (log, &log.joints[j]));
@@ -49,9 +49,9 @@ pub fn sizes(logs: &[&DriveLog], kind: DriveKind, chains: Option<&Chains>) -> Ve
             let gains: Vec<f64> = tracks().map(|(_, track)| track.kp).collect();
             let kp = median(gains).max(1e-9);
             let (inertia, gravity) = match logs[0].load {
-                Load::Pendulum(_) => {
+                DriveLoad::PendulumRig(_) => {
                     let rigs = logs.iter().filter_map(|log| match log.load {
-                        Load::Pendulum(rig) => Some(rig),
+                        DriveLoad::PendulumRig(rig) => Some(rig),
                         _ => None,
                     });
                     let all: Vec<_> = rigs.collect();
@@ -61,11 +61,11 @@ pub fn sizes(logs: &[&DriveLog], kind: DriveKind, chains: Option<&Chains>) -> Ve
                         median(all.iter().map(|rig| rig.gravity()).collect()),
                     )
                 }
-                Load::Unknown => (1.0, 0.0),
-                Load::Robot => (links.as_ref().map_or(1.0, |links| links[j]), 0.0),
+                DriveLoad::Unknown => (1.0, 0.0),
+                DriveLoad::Robot => (links.as_ref().map_or(1.0, |links| links[j]), 0.0),
             };
             let torque = match (kind, logs[0].load) {
-                (DriveKind::Torque, Load::Robot) => kp * error,
+                (DriveKind::Torque, DriveLoad::Robot) => kp * error,
                 _ => gravity.max(inertia * speed * speed / error),
             };
             Sizes {
@@ -103,8 +103,8 @@ pub fn declared(logs: &[&DriveLog], kind: DriveKind) -> Vec<Unknown> {
         }
         match logs[0].load {
             // gravity of links that nobody knows is a constant at best
-            Load::Unknown => add(Quantity::Offset),
-            Load::Pendulum(_) | Load::Robot => add(Quantity::Armature),
+            DriveLoad::Unknown => add(Quantity::Offset),
+            DriveLoad::PendulumRig(_) | DriveLoad::Robot => add(Quantity::Armature),
         }
     }
     out

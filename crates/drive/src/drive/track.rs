@@ -14,7 +14,7 @@ pub struct DriveLog {
     /// How the command runs between samples.
     pub command_is: CommandIs,
     pub joints: Vec<Track>,
-    pub load: Load,
+    pub load: DriveLoad,
     /// What the file says wrongly, or does not say.
     pub findings: Vec<String>,
 }
@@ -48,9 +48,9 @@ pub struct Track {
 
 /// What the drive moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Load {
+pub enum DriveLoad {
     /// A mass at the end of a rod, 0 is down.
-    Pendulum(Pendulum),
+    PendulumRig(PendulumRig),
     /// Nothing that is known: every torque is a ratio to the inertia.
     Unknown,
     /// The links of the robot that the log is read for.
@@ -59,7 +59,7 @@ pub enum Load {
 
 /// A pendulum rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pendulum {
+pub struct PendulumRig {
     /// Mass at the end [kg].
     pub mass: f64,
     /// Mass of the rod [kg].
@@ -71,7 +71,7 @@ pub struct Pendulum {
 /// Standard gravity [m/s^2].
 const GRAVITY: f64 = 9.80665;
 
-impl Pendulum {
+impl PendulumRig {
     /// Inertia about the axis [kg m^2]: point mass and slender rod.
     pub fn inertia(&self) -> f64 {
         (self.mass + self.arm_mass / 3.0) * self.length * self.length

@@ -6,8 +6,8 @@ use std::path::Path;
 use cft_ident_drive::drive::drive_file::DriveFile;
 use cft_ident_drive::drive::error::DriveError;
 use cft_ident_drive::drive::read::bam::RigGiven;
-use cft_ident_drive::drive::read::{Told, read};
-use cft_ident_drive::drive::track::{CommandIs, DriveLog, Load};
+use cft_ident_drive::drive::read::{ReadRequest, read};
+use cft_ident_drive::drive::track::{CommandIs, DriveLoad, DriveLog};
 use cft_ident_logs::log::LogSpec;
 
 fn rig(head: &str, rows: usize) -> String {
@@ -23,7 +23,7 @@ fn rig(head: &str, rows: usize) -> String {
     format!("{{{head} \"entries\": [{}]}}", entries.join(","))
 }
 
-fn read_text(name: &str, text: &[u8], told: &Told) -> Result<DriveLog, DriveError> {
+fn read_text(name: &str, text: &[u8], told: &ReadRequest) -> Result<DriveLog, DriveError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, text).unwrap();
@@ -33,10 +33,10 @@ fn read_text(name: &str, text: &[u8], told: &Told) -> Result<DriveLog, DriveErro
 #[test]
 fn rows_win_over_a_head_that_contradicts_them() {
     let head = "\"mass\": 0.5, \"length\": 0.1, \"arm_mass\": 0.05, \"kp\": 16, \"vin\": 15.0, \"sample_rate\": 100,";
-    let log = read_text("a.json", rig(head, 200).as_bytes(), &Told::default()).unwrap();
+    let log = read_text("a.json", rig(head, 200).as_bytes(), &ReadRequest::default()).unwrap();
     assert_eq!(log.joints[0].supply[0], 11.9);
     assert_eq!(log.command_is, CommandIs::Linear);
-    assert!(matches!(log.load, Load::Pendulum(rig) if rig.mass == 0.5));
+    assert!(matches!(log.load, DriveLoad::PendulumRig(rig) if rig.mass == 0.5));
     for expected in [
         "sample_rate says 100.0000 Hz, the rows 200.0000 Hz",
         "vin says 15 V, the rows 11.90 V",
@@ -72,17 +72,17 @@ fn each_file_that_cannot_be_used_says_why_and_what_to_do() {
             "which columns are commands is not said",
         ),
     ] {
-        let error = read_text(name, text.as_bytes(), &Told::default()).unwrap_err();
+        let error = read_text(name, text.as_bytes(), &ReadRequest::default()).unwrap_err();
         let error = error.to_string();
         assert!(error.contains(expected), "{error}");
         assert!(error.contains("; "), "{error}");
     }
-    let told = Told {
+    let told = ReadRequest {
         rig: RigGiven {
             kp: Some(16.0),
             ..RigGiven::default()
         },
-        ..Told::default()
+        ..ReadRequest::default()
     };
     let log = read_text("a.json", rig(pair, 200).as_bytes(), &told).unwrap();
     assert_eq!(log.joints[0].kp, 16.0);
@@ -170,14 +170,14 @@ fn pace() -> Vec<u8> {
 
 #[test]
 fn tensors_of_a_saved_dictionary_are_read_as_data() {
-    let log = read_text("a.pt", &pace(), &Told::default()).unwrap();
+    let log = read_text("a.pt", &pace(), &ReadRequest::default()).unwrap();
     assert_eq!(log.joints.len(), 2);
     assert_eq!(log.t.len(), 40);
     assert!((log.joints[1].command[0] - 1.0).abs() < 1e-7);
     assert!((log.joints[0].position[3] - f64::from((0.9f32 - 0.2).sin())).abs() < 1e-6);
-    let told = Told {
+    let told = ReadRequest {
         joints: vec!["a".to_owned()],
-        ..Told::default()
+        ..ReadRequest::default()
     };
     let error = read_text("a.pt", &pace(), &told).unwrap_err().to_string();
     assert!(error.contains("holds 2 joints, and 1 are named"), "{error}");
@@ -189,8 +189,8 @@ fn no_damage_of_a_saved_dictionary_makes_it_panic() {
     for k in (0..good.len()).step_by(3) {
         let mut bytes = good.clone();
         bytes[k] ^= 0xff;
-        let _ = read_text("a.pt", &bytes, &Told::default());
-        let _ = read_text("a.pt", &good[..k], &Told::default());
+        let _ = read_text("a.pt", &bytes, &ReadRequest::default());
+        let _ = read_text("a.pt", &good[..k], &ReadRequest::default());
     }
 }
 
@@ -218,7 +218,7 @@ fn a_folder_of_two_tables_is_a_log() {
         format!("type,timestamp,positions\n{state}"),
     )
     .unwrap();
-    let error = read(&LogSpec::whole(folder.path()), &Told::default()).unwrap_err();
+    let error = read(&LogSpec::whole(folder.path()), &ReadRequest::default()).unwrap_err();
     assert!(
         error
             .to_string()

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use cft_ident_drive::drive::candidate::Effect;
 use cft_ident_drive::drive::identify::{DriveData, identify};
-use cft_ident_drive::drive::law::{DriveKind, Firmware};
-use cft_ident_drive::drive::outcome::Drives;
+use cft_ident_drive::drive::law::{DriveKind, ServoFirmware};
+use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_drive::drive::read::bam::RigGiven;
-use cft_ident_drive::drive::read::{Told, read};
+use cft_ident_drive::drive::read::{ReadRequest, read};
 use cft_ident_logs::log::LogSpec;
 
 #[test]
@@ -20,12 +20,12 @@ fn a_measured_servo_has_a_late_command_and_a_speed_limit_at_a_gain_that_nobody_f
     };
     let mut paths: Vec<_> = files.map(|f| f.unwrap().path()).collect();
     paths.sort();
-    let told = Told {
+    let told = ReadRequest {
         rig: RigGiven {
             arm_mass: Some(0.05),
             ..RigGiven::default()
         },
-        ..Told::default()
+        ..ReadRequest::default()
     };
     let logs = paths
         .iter()
@@ -35,9 +35,9 @@ fn a_measured_servo_has_a_late_command_and_a_speed_limit_at_a_gain_that_nobody_f
         fitted,
         held_out,
         links: None,
-        kind: DriveKind::Volts(Firmware::default()),
+        kind: DriveKind::Volts(ServoFirmware::default()),
     };
-    let drives = Drives::new(&identify(&data, &|_| {}).unwrap());
+    let drives = DriveResult::new(&identify(&data, &|_| {}).unwrap());
     for effect in [Effect::CommandDelay, Effect::SpeedLimit] {
         assert!(
             drives.steps.iter().any(|s| s.effect == effect && s.written),

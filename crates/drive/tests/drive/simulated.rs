@@ -2,14 +2,14 @@
 
 use cft_ident_drive::drive::candidate::Effect;
 use cft_ident_drive::drive::identify::{DriveData, Identified, identify};
-use cft_ident_drive::drive::law::{DriveKind, Firmware, JointLaw, MachineLaw};
-use cft_ident_drive::drive::outcome::Drives;
+use cft_ident_drive::drive::law::{DriveKind, JointLaw, MachineLaw, ServoFirmware};
+use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_drive::drive::read::bam::{RigGiven, read};
 use cft_ident_drive::drive::roll_out::roll_axis;
 use cft_ident_drive::drive::track::DriveLog;
-use cft_ident_plant::simulate::servo::{BenchMotion, Rig, Servo, ServoRun, run_servo};
+use cft_ident_plant::simulate::servo::{BenchMotion, ServoPlant, ServoRig, ServoRun, run_servo};
 
-const RIG: Rig = Rig {
+const RIG: ServoRig = ServoRig {
     mass: 0.6,
     arm_mass: 0.05,
     length: 0.15,
@@ -20,25 +20,25 @@ fn log(run: &ServoRun) -> DriveLog {
     read(&run.file_name(), json.as_bytes(), &RigGiven::default()).unwrap()
 }
 
-fn logs(servo: &Servo, gains: &[f64], seed: u64) -> Vec<DriveLog> {
+fn logs(servo: &ServoPlant, gains: &[f64], seed: u64) -> Vec<DriveLog> {
     let runs = gains.iter().flat_map(|kp| {
         BenchMotion::ALL.map(|motion| log(&run_servo(servo, &RIG, motion, *kp, seed)))
     });
     runs.collect()
 }
 
-fn identified(servo: &Servo, seed: u64) -> Identified {
+fn identified(servo: &ServoPlant, seed: u64) -> Identified {
     let data = DriveData {
         fitted: logs(servo, &[8.0, 32.0], seed),
         held_out: logs(servo, &[16.0], seed),
         links: None,
-        kind: DriveKind::Volts(Firmware::default()),
+        kind: DriveKind::Volts(ServoFirmware::default()),
     };
     identify(&data, &|_| {}).unwrap()
 }
 
 /// The law that the simulator has.
-fn truth(servo: &Servo) -> MachineLaw {
+fn truth(servo: &ServoPlant) -> MachineLaw {
     let per_volt = servo.kt / servo.resistance;
     let damping = servo.kt * per_volt + servo.viscous;
     MachineLaw {
@@ -60,23 +60,23 @@ fn truth(servo: &Servo) -> MachineLaw {
     }
 }
 
-const LIMITED: Servo = Servo {
+const LIMITED: ServoPlant = ServoPlant {
     speed_limit: Some(4.8),
     command_delay: 0.032,
-    ..Servo::HOBBY
+    ..ServoPlant::HOBBY
 };
 
 #[test]
 fn roll_outs_by_the_numbers_of_the_simulator_lie_within_two_steps_of_its_encoder() {
-    let late = Servo {
+    let late = ServoPlant {
         loop_delay: 0.004,
         load_friction: 0.1,
         ..LIMITED
     };
-    for servo in [Servo::HOBBY, LIMITED, late] {
+    for servo in [ServoPlant::HOBBY, LIMITED, late] {
         for log in logs(&servo, &[8.0, 32.0], 3) {
             let mut out = vec![0.0; log.t.len()];
-            let kind = DriveKind::Volts(Firmware::default());
+            let kind = DriveKind::Volts(ServoFirmware::default());
             roll_axis(&log, kind, &truth(&servo), 0, &mut out);
             let pairs = out.iter().zip(&log.joints[0].position);
             let mean = pairs.map(|(a, b)| (a - b).abs()).sum::<f64>() / out.len() as f64;
@@ -89,7 +89,7 @@ fn roll_outs_by_the_numbers_of_the_simulator_lie_within_two_steps_of_its_encoder
 #[test]
 fn a_late_command_and_a_speed_limit_are_named_with_their_sizes() {
     let found = identified(&LIMITED, 5);
-    let drives = Drives::new(&found);
+    let drives = DriveResult::new(&found);
     let mut named: Vec<Effect> = drives
         .steps
         .iter()
@@ -125,9 +125,9 @@ fn a_late_command_and_a_speed_limit_are_named_with_their_sizes() {
 #[test]
 fn a_servo_without_delay_and_without_limit_shows_none() {
     for seed in 0..3 {
-        let servo = Servo {
+        let servo = ServoPlant {
             coulomb: 0.05 + 0.04 * seed as f64,
-            ..Servo::HOBBY
+            ..ServoPlant::HOBBY
         };
         let found = identified(&servo, seed);
         let named: Vec<_> = found.found.steps.iter().filter(|s| s.written()).collect();

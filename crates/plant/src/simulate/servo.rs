@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// A servo and its firmware. SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Servo {
+pub struct ServoPlant {
     /// Torque constant [N m/A], as seen at the output.
     pub kt: f64,
     /// Winding resistance [ohm].
@@ -43,9 +43,9 @@ pub struct Servo {
     pub ticks: f64,
 }
 
-impl Servo {
+impl ServoPlant {
     /// One like those of hobby arms, without limit of speed and without delay.
-    pub const HOBBY: Servo = Servo {
+    pub const HOBBY: ServoPlant = ServoPlant {
         kt: 1.1,
         resistance: 2.2,
         armature: 0.027,
@@ -64,7 +64,7 @@ impl Servo {
 
 /// What the servo lifts: a mass at the end of a rod.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rig {
+pub struct ServoRig {
     /// [kg]
     pub mass: f64,
     /// [kg]
@@ -139,8 +139,8 @@ impl BenchMotion {
 pub struct ServoRun {
     pub motion: BenchMotion,
     pub kp: f64,
-    pub rig: Rig,
-    pub servo: Servo,
+    pub rig: ServoRig,
+    pub servo: ServoPlant,
     pub t: Vec<f64>,
     pub command: Vec<f64>,
     pub position: Vec<f64>,
@@ -153,7 +153,13 @@ const RATE_HZ: f64 = 200.0;
 const STEPS: usize = 100;
 
 /// Runs a motion at a gain.
-pub fn run_servo(servo: &Servo, rig: &Rig, motion: BenchMotion, kp: f64, seed: u64) -> ServoRun {
+pub fn run_servo(
+    servo: &ServoPlant,
+    rig: &ServoRig,
+    motion: BenchMotion,
+    kp: f64,
+    seed: u64,
+) -> ServoRun {
     let rows = (BenchMotion::SECONDS * RATE_HZ) as usize;
     let t: Vec<f64> = (0..=rows).map(|k| k as f64 / RATE_HZ).collect();
     let command = motion.positions(&t, seed);
@@ -258,7 +264,7 @@ impl ServoRun {
 mod tests {
     use super::*;
 
-    const RIG: Rig = Rig {
+    const RIG: ServoRig = ServoRig {
         mass: 0.5,
         arm_mass: 0.05,
         length: 0.12,
@@ -266,9 +272,9 @@ mod tests {
 
     #[test]
     fn a_servo_at_rest_carries_its_load_by_its_gain_within_its_dry_friction() {
-        let run = run_servo(&Servo::HOBBY, &RIG, BenchMotion::Step, 16.0, 1);
+        let run = run_servo(&ServoPlant::HOBBY, &RIG, BenchMotion::Step, 16.0, 1);
         let at = run.t.iter().position(|t| *t > 3.9).unwrap();
-        let servo = Servo::HOBBY;
+        let servo = ServoPlant::HOBBY;
         let stiffness = servo.kt * servo.supply * servo.firmware_gain * 16.0 / servo.resistance;
         let weight = (RIG.mass + 0.5 * RIG.arm_mass) * 9.80665 * RIG.length;
         let missing = stiffness * (run.command[at] - run.position[at]);
@@ -282,11 +288,11 @@ mod tests {
 
     #[test]
     fn a_late_command_moves_the_same_so_much_later() {
-        let late = Servo {
+        let late = ServoPlant {
             command_delay: 0.03,
-            ..Servo::HOBBY
+            ..ServoPlant::HOBBY
         };
-        let one = run_servo(&Servo::HOBBY, &RIG, BenchMotion::Step, 16.0, 1);
+        let one = run_servo(&ServoPlant::HOBBY, &RIG, BenchMotion::Step, 16.0, 1);
         let other = run_servo(&late, &RIG, BenchMotion::Step, 16.0, 1);
         for k in 200..1000 {
             assert!(

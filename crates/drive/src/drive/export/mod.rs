@@ -61,7 +61,7 @@ fn numbers(file: &DriveFile, joint: &str) -> JointNumbers {
 
 /// kt, R and the duty per radian and unit of kp; where nothing declares them, those of a largest duty of 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Electric {
+pub struct ElectricNumbers {
     pub kt: f64,
     pub resistance: f64,
     pub firmware_gain: f64,
@@ -71,7 +71,11 @@ pub struct Electric {
 }
 
 /// The electric numbers of a joint at a supply.
-fn electric(file: &DriveFile, of: &JointNumbers, supply: f64) -> Result<Electric, DriveError> {
+fn electric(
+    file: &DriveFile,
+    of: &JointNumbers,
+    supply: f64,
+) -> Result<ElectricNumbers, DriveError> {
     let drive = &file.drive;
     let missing = || {
         DriveError::Request {
@@ -96,7 +100,7 @@ fn electric(file: &DriveFile, of: &JointNumbers, supply: f64) -> Result<Electric
     if !(slope > 0.0 && kt > 0.0) {
         return Err(missing());
     }
-    Ok(Electric {
+    Ok(ElectricNumbers {
         kt,
         resistance: kt / slope,
         firmware_gain: of.stiffness / (slope * supply),

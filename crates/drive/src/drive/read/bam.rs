@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use crate::drive::error::DriveError;
-use crate::drive::track::{CommandIs, DriveLog, Load, Pendulum, Track};
+use crate::drive::track::{CommandIs, DriveLoad, DriveLog, PendulumRig, Track};
 
 /// What a person gives where a file does not.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -22,7 +22,7 @@ const OFF: f64 = 0.05;
 const EVEN: f64 = 1e-6;
 
 #[derive(Deserialize)]
-struct Rig {
+struct RigFile {
     mass: Option<f64>,
     arm_mass: Option<f64>,
     length: Option<f64>,
@@ -67,7 +67,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
         what,
         remedy: remedy.to_owned(),
     };
-    let rig: Rig = serde_json::from_slice(bytes).map_err(|e| {
+    let rig: RigFile = serde_json::from_slice(bytes).map_err(|e| {
         wrong(
             format!("is no JSON of a rig: {e}"),
             "a rig's log is an object with mass, length, kp and entries, each with timestamp, position and goal_position",
@@ -147,7 +147,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
                         .to_owned(),
                 );
             }
-            Load::Pendulum(Pendulum {
+            DriveLoad::PendulumRig(PendulumRig {
                 mass,
                 arm_mass: arm_mass.unwrap_or(0.0),
                 length,
@@ -157,7 +157,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
             findings.push(
                 "mass and length are not given: every torque is a ratio to the inertia".to_owned(),
             );
-            Load::Unknown
+            DriveLoad::Unknown
         }
     };
     let motion = match &rig.trajectory {

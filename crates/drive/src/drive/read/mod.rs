@@ -12,12 +12,12 @@ use cft_ident_logs::log::{self, LogSpec, Provenance, RawBlock, RawReader, Span, 
 
 use super::check;
 use super::error::DriveError;
-use super::track::{CommandIs, DriveLog, Load, Track};
+use super::track::{CommandIs, DriveLoad, DriveLog, Track};
 use bam::RigGiven;
 
 /// What a person says about logs.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Told {
+pub struct ReadRequest {
     pub rig: RigGiven,
     /// Names of the joints, in the order of files that have none.
     pub joints: Vec<String>,
@@ -32,7 +32,7 @@ pub struct Told {
 }
 
 /// Reads a log: the part of it that is used, checked.
-pub fn read(spec: &LogSpec, told: &Told) -> Result<(DriveLog, Provenance), DriveError> {
+pub fn read(spec: &LogSpec, told: &ReadRequest) -> Result<(DriveLog, Provenance), DriveError> {
     let path = spec.path.as_path();
     let name = spec.name();
     let file = escape(&name);
@@ -130,7 +130,7 @@ fn tracks(
     file: &str,
     position: Vec<Vec<f64>>,
     command: Vec<Vec<f64>>,
-    told: &Told,
+    told: &ReadRequest,
 ) -> Result<Vec<Track>, DriveError> {
     let wide = position.len();
     if !told.joints.is_empty() && told.joints.len() != wide {
@@ -158,7 +158,7 @@ fn tracks(
 }
 
 /// The gains: those that are told; where torques are ratios an unknown kp is one unit.
-fn gains(file: &str, told: &Told) -> Result<(f64, f64), DriveError> {
+fn gains(file: &str, told: &ReadRequest) -> Result<(f64, f64), DriveError> {
     match (told.rig.kp, told.robot && !told.volts) {
         (Some(kp), _) => Ok((kp, told.rig.kd.unwrap_or(0.0))),
         (None, false) => Ok((1.0, 0.0)),
@@ -175,7 +175,7 @@ fn plain(
     t: Vec<f64>,
     command_is: CommandIs,
     joints: Vec<Track>,
-    told: &Told,
+    told: &ReadRequest,
 ) -> DriveLog {
     let mut facts = Vec::new();
     for (fact, value) in [("kp", told.rig.kp), ("kd", told.rig.kd)] {
@@ -189,8 +189,8 @@ fn plain(
         command_is,
         joints,
         load: match told.robot {
-            true => Load::Robot,
-            false => Load::Unknown,
+            true => DriveLoad::Robot,
+            false => DriveLoad::Unknown,
         },
         findings: Vec::new(),
     }
@@ -235,7 +235,7 @@ fn cut(log: &mut DriveLog, span: Span) {
 }
 
 /// A table with a column of commands and one of positions for each joint.
-fn table(spec: &LogSpec, told: &Told) -> Result<(DriveLog, Provenance256), DriveError> {
+fn table(spec: &LogSpec, told: &ReadRequest) -> Result<(DriveLog, FileChecksum), DriveError> {
     let name = spec.name();
     let file = escape(&name);
     let said = |what: String, remedy: String| DriveError::File {
@@ -339,7 +339,7 @@ fn table(spec: &LogSpec, told: &Told) -> Result<(DriveLog, Provenance256), Drive
 }
 
 /// SHA-256 of a file, hexadecimal.
-type Provenance256 = String;
+type FileChecksum = String;
 
 /// What stands for `*`.
 fn matched<'a>(pattern: &str, name: &'a str) -> Option<&'a str> {

@@ -7,10 +7,10 @@ use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
 use crate::report::words::listed;
 use cft_ident_core::number;
 use cft_ident_drive::drive::identify::Course;
-use cft_ident_drive::drive::outcome::{DriveParameter, DriveStep, Drives, PositionError};
+use cft_ident_drive::drive::outcome::{DriveParameter, DriveResult, DriveStep, PositionError};
 
 /// Verdict, errors before and after, steps and numbers.
-pub fn drive(found: &Drives, name: &str) -> Report {
+pub fn drive(found: &DriveResult, name: &str) -> Report {
     let mut report = Report::new(&format!("Drives of {name}"));
     report.everywhere().verdict(&found.verdict.text, true);
     report.everywhere().line("");
@@ -105,7 +105,7 @@ fn traces(joints: &[String], courses: &[Course]) -> Traces {
 /// A row of the table of errors: which logs, without effects and with them.
 type ErrorRow<'a> = (&'static str, &'a PositionError, &'a PositionError);
 
-fn errors(found: &Drives) -> Table {
+fn errors(found: &DriveResult) -> Table {
     let (before, after) = (&found.before, &found.after);
     let mut rows: Vec<ErrorRow> = vec![("fitted", &before.train, &after.train)];
     let pairs = [
@@ -132,7 +132,7 @@ fn errors(found: &Drives) -> Table {
         .into()
 }
 
-fn steps(found: &Drives) -> Table {
+fn steps(found: &DriveResult) -> Table {
     let size = |step: &DriveStep| {
         let each = step.parameters.iter().map(|(name, amplitude)| {
             let value = match amplitude.std {
@@ -180,7 +180,7 @@ fn steps(found: &Drives) -> Table {
         .into()
 }
 
-fn parameters(found: &Drives) -> Table {
+fn parameters(found: &DriveResult) -> Table {
     let value = |p: &DriveParameter| match p.std {
         Some(std) => number::plus_minus(p.value, std),
         None => number::significant(p.value, 4),
@@ -205,7 +205,7 @@ fn parameters(found: &Drives) -> Table {
     .into()
 }
 
-fn given(found: &Drives) -> Table {
+fn given(found: &DriveResult) -> Table {
     Columns::new("single numbers, with what they hold with", &found.given)
         .words("joint", |g| &g.joint)
         .words("name", |g| &g.name)
