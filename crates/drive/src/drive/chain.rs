@@ -19,6 +19,14 @@ const SWEEPS: usize = 30;
 /// Further than this from where it was measured a joint is lost [rad].
 const LOST: f64 = 1e3;
 
+/// A part of a log: two spans of one file have its name.
+type LogPart = (String, u64, usize);
+
+fn part_of(log: &DriveLog) -> LogPart {
+    let begin = log.t.first().copied().unwrap_or(0.0);
+    (log.name.clone(), begin.to_bits(), log.t.len())
+}
+
 /// A robot whose links are known, and its inertia along some logs.
 #[derive(Debug)]
 pub struct RobotChains {
@@ -27,7 +35,7 @@ pub struct RobotChains {
     /// Joints that move each other's links, group by group.
     groups: Vec<Vec<usize>>,
     /// M of every sample, log by log.
-    inertia: HashMap<String, Vec<f64>>,
+    inertia: HashMap<LogPart, Vec<f64>>,
 }
 
 impl RobotChains {
@@ -45,7 +53,7 @@ impl RobotChains {
                     *coupled |= m.abs() > 1e-12;
                 }
             }
-            inertia.insert(log.name.clone(), all);
+            inertia.insert(part_of(log), all);
         }
         RobotChains {
             robot: robot.clone(),
@@ -84,7 +92,7 @@ impl RobotChains {
     pub fn roll(&self, log: &DriveLog, kind: DriveKind, law: &MachineLaw) -> Vec<Vec<f64>> {
         let n = self.robot.joints();
         let mut out = vec![vec![0.0; log.t.len()]; n];
-        let Some(inertia) = self.inertia.get(&log.name) else {
+        let Some(inertia) = self.inertia.get(&part_of(log)) else {
             return out;
         };
         let t = &log.t;
