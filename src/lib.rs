@@ -67,7 +67,7 @@
 //! blocks of t, q and tau; [`inspect`] looks for faults in them, [`mapping`] for the joints in a log that nobody described; [`motion`] turns them into filtered
 //! rows of q, v, a and tau; [`robot`] holds the physics, [`effect`] what a plain model lacks, [`math`]
 //! what is small and general, [`config`] the files. Beside them: [`simulate`] is a plant to test
-//! against, [`excite`] designs motions, [`export`] writes a model as C, Rust or URDF, [`replay`] runs
+//! against, [`drive`] finds drives from commanded and measured positions, [`excite`] designs motions, [`export`] writes a model as C, Rust or URDF, [`replay`] runs
 //! models along logs for the figures of a report, [`report`] writes results as text, page and JSON, and [`cli`] is the command line.
 
 #![forbid(unsafe_code)]
@@ -76,6 +76,7 @@ pub use cft_ident_core::{
     block, diagnose, effect, friction, inertia, judge, math, motion, number, robot, validate,
     verdict,
 };
+pub use cft_ident_drive::drive;
 pub use cft_ident_export::export;
 pub use cft_ident_files::config;
 pub use cft_ident_fleet::track;

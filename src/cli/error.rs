@@ -9,6 +9,7 @@ use std::io::{IsTerminal, Write};
 use super::exit::Exit;
 use super::{colour, window};
 use cft_ident_core::explain::{ErrorText, Explain};
+use cft_ident_drive::drive::error::DriveError;
 use cft_ident_files::config::ConfigError;
 use cft_ident_logs::log::{LogError, is_hidden};
 use cft_ident_logs::mapping::MappingError;
@@ -99,6 +100,16 @@ impl From<LogError> for CliError {
 impl From<ConfigError> for CliError {
     fn from(error: ConfigError) -> Self {
         Self::new(Exit::BadInput, error)
+    }
+}
+
+impl From<DriveError> for CliError {
+    fn from(error: DriveError) -> Self {
+        let exit = match error {
+            DriveError::Undetermined { .. } => Exit::Undetermined,
+            _ => Exit::BadInput,
+        };
+        Self::new(exit, error)
     }
 }
 

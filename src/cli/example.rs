@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::{CliError, Context, Outcome, campaign};
 use cft_ident_files::config;
 use cft_ident_logs::log::unpacked;
+use cft_ident_plant::simulate::servo::{BenchMotion, ServoPlant, ServoRig, run_servo};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 
@@ -44,6 +45,8 @@ pub enum ExampleMachine {
     Bldc,
     /// The built-in campaign of the CFT robot, simulated
     Cft,
+    /// A servo on a pendulum rig, command and position, simulated
+    Servo,
 }
 
 /// A file that the program carries.
@@ -142,6 +145,40 @@ static CFT: Machine = Machine {
     files: &[],
     next: "cft-ident identify {}/campaign.toml -o run\n",
 };
+/// Likewise.
+static SERVO: Machine = Machine {
+    name: "servo",
+    what: "a servo on a pendulum rig, simulated; 15 logs of command and position",
+    licence: None,
+    origin: "A simulated servo on a pendulum rig: five motions at three gains, command and position at 200 Hz.\n\
+        Its command comes late, and its firmware limits the speed of the set point: `drive` is to find how much.\n",
+    files: &[],
+    next: "cft-ident drive {}/*.json --holdout-where kp=16 -o servo.toml --report servo.html\n\
+        cft-ident export -m servo.toml --mjcf-actuators servo.xml --kp 16\n",
+};
+
+/// The logs of its rig by name.
+fn servo_logs() -> Vec<(String, Vec<u8>)> {
+    let servo = ServoPlant {
+        speed_limit: Some(4.8),
+        command_delay: 0.032,
+        ..ServoPlant::HOBBY
+    };
+    let rig = ServoRig {
+        mass: 0.6,
+        arm_mass: 0.05,
+        length: 0.15,
+    };
+    let mut out = Vec::new();
+    for kp in [8.0, 16.0, 32.0] {
+        for motion in BenchMotion::ALL {
+            let run = run_servo(&servo, &rig, motion, kp, SEED);
+            out.push((run.file_name(), run.to_json().into_bytes()));
+        }
+    }
+    out
+}
+
 /// Seed of its simulation: that of `identify`.
 const SEED: u64 = 1;
 
@@ -162,6 +199,7 @@ impl ExampleMachine {
             ExampleMachine::Tx40 => &TX40,
             ExampleMachine::Bldc => &BLDC,
             ExampleMachine::Cft => &CFT,
+            ExampleMachine::Servo => &SERVO,
         }
     }
 }
@@ -259,7 +297,7 @@ pub(super) fn write(
             .hint("name another folder with -o")
     };
     let make_folder = || context.files.make_folder(folder).map_err(|e| unusable(&e));
-    if machine.files.is_empty() {
+    if std::ptr::eq(machine, &CFT) {
         let robot = config::embedded(Path::new(campaign::ROBOT)).unwrap_or_default();
         stays(&folder.join("robot.toml"), robot.as_bytes())?;
         make_folder()?;
@@ -267,16 +305,19 @@ pub(super) fn write(
         warnings.iter().for_each(|warning| context.warn(warning));
         return Ok(files);
     }
-    let mut contents: Vec<(&str, Vec<u8>)> = Vec::with_capacity(machine.files.len() + 1);
+    let mut contents: Vec<(String, Vec<u8>)> = Vec::with_capacity(machine.files.len() + 1);
+    if std::ptr::eq(machine, &SERVO) {
+        contents = servo_logs();
+    }
     for (name, content) in machine.files {
         let bytes = match content {
             Content::Plain(bytes) => bytes.to_vec(),
             Content::Packed(bytes) => unpacked(bytes).map_err(|e| unusable(&e))?,
             Content::Config(path) => config::embedded(Path::new(path)).unwrap_or_default().into(),
         };
-        contents.push((name, bytes));
+        contents.push(((*name).to_owned(), bytes));
     }
-    contents.push(("README.txt", machine.origin.into()));
+    contents.push(("README.txt".to_owned(), machine.origin.into()));
     for (name, bytes) in &contents {
         stays(&folder.join(name), bytes)?;
     }
@@ -284,8 +325,7 @@ pub(super) fn write(
     for (name, bytes) in &contents {
         context.files.write(&folder.join(name), bytes)?;
     }
-    let names = contents.iter().map(|(name, _)| (*name).to_owned());
-    Ok(names.collect())
+    Ok(contents.into_iter().map(|(name, _)| name).collect())
 }
 
 /// A file that is there and says something else is the user's.

@@ -1,5 +1,6 @@
 //! `cft-ident export`: a model for other programs, as C header, Rust module, URDF or file of a simulator.
 
+mod drives;
 mod words;
 
 use cft_ident_core::explain::Explain;
@@ -71,6 +72,33 @@ pub struct Args {
         requires = "urdf"
     )]
     pub urdf_source: Option<PathBuf>,
+    /// Actuators of MuJoCo to write, of a model file of `drive`
+    #[arg(long, value_name = "FILE.xml", group = "into", value_parser = arguments::ends_in(["xml"]))]
+    pub mjcf_actuators: Option<PathBuf>,
+    /// Parameters of BAM to write, of a model file of `drive`
+    #[arg(long, value_name = "FILE.json", group = "into", value_parser = arguments::ends_in(["json"]))]
+    pub bam: Option<PathBuf>,
+    /// Actuators of Isaac Lab to write, of a model file of `drive`
+    #[arg(long, value_name = "FILE.py", group = "into", value_parser = arguments::ends_in(["py"]))]
+    pub isaaclab: Option<PathBuf>,
+    /// Proportional gain of the actuators of `drive` [N m/rad, or counts of the firmware]
+    #[arg(hide_short_help = true, long, value_name = "X", value_parser = arguments::positive)]
+    pub kp: Option<f64>,
+    /// Their gain of the speed
+    #[arg(hide_short_help = true, long, value_name = "X", default_value = "0", value_parser = arguments::finite)]
+    pub kd: f64,
+    /// Step of their simulator [s]
+    #[arg(hide_short_help = true, long, value_name = "S", default_value = "0.002", value_parser = arguments::positive)]
+    pub timestep: f64,
+    /// Class of BAM that the servo is
+    #[arg(
+        hide_short_help = true,
+        long,
+        value_name = "NAME",
+        default_value = "sts3215",
+        requires = "bam"
+    )]
+    pub actuator: String,
     /// MJCF file of MuJoCo to write
     #[arg(long, value_name = "FILE.xml", group = "into", value_parser = arguments::ends_in(["xml"]))]
     pub mjcf: Option<PathBuf>,
@@ -218,6 +246,9 @@ fn controller_names(file: &ModelFile) -> BTreeMap<String, String> {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    if drives::asked(args) {
+        return drives::run(args, context);
+    }
     let side = args.urdf.as_ref().map(|path| path.with_extension("toml"));
     let formats = formats(args);
     if !args.logs.is_empty() && formats.is_empty() && args.urdf.is_none() {

@@ -14,6 +14,7 @@ mod context;
 mod controller;
 mod convert;
 mod diagnose;
+mod drive;
 mod error;
 mod example;
 mod excite;
@@ -196,6 +197,7 @@ commands! {
     Validate: validate,
     Reduce: reduce,
     Diagnose: diagnose,
+    Drive: drive,
     Track: track,
     Compare: compare,
     Payload: payload,

@@ -13,7 +13,7 @@ fn every_example_is_written_with_its_origin_and_its_licence() {
     let folder = tempfile::tempdir().unwrap();
     let listed = run(folder.path(), &["example"]);
     let examples = listed["examples"].as_array().unwrap();
-    assert_eq!(examples.len(), 4);
+    assert_eq!(examples.len(), 5);
     for example in examples {
         let name = example["name"].as_str().unwrap();
         let found = run(folder.path(), &["example", name]);

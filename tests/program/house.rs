@@ -27,6 +27,7 @@ const ROOMS: &[(&str, &str)] = &[
         "math robot block log config motion effect band export",
     ),
     ("open_loop", "explain math number robot motion effect"),
+    ("drive", "explain number verdict robot log"),
     ("friction", "explain math robot block motion verdict"),
     ("inertia", "explain math robot block motion verdict"),
     ("judge", "math"),
@@ -57,7 +58,7 @@ const ROOMS: &[(&str, &str)] = &[
     (
         "report",
         "explain math verdict number robot log config motion effect friction inertia diagnose validate \
-         inspect setup excite compare identify band observe open_loop track replay",
+         inspect setup excite compare identify band observe open_loop track replay drive",
     ),
     (
         "cli",

@@ -18,6 +18,7 @@ mod diagnose;
 mod diagnose_cft;
 mod diagnose_measured;
 mod docs;
+mod drive;
 mod example;
 mod excite_places;
 mod excite_robots;

@@ -6,6 +6,7 @@ use serde_json::Value;
 use crate::cli::{
     CliError, Outcome, convert, example, export, identify, inspect, new, reduce, show, simulate,
 };
+use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
 use cft_ident_plant::excite::Judgements;
 use cft_ident_plant::simulate::truth::TruthFile;
@@ -40,6 +41,8 @@ pub enum Kind {
     Track,
     /// JSON document of `diagnose`
     Diagnose,
+    /// JSON document of `drive`
+    Drive,
     /// JSON document of `compare`
     Compare,
     /// JSON document of `identify`
@@ -93,6 +96,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Reduce => json::schema::<reduce::Reduced>("reduce"),
         Kind::Track => json::schema::<Tracked>("track"),
         Kind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
+        Kind::Drive => json::schema::<DriveResult>("drive"),
         Kind::Compare => json::schema::<ComparisonResult>("compare"),
         Kind::Identify => json::schema::<identify::Identified>("identify"),
         Kind::Excite => json::schema::<Judgements>("excite"),

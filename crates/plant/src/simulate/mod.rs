@@ -36,6 +36,7 @@ mod recorder;
 pub mod reference;
 pub mod run;
 pub mod sensors;
+pub mod servo;
 pub mod settings;
 mod settings_file;
 pub mod simulated_run;

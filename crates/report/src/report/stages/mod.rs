@@ -4,6 +4,7 @@
 pub mod compare;
 pub mod diagnose;
 mod diagnose_words;
+pub mod drive;
 pub mod excite;
 mod first_screen;
 mod formulas;

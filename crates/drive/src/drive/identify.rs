@@ -1,0 +1,432 @@
+//! Drives from logs: the stage as a function of a dataset and a request.
+
+use std::collections::BTreeSet;
+
+use cft_ident_core::robot::Robot;
+
+use super::candidate::Effect;
+use super::chain::RobotChains;
+use super::error::DriveError;
+use super::fit::{Piece, Problem, median};
+use super::judge::NUMBERS;
+use super::law::DriveKind;
+use super::search::{self, Found, LawEstimate, StepCertainty};
+use super::start;
+use super::track::{DriveLoad, DriveLog};
+use super::unknown::{Frame, Quantity, Unknown};
+
+/// Logs by what they are for.
+#[derive(Debug, Clone)]
+pub struct DriveData {
+    pub fitted: Vec<DriveLog>,
+    pub held_out: Vec<DriveLog>,
+    /// The robot whose links the drives move, with its base parameters.
+    pub links: Option<(Robot, Vec<f64>)>,
+    pub kind: DriveKind,
+}
+
+/// What the jackknife leaves out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BlocksAre {
+    MotionsAndGains,
+    /// Too few of those: equal times of the logs.
+    Time,
+}
+
+/// Time blocks where motions and gains are too few.
+const TIME_BLOCKS: usize = 24;
+
+/// Errors of predicted positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PositionErrors {
+    /// Log by log, joint by joint: mean size and mean square [rad, rad^2].
+    pub logs: Vec<(String, usize, Vec<[f64; 2]>)>,
+}
+
+impl PositionErrors {
+    fn mean(&self, of: impl Fn(&[f64; 2]) -> f64, joint: Option<usize>) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (_, rows, joints) in &self.logs {
+            for (j, error) in joints.iter().enumerate() {
+                if joint.is_none_or(|only| only == j) {
+                    sum += of(error) * *rows as f64;
+                    count += *rows as f64;
+                }
+            }
+        }
+        sum / count
+    }
+
+    /// Mean size over all samples [rad], of all joints or of one.
+    pub fn mae(&self, joint: Option<usize>) -> f64 {
+        self.mean(|e| e[0], joint)
+    }
+
+    pub fn rmse(&self, joint: Option<usize>) -> f64 {
+        self.mean(|e| e[1], joint).sqrt()
+    }
+}
+
+/// Errors of a model on logs by their use.
+#[derive(Debug, Clone)]
+pub struct ErrorsByUse {
+    pub train: PositionErrors,
+    pub holdout: Option<PositionErrors>,
+    /// Held-out logs, each by a fit without the logs of its motion.
+    pub unseen: Option<PositionErrors>,
+}
+
+/// What was identified.
+#[derive(Debug, Clone)]
+pub struct Identified {
+    pub found: Found,
+    pub frame: Frame,
+    pub joints: Vec<String>,
+    pub blocks_are: BlocksAre,
+    pub blocks: usize,
+    /// Whether every torque is a ratio to the inertia.
+    pub ratios: bool,
+    pub before: ErrorsByUse,
+    pub after: ErrorsByUse,
+    /// Armatures [kg m^2] with the other delay in the place of the one that is written, where data do not part them.
+    pub other_delay: Option<(Effect, Vec<f64>)>,
+    /// Positions of some logs, held-out ones first.
+    pub courses: Vec<Course>,
+}
+
+/// Positions along a log, joint after joint [rad].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    pub log: String,
+    pub held_out: bool,
+    pub t: Vec<f64>,
+    pub command: Vec<Vec<f64>>,
+    pub measured: Vec<Vec<f64>>,
+    /// Without any effect.
+    pub given: Vec<Vec<f64>>,
+    /// With those that are written.
+    pub refined: Vec<Vec<f64>>,
+}
+
+/// Most logs whose positions are kept for pictures.
+const COURSES: usize = 24;
+
+/// Identifies the drives of a dataset.
+pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, DriveError> {
+    let fitted: Vec<&DriveLog> = data.fitted.iter().collect();
+    let all: Vec<&DriveLog> = data.fitted.iter().chain(&data.held_out).collect();
+    same_joints(&all)?;
+    let first = fitted[0];
+    let links = data.links.as_ref();
+    let chains = links.map(|(robot, theta)| RobotChains::new(robot, theta, &all));
+    let chains = chains.as_ref();
+    let kind = data.kind;
+    let sizes = start::sizes(&fitted, kind, chains);
+    let (pieces, blocks, blocks_are) = pieces(&fitted);
+    let volts: Vec<f64> = fitted
+        .iter()
+        .flat_map(|log| log.joints[0].supply.clone())
+        .collect();
+    let supply = (!volts.is_empty()).then(|| median(volts));
+    let mut problem = Problem {
+        logs: &fitted,
+        frame: Frame {
+            kind,
+            supply: match kind {
+                DriveKind::Volts(_) => supply,
+                DriveKind::Torque => None,
+            },
+            joints: first.joints.len(),
+            stribeck_speed: sizes.iter().map(|s| STRIBECK_SPEED * s.speed).collect(),
+            held: Vec::new(),
+        },
+        sizes,
+        pieces,
+        blocks,
+        chains,
+    };
+    let gravity = match first.load {
+        DriveLoad::PendulumRig(_) => true,
+        DriveLoad::Robot => {
+            chains.is_some_and(|c| c.gravity(first, 0).iter().any(|g| g.abs() > 1e-9))
+        }
+        DriveLoad::Unknown => false,
+    };
+    doing("gain, damping, friction");
+    let unknowns = start::declared(&fitted, kind);
+    let given = search::declared(&problem, &unknowns);
+    let possible = Effect::possible(kind, gravity, first.load != DriveLoad::Unknown);
+    let mut found = search::search(&problem, given, &possible, doing);
+    let held_out: Vec<&DriveLog> = data.held_out.iter().collect();
+    confirm_held_out(&problem, &mut found, &held_out);
+    shrink(&mut problem, &mut found);
+    let bare = Problem {
+        frame: Frame {
+            held: Vec::new(),
+            ..problem.frame.clone()
+        },
+        ..problem.clone()
+    };
+    doing("held-out data");
+    let before = errors(&bare, &found.given, &held_out);
+    let after = errors(&problem, &found.refined, &held_out);
+    let other_delay = other_delay(&problem, &found);
+    let drawn = held_out.iter().map(|log| (true, *log));
+    let drawn = drawn
+        .chain(fitted.iter().map(|log| (false, *log)))
+        .take(COURSES);
+    let courses = drawn
+        .map(|(held_out, log)| Course {
+            log: log.name.clone(),
+            held_out,
+            t: log.t.clone(),
+            command: log.joints.iter().map(|j| j.command.clone()).collect(),
+            measured: log.joints.iter().map(|j| j.position.clone()).collect(),
+            given: bare.positions(log, &found.given.unknowns, &found.given.values),
+            refined: problem.positions(log, &found.refined.unknowns, &found.refined.values),
+        })
+        .collect();
+    Ok(Identified {
+        joints: first.joints.iter().map(|j| j.joint.clone()).collect(),
+        ratios: first.load == DriveLoad::Unknown,
+        frame: problem.frame.clone(),
+        found,
+        blocks_are,
+        blocks,
+        before,
+        after,
+        other_delay,
+        courses,
+    })
+}
+
+impl DriveData {
+    /// The same joint by joint, where no links couple several.
+    pub fn by_joint(&self) -> Vec<DriveData> {
+        let joints = self.fitted.first().map_or(0, |log| log.joints.len());
+        if self.links.is_some() || joints < 2 {
+            return vec![self.clone()];
+        }
+        let only = |logs: &[DriveLog], j: usize| {
+            let one = |log: &DriveLog| {
+                let track = log.joints.get(j)?.clone();
+                Some(DriveLog {
+                    joints: vec![track],
+                    ..log.clone()
+                })
+            };
+            logs.iter().filter_map(one).collect()
+        };
+        let of = |j| DriveData {
+            fitted: only(&self.fitted, j),
+            held_out: only(&self.held_out, j),
+            links: None,
+            kind: self.kind,
+        };
+        (0..joints).map(of).collect()
+    }
+}
+
+/// Positions of joints that were identified one by one, log by log.
+pub fn joined_courses(each: &[Identified]) -> Vec<Course> {
+    let Some((first, rest)) = each.split_first() else {
+        return Vec::new();
+    };
+    let mut out = first.courses.clone();
+    for other in rest {
+        for (course, more) in out.iter_mut().zip(&other.courses) {
+            course.command.extend(more.command.iter().cloned());
+            course.measured.extend(more.measured.iter().cloned());
+            course.given.extend(more.given.iter().cloned());
+            course.refined.extend(more.refined.iter().cloned());
+        }
+    }
+    out
+}
+
+/// vs over the speed that a joint reaches.
+const STRIBECK_SPEED: f64 = 0.05;
+
+fn same_joints(logs: &[&DriveLog]) -> Result<(), DriveError> {
+    let wrong = |what: String, remedy: &str| DriveError::Request {
+        what,
+        remedy: remedy.to_owned(),
+    };
+    let Some(first) = logs.first() else {
+        return Err(wrong(
+            "no log is left to fit".to_owned(),
+            "hold out fewer logs",
+        ));
+    };
+    for log in logs {
+        let same = log.joints.len() == first.joints.len();
+        if !same || std::mem::discriminant(&log.load) != std::mem::discriminant(&first.load) {
+            return Err(wrong(
+                format!("{} and {} are not of one machine", first.name, log.name),
+                "identify each machine by itself",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// How logs are cut into blocks.
+fn pieces(logs: &[&DriveLog]) -> (Vec<Piece>, usize, BlocksAre) {
+    let names: Vec<_> = logs.iter().map(|log| log.block()).collect();
+    let each: BTreeSet<_> = names.iter().cloned().collect();
+    if each.len() >= NUMBERS.blocks {
+        let whole = logs.iter().enumerate().map(|(l, log)| Piece {
+            log: l,
+            from: 0,
+            to: log.t.len(),
+            block: each.iter().position(|name| *name == names[l]).unwrap_or(0),
+        });
+        return (whole.collect(), each.len(), BlocksAre::MotionsAndGains);
+    }
+    let total: usize = logs.iter().map(|log| log.t.len()).sum();
+    let long = total.div_ceil(TIME_BLOCKS);
+    let (mut out, mut block, mut room) = (Vec::new(), 0, long);
+    for (l, log) in logs.iter().enumerate() {
+        let mut from = 0;
+        while from < log.t.len() {
+            let to = (from + room).min(log.t.len());
+            out.push(Piece {
+                log: l,
+                from,
+                to,
+                block,
+            });
+            room -= to - from;
+            if room == 0 {
+                (block, room) = (block + 1, long);
+            }
+            from = to;
+        }
+    }
+    let blocks = if room == long { block } else { block + 1 };
+    (out, blocks, BlocksAre::Time)
+}
+
+/// Errors of a solution on logs.
+pub fn errors_on(problem: &Problem, at: &LawEstimate, logs: &[&DriveLog]) -> PositionErrors {
+    let on = Problem {
+        logs,
+        pieces: Vec::new(),
+        blocks: 0,
+        ..problem.clone()
+    };
+    let residuals = on.residuals(&at.unknowns, &at.values);
+    let of = |(log, joints): (&&DriveLog, Vec<Vec<f64>>)| {
+        let rows = log.t.len();
+        let sums = joints.iter().map(|r| {
+            let mean = |of: fn(f64) -> f64| r.iter().map(|r| of(*r)).sum::<f64>() / rows as f64;
+            [mean(f64::abs), mean(|r| r * r)]
+        });
+        (log.name.clone(), rows, sums.collect())
+    };
+    PositionErrors {
+        logs: logs.iter().zip(residuals).map(of).collect(),
+    }
+}
+
+fn errors(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> ErrorsByUse {
+    ErrorsByUse {
+        train: errors_on(problem, at, problem.logs),
+        holdout: (!held_out.is_empty()).then(|| errors_on(problem, at, held_out)),
+        unseen: unseen(problem, at, held_out),
+    }
+}
+
+/// Errors on held-out logs, each by a fit without its motion; none where no motion was fitted.
+fn unseen(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> Option<PositionErrors> {
+    let motions: BTreeSet<&str> = held_out.iter().map(|log| log.motion.as_str()).collect();
+    let mut logs = Vec::new();
+    for motion in motions {
+        let kept: Vec<usize> = (0..problem.logs.len())
+            .filter(|l| problem.logs[*l].motion != motion)
+            .collect();
+        if kept.is_empty() {
+            continue;
+        }
+        let rest: Vec<&DriveLog> = kept.iter().map(|l| problem.logs[*l]).collect();
+        let (pieces, blocks, _) = pieces(&rest);
+        let without = Problem {
+            logs: &rest,
+            pieces,
+            blocks,
+            ..problem.clone()
+        };
+        let fitted = match kept.len() == problem.logs.len() {
+            true => at.clone(),
+            false => {
+                let scales = without.scales(&at.unknowns, &at.values);
+                let fitted = without.fit(&at.unknowns, &at.values, &scales, UNSEEN_STEPS);
+                LawEstimate {
+                    values: fitted.values,
+                    ..at.clone()
+                }
+            }
+        };
+        let of: Vec<&DriveLog> = held_out
+            .iter()
+            .filter(|log| log.motion == motion)
+            .copied()
+            .collect();
+        logs.extend(errors_on(problem, &fitted, &of).logs);
+    }
+    (!logs.is_empty()).then_some(PositionErrors { logs })
+}
+
+/// Steps of a fit without a motion, from the fit with it.
+const UNSEEN_STEPS: usize = 8;
+
+/// Steps that make held-out logs worse leave.
+fn confirm_held_out(problem: &Problem, found: &mut Found, held_out: &[&DriveLog]) {
+    if held_out.is_empty() {
+        return;
+    }
+    for at in (0..found.steps.len()).rev() {
+        if !found.steps[at].written() {
+            continue;
+        }
+        let less = search::without(problem, &found.refined, found.steps[at].effect);
+        let with = errors_on(problem, &found.refined, held_out).mae(None);
+        if with > errors_on(problem, &less, held_out).mae(None) {
+            found.steps[at].status = StepCertainty::HeldOutWorse;
+            found.refined = less;
+        }
+    }
+}
+
+/// Shapes of friction that are not confirmed are held at s times their estimate, everything else fitted around them.
+fn shrink(problem: &mut Problem, found: &mut Found) {
+    let steps = found.steps.iter().filter(|step| step.written());
+    let indicated = steps.filter(|step| step.status == StepCertainty::Indicated);
+    let smaller: Vec<_> = indicated
+        .map(|step| {
+            let s = step.judged.shrinkage;
+            let held = step.unknowns.iter().zip(&step.values);
+            let held: Vec<(Unknown, f64)> = held.map(|(u, x)| (*u, s * x)).collect();
+            (step.effect, held)
+        })
+        .collect();
+    for (effect, held) in smaller {
+        problem.frame.held.extend(held);
+        found.refined = search::without(problem, &found.refined, effect);
+    }
+}
+
+/// The armature with the other delay, where data do not part the two.
+fn other_delay(problem: &Problem, found: &Found) -> Option<(Effect, Vec<f64>)> {
+    let delays = [Effect::CommandDelay, Effect::LoopDelay];
+    let step = found
+        .steps
+        .iter()
+        .find(|s| s.written() && delays.contains(&s.effect))?;
+    let other = step.alternatives.iter().find(|e| delays.contains(e))?;
+    let rest = search::without(problem, &found.refined, step.effect);
+    let with = search::with(problem, &rest, *other);
+    let of = |j| with.value(Unknown::of(Quantity::Armature, j));
+    let armatures: Option<Vec<f64>> = (0..problem.frame.joints).map(of).collect();
+    Some((*other, armatures?))
+}

@@ -1,0 +1,31 @@
+//! Drives: what a servo or a leg is, from commanded and measured positions.
+//!
+//! ```text
+//! files -> DriveLog                     read      plain numbers, joint by joint
+//!       -> checked                      check     units, rest, stops
+//!       -> roll-outs                    roll_out  one axis; chain: arms and legs
+//!       -> fitted law                   fit       output error, Gauss-Newton with bounds
+//!       -> steps, judged                search    candidate effects, jackknife in judge
+//!       -> Drives                       outcome   names, units, verdicts; drive_file: TOML
+//! ```
+
+pub mod candidate;
+pub mod chain;
+pub mod check;
+pub mod drive_file;
+pub mod error;
+pub mod export;
+pub mod fit;
+pub mod identify;
+pub mod judge;
+pub mod law;
+mod made;
+mod numbers;
+pub mod outcome;
+pub mod read;
+pub mod roll_out;
+pub mod search;
+pub mod set_point;
+pub mod start;
+pub mod track;
+pub mod unknown;

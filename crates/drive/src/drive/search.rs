@@ -1,0 +1,329 @@
+//! The search for what a drive has beside gain, damping, dry friction and armature.
+//!
+//! Every effect is fitted with everything else free from a few starts; of those that help the blocks left out the one that
+//! helps most joins, and again. Then the jackknife judges: what is not sure leaves, the least sure first, and the rest is
+//! fitted and asked again.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::candidate::Effect;
+use super::fit::{NUMBERS as FIT, Problem, ResidualScales, Sums};
+use super::judge::{self, BlockJackknife, Judged, NUMBERS};
+use super::start;
+use super::unknown::{Quantity, Unknown};
+
+/// A fitted law with its deviations.
+#[derive(Debug, Clone)]
+pub struct LawEstimate {
+    pub unknowns: Vec<Unknown>,
+    pub values: Vec<f64>,
+    pub converged: bool,
+    pub scales: ResidualScales,
+    pub blocks: Vec<Sums>,
+    pub jackknife: BlockJackknife,
+}
+
+impl LawEstimate {
+    /// Of values that a fit ended at.
+    fn at(
+        problem: &Problem,
+        unknowns: &[Unknown],
+        values: Vec<f64>,
+        scales: &ResidualScales,
+    ) -> Self {
+        let blocks = problem.by_block(&problem.linearised(unknowns, &values, scales));
+        LawEstimate {
+            jackknife: BlockJackknife::new(unknowns, &values, &blocks),
+            unknowns: unknowns.to_vec(),
+            values,
+            converged: true,
+            scales: scales.clone(),
+            blocks,
+        }
+    }
+
+    fn loss(&self) -> f64 {
+        self.blocks.iter().map(|block| block.loss).sum()
+    }
+
+    /// Losses of the blocks, each by the others.
+    pub fn left_out(&self) -> Vec<f64> {
+        self.jackknife.left_out(&self.blocks)
+    }
+
+    pub fn value(&self, unknown: Unknown) -> Option<f64> {
+        let at = self.unknowns.iter().position(|u| *u == unknown)?;
+        Some(self.values[at])
+    }
+}
+
+/// How sure a step is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepCertainty {
+    Confirmed,
+    Indicated,
+    /// It fits, and is not sure: not written.
+    Seen,
+    /// Held-out logs get worse by it: not written.
+    HeldOutWorse,
+}
+
+/// An effect that helps the blocks left out.
+#[derive(Debug, Clone)]
+pub struct Step {
+    pub effect: Effect,
+    pub unknowns: Vec<Unknown>,
+    /// As estimated in the joint fit, with deviations.
+    pub values: Vec<f64>,
+    pub stds: Vec<Option<f64>>,
+    pub judged: Judged,
+    pub status: StepCertainty,
+    /// Mean ln(before / after) of the loss of blocks left out, and its standard error.
+    pub gain: [f64; 2],
+    /// Effects that do nearly as well in its place.
+    pub alternatives: Vec<Effect>,
+}
+
+impl Step {
+    pub fn written(&self) -> bool {
+        match self.status {
+            StepCertainty::Confirmed => true,
+            StepCertainty::Indicated => !self.effect.measurable(),
+            StepCertainty::Seen | StepCertainty::HeldOutWorse => false,
+        }
+    }
+}
+
+/// An effect that was tried.
+#[derive(Debug, Clone)]
+pub struct TriedStep {
+    pub effect: Effect,
+    pub gain: [f64; 2],
+}
+
+/// What a search found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Without any effect.
+    pub given: LawEstimate,
+    /// With all that are written.
+    pub refined: LawEstimate,
+    pub steps: Vec<Step>,
+    /// Those that were tried last and not taken.
+    pub tried: Vec<TriedStep>,
+}
+
+/// Steps of a fit of a candidate from the best of its starts on.
+const SHORT: usize = 5;
+
+/// Fits with scales that follow the residual.
+pub fn fit(
+    problem: &Problem,
+    unknowns: &[Unknown],
+    start: &[f64],
+    scales: Option<&ResidualScales>,
+) -> LawEstimate {
+    let mut values = start.to_vec();
+    let first = match scales {
+        Some(scales) => scales.clone(),
+        None => problem.scales(unknowns, &values),
+    };
+    let mut scales = first;
+    let mut converged = false;
+    for _ in 0..ROUNDS {
+        let fitted = problem.fit(unknowns, &values, &scales, FIT.steps);
+        values = fitted.values;
+        converged = fitted.converged;
+        scales = problem.scales(unknowns, &values);
+    }
+    let mut solution = LawEstimate::at(problem, unknowns, values, &scales);
+    // a limit that is never reached is none
+    for (i, unknown) in unknowns.iter().enumerate() {
+        let seen = solution.blocks.iter().any(|block| block.h[(i, i)] > 0.0);
+        if unknown.quantity == Quantity::TorqueLimit && !seen {
+            solution.values[i] = 0.0;
+        }
+    }
+    solution.converged = converged;
+    solution
+}
+
+/// Fits in a row whose scales follow the residual. One: scales of the start; more: the same to two digits.
+const ROUNDS: usize = 3;
+
+/// The declared drive, from several starts.
+pub fn declared(problem: &Problem, unknowns: &[Unknown]) -> LawEstimate {
+    let mut best: Option<(f64, LawEstimate)> = None;
+    for start in start::starts(problem, unknowns) {
+        let scales = problem.scales(unknowns, &start);
+        let first = problem.fit(unknowns, &start, &scales, FIT.steps);
+        let loss = problem
+            .losses_by_joint(unknowns, &first.values)
+            .iter()
+            .sum();
+        if best.as_ref().is_none_or(|(known, _)| loss < *known) {
+            best = Some((loss, fit(problem, unknowns, &first.values, None)));
+        }
+    }
+    best.expect("there are starts").1
+}
+
+/// The best of the starts of an effect, fitted beside a solution with its scales.
+pub fn with(problem: &Problem, beside: &LawEstimate, effect: Effect) -> LawEstimate {
+    let mut unknowns = beside.unknowns.clone();
+    unknowns.extend(effect.unknowns(problem.frame.joints));
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for start in effect.starts(&problem.sizes) {
+        let mut values = beside.values.clone();
+        values.extend(start);
+        let fitted = problem.fit(&unknowns, &values, &beside.scales, 1);
+        if best.as_ref().is_none_or(|(loss, _)| fitted.loss < *loss) {
+            best = Some((fitted.loss, fitted.values));
+        }
+    }
+    let (loss, mut values) = best.expect("there are starts");
+    // what gains nothing where it is fitted gains nothing elsewhere
+    if loss < (1.0 - NUMBERS.noticeable) * beside.loss() {
+        values = problem
+            .fit(&unknowns, &values, &beside.scales, SHORT)
+            .values;
+    }
+    LawEstimate::at(problem, &unknowns, values, &beside.scales)
+}
+
+/// The search, from the declared drive on.
+pub fn search(
+    problem: &Problem,
+    given: LawEstimate,
+    possible: &[Effect],
+    doing: &dyn Fn(&str),
+) -> Found {
+    let mut at = given.clone();
+    let mut joined: Vec<(Effect, [f64; 2], Vec<Effect>)> = Vec::new();
+    let mut tried = Vec::new();
+    while joined.len() < NUMBERS.steps && problem.blocks > 1 {
+        let before = at.left_out();
+        tried.clear();
+        let mut fitted = Vec::new();
+        for effect in possible
+            .iter()
+            .filter(|e| !joined.iter().any(|(known, ..)| known == *e))
+        {
+            doing(effect.name());
+            let with = with(problem, &at, *effect);
+            let after = with.left_out();
+            let [gain, se] = judge::gain(&before, &after);
+            tried.push(TriedStep {
+                effect: *effect,
+                gain: [gain, se],
+            });
+            // a part of the error is half of that of its square
+            let noticeable = gain > 2.0 * NUMBERS.noticeable;
+            if noticeable && gain > NUMBERS.screen * se {
+                fitted.push((*effect, gain, se, with, after));
+            }
+        }
+        fitted.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let Some((effect, gain, se, with, after)) = fitted.first() else {
+            break;
+        };
+        let near = |other: &&(Effect, f64, f64, LawEstimate, Vec<f64>)| {
+            let [less, se] = judge::gain(&other.4, after);
+            less < NUMBERS.screen * se
+        };
+        let alternatives = fitted[1..]
+            .iter()
+            .filter(near)
+            .map(|other| other.0)
+            .collect();
+        joined.push((*effect, [*gain, *se], alternatives));
+        at = fit(problem, &with.unknowns, &with.values, Some(&at.scales));
+    }
+    let mut found = settle(problem, given, at, joined);
+    found.tried = tried;
+    found
+}
+
+/// Lets what is not sure leave, the least sure first, until all that stand pass.
+fn settle(
+    problem: &Problem,
+    given: LawEstimate,
+    mut at: LawEstimate,
+    joined: Vec<(Effect, [f64; 2], Vec<Effect>)>,
+) -> Found {
+    let mut steps: BTreeMap<usize, Step> = BTreeMap::new();
+    let mut standing: Vec<usize> = (0..joined.len()).collect();
+    loop {
+        for place in &standing {
+            let (effect, gain, alternatives) = &joined[*place];
+            let step = judged(problem, &at, *effect, *gain, alternatives);
+            steps.insert(*place, step);
+        }
+        let sureness = |place: &usize| {
+            let judged = steps[place].judged;
+            judged.deviations * judged.deviations / judged.floor
+        };
+        let leaves = standing
+            .iter()
+            .copied()
+            .filter(|place| !steps[place].written());
+        let least = leaves.min_by(|a, b| sureness(a).total_cmp(&sureness(b)));
+        let Some(least) = least else { break };
+        standing.retain(|place| *place != least);
+        at = without(problem, &at, joined[least].0);
+    }
+    Found {
+        given,
+        refined: at,
+        steps: steps.into_values().collect(),
+        tried: Vec::new(),
+    }
+}
+
+/// A solution fitted anew without an effect.
+pub fn without(problem: &Problem, at: &LawEstimate, effect: Effect) -> LawEstimate {
+    let gone = effect.unknowns(problem.frame.joints);
+    let pairs = at.unknowns.iter().zip(&at.values);
+    let kept = pairs.filter(|(unknown, _)| !gone.contains(unknown));
+    let (unknowns, values): (Vec<Unknown>, Vec<f64>) = kept.map(|(u, x)| (*u, *x)).unzip();
+    fit(problem, &unknowns, &values, Some(&at.scales))
+}
+
+fn judged(
+    problem: &Problem,
+    at: &LawEstimate,
+    effect: Effect,
+    gain: [f64; 2],
+    alternatives: &[Effect],
+) -> Step {
+    let unknowns = effect.unknowns(problem.frame.joints);
+    let place = |unknown: &Unknown| at.unknowns.iter().position(|u| u == unknown);
+    let places: Vec<usize> = unknowns.iter().filter_map(place).collect();
+    let free: Vec<usize> = places
+        .iter()
+        .copied()
+        .filter(|i| at.jackknife.free[*i])
+        .collect();
+    let amplitude = DVector::from_iterator(free.len(), free.iter().map(|i| at.values[*i]));
+    let v = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+        at.jackknife.covariance[(free[a], free[b])]
+    });
+    let judged = Judged::new(&amplitude, v, problem.blocks);
+    let status = match judged.shrinkage {
+        s if s > NUMBERS.confirmed => StepCertainty::Confirmed,
+        s if s > 0.0 => StepCertainty::Indicated,
+        _ => StepCertainty::Seen,
+    };
+    Step {
+        effect,
+        values: places.iter().map(|i| at.values[*i]).collect(),
+        stds: places.iter().map(|i| at.jackknife.std(*i)).collect(),
+        unknowns,
+        judged,
+        status,
+        gain,
+        alternatives: alternatives.to_vec(),
+    }
+}

@@ -1,0 +1,168 @@
+//! The unknowns of a fit and how a law is made of them.
+
+use super::law::{DriveKind, JointLaw, MachineLaw};
+
+/// What an unknown is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// K, torque per radian and unit of kp.
+    Stiffness,
+    /// D while the drive is on, where it never is off.
+    Damping,
+    /// kt^2/R alone, where the drive is off in a part.
+    BackEmf,
+    /// Fv alone, likewise.
+    Viscous,
+    Coulomb,
+    Armature,
+    CommandDelay,
+    LoopDelay,
+    /// 1/v_max, so that none is zero.
+    Slowness,
+    /// 1/tau_max, likewise.
+    TorqueLimit,
+    LoadFriction,
+    Stribeck,
+    Bias,
+    Offset,
+}
+
+/// An unknown of a joint, or of the whole machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Unknown {
+    pub quantity: Quantity,
+    pub joint: Option<usize>,
+}
+
+impl Unknown {
+    pub fn of(quantity: Quantity, joint: usize) -> Self {
+        Unknown {
+            quantity,
+            joint: Some(joint),
+        }
+    }
+
+    pub fn common(quantity: Quantity) -> Self {
+        Unknown {
+            quantity,
+            joint: None,
+        }
+    }
+
+    /// Smallest and largest value.
+    pub fn bounds(&self) -> [f64; 2] {
+        match self.quantity {
+            Quantity::Bias | Quantity::Offset => [f64::NEG_INFINITY, f64::INFINITY],
+            Quantity::CommandDelay | Quantity::LoopDelay => [0.0, LATEST],
+            _ => [0.0, f64::INFINITY],
+        }
+    }
+}
+
+/// Latest command or loop [s].
+pub const LATEST: f64 = 0.3;
+
+/// How large the numbers of a joint are: what steps of differences and starts are measured with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sizes {
+    /// [kg m^2]
+    pub inertia: f64,
+    /// [N m]
+    pub torque: f64,
+    /// [rad/s]
+    pub speed: f64,
+    /// [rad]
+    pub error: f64,
+    /// Largest error of position but one in a hundred [rad].
+    pub farthest: f64,
+}
+
+impl Sizes {
+    /// What one part in a thousand of is a small change of a quantity.
+    pub fn of(&self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::Stiffness => self.torque / self.error,
+            Quantity::Damping | Quantity::BackEmf | Quantity::Viscous => self.torque / self.speed,
+            Quantity::Coulomb | Quantity::Stribeck | Quantity::Offset => self.torque,
+            Quantity::Armature => self.inertia,
+            Quantity::CommandDelay | Quantity::LoopDelay => self.error / self.speed,
+            Quantity::Slowness => 1.0 / self.speed,
+            Quantity::TorqueLimit => 1.0 / self.torque,
+            Quantity::LoadFriction => 1.0,
+            Quantity::Bias => self.error,
+        }
+    }
+}
+
+/// What a machine is beside its unknowns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    pub kind: DriveKind,
+    /// Supply at which torques hold [V].
+    pub supply: Option<f64>,
+    pub joints: usize,
+    /// vs of each joint [rad/s].
+    pub stribeck_speed: Vec<f64>,
+    /// Numbers that are held: effects that are written smaller than they were estimated.
+    pub held: Vec<(Unknown, f64)>,
+}
+
+impl Frame {
+    /// The law with these values of the unknowns; what is no unknown is absent.
+    pub fn law(&self, unknowns: &[Unknown], values: &[f64]) -> MachineLaw {
+        let none = JointLaw {
+            stiffness: 1.0,
+            torque_max: f64::INFINITY,
+            ..JointLaw::default()
+        };
+        let mut law = MachineLaw {
+            joints: vec![none; self.joints],
+            command_delay: 0.0,
+            loop_delay: 0.0,
+            supply: self.supply,
+        };
+        for (joint, vs) in law.joints.iter_mut().zip(&self.stribeck_speed) {
+            joint.stribeck_speed = *vs;
+        }
+        let held = self.held.iter().map(|(unknown, value)| (unknown, value));
+        for (unknown, value) in unknowns.iter().zip(values).chain(held) {
+            let Some(j) = unknown.joint else {
+                match unknown.quantity {
+                    Quantity::CommandDelay => law.command_delay = *value,
+                    Quantity::LoopDelay => law.loop_delay = *value,
+                    _ => {}
+                }
+                continue;
+            };
+            let of = &mut law.joints[j];
+            match unknown.quantity {
+                Quantity::Stiffness => of.stiffness = *value,
+                Quantity::Damping => (of.damping, of.viscous) = (*value, *value),
+                Quantity::BackEmf => of.damping += value,
+                Quantity::Viscous => {
+                    of.damping += value;
+                    of.viscous = *value;
+                }
+                Quantity::Coulomb => of.coulomb = *value,
+                Quantity::Armature => of.armature = *value,
+                Quantity::Slowness => of.slowness = *value,
+                Quantity::TorqueLimit if *value > 0.0 => of.torque_max = 1.0 / value,
+                Quantity::TorqueLimit => of.torque_max = f64::INFINITY,
+                Quantity::LoadFriction => of.load_friction = *value,
+                Quantity::Stribeck => of.stribeck = *value,
+                Quantity::Bias => of.bias = *value,
+                Quantity::Offset => of.offset = *value,
+                Quantity::CommandDelay => law.command_delay = *value,
+                Quantity::LoopDelay => law.loop_delay = *value,
+            }
+        }
+        if let DriveKind::Volts(firmware) = self.kind
+            && let (Some(gain), Some(duty)) = (firmware.gain, firmware.duty_max)
+        {
+            for of in &mut law.joints {
+                of.torque_max = of.torque_max.min(of.stiffness * duty / gain);
+            }
+        }
+        law
+    }
+}

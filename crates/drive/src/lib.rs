@@ -1,0 +1,4 @@
+//! Drives from command and encoder.
+#![forbid(unsafe_code)]
+
+pub mod drive;
