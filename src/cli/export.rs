@@ -238,6 +238,25 @@ fn source(path: &Path) -> Result<ReadFile<(String, RobotFile)>, CliError> {
     })
 }
 
+/// Refuses a file beside a URDF that no export has written: a robot file of the same stem, say.
+fn not_of_others(urdf: &Path, side: &Path) -> Result<(), CliError> {
+    let other = std::fs::read(side).is_ok_and(|bytes| {
+        let text = String::from_utf8_lossy(&bytes);
+        !text
+            .lines()
+            .any(|line| line.starts_with(export::urdf::SIDE))
+    });
+    if !other {
+        return Ok(());
+    }
+    let [urdf, side] = [urdf, side].map(|path| path.display());
+    let text =
+        format!("{side} is there already, and it is no file that belongs to an exported URDF");
+    Err(CliError::output(text).hint(format!(
+        "the export writes it beside {urdf}: give the URDF another name, or move {side}"
+    )))
+}
+
 /// What the controller calls joints that the model calls otherwise.
 fn controller_names(file: &ModelFile) -> BTreeMap<String, String> {
     let joints = file.robot.log.joint.iter();
@@ -262,6 +281,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs = paths_of(&args.logs).chain([&*args.model]);
     let sources = args.urdf_source.iter().chain(&args.mjcf_source);
     context.check_outputs(inputs.chain(sources.map(|path| &**path)), outputs)?;
+    if let (Some(urdf), Some(side)) = (&args.urdf, &side) {
+        not_of_others(urdf, side)?;
+    }
     let given = files::model(&args.model, context)?;
     for effect in &given.value.file.effects {
         if let (Some(reason), false) = (no_torque(&effect.name), args.without_effects) {

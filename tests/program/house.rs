@@ -28,9 +28,9 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     ("open_loop", "explain math number robot motion effect"),
     ("drive", "explain number verdict robot log"),
-    ("friction", "explain math robot block motion verdict"),
-    ("inertia", "explain math robot block motion verdict"),
     ("judge", "math"),
+    ("friction", "explain math robot block motion verdict"),
+    ("inertia", "explain math robot block motion verdict judge"),
     (
         "diagnose",
         "explain math number robot block motion effect judge",

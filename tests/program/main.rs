@@ -48,6 +48,7 @@ mod mixed_rates;
 mod new_any_log;
 mod one_joint_logs;
 mod pipeline;
+mod printed_is_written;
 mod reduced;
 mod report;
 mod rests;

@@ -16,6 +16,7 @@ use super::slope::{open_above, profile_slope};
 use super::smoothing::{add_choices, bands};
 use super::start::{FilterStart, constant_inertia, from_log};
 use super::thinned::thinned;
+use crate::math::descent::Ending;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
 
@@ -91,7 +92,7 @@ pub fn estimate(
         maximum = one;
     }
     let Some(inputs) = inputs else {
-        return Ok(assemble(names, prepared, maximum, speeds));
+        return judged(joint, assemble(names, prepared, maximum, speeds));
     };
     let mut cutoffs = vec![f64::INFINITY; inputs.robot.joints()];
     let mut banded = None;
@@ -109,6 +110,29 @@ pub fn estimate(
     }
     let mut e = assemble(names, prepared, maximum, speeds);
     e.cutoffs = cutoffs;
+    judged(joint, e)
+}
+
+/// Refuses a law that explains nothing or drives the joint; what a search that did not converge left is not identified.
+fn judged(joint: &str, mut e: JointEstimate) -> Result<JointEstimate, FrictionError> {
+    let joint = joint.to_owned();
+    let without = e.without_law.min(1.0);
+    if e.relative_error >= without {
+        let [left, without] = [e.relative_error, without].map(|x| 100.0 * x);
+        return Err(FrictionError::ExplainsNothing {
+            joint,
+            left,
+            without,
+        });
+    }
+    if e.power() <= 0.0 {
+        return Err(FrictionError::Drives { joint });
+    }
+    if e.ending != Ending::Converged {
+        for value in &mut e.values {
+            value.verdict = Verdict::NotIdentifiable;
+        }
+    }
     Ok(e)
 }
 
@@ -127,7 +151,8 @@ fn assemble(
     covariance[1][1] += departure(prepared, p, &|v| law.torque(v));
     let [_, fastest] = speeds.covered;
     let next = fastest + (BEYOND - 1.0) * fastest / BEYOND_STEPS as f64;
-    let (rmse, relative_error) = residual(prepared, p, &law);
+    let (rmse, relative_error) = residual(prepared, p, &|v| law.torque(v));
+    let (_, without_law) = residual(prepared, p, &|_| 0.0);
     let s = &maximum.score;
     let half = 1.96 * (2.0 / s.windows.max(1) as f64).sqrt();
     JointEstimate {
@@ -149,6 +174,7 @@ fn assemble(
         },
         rmse,
         relative_error,
+        without_law,
         samples: problem.samples(),
         starts: maximum.starts,
         ending: maximum.ending,
@@ -256,8 +282,8 @@ pub fn curve_std(law: &DoubleTanh, covariance: &[[f64; FRICTION]; FRICTION], v: 
     variance.max(0.0).sqrt()
 }
 
-/// Residual torque along the smoothed motion.
-fn residual(prepared: &Prepared, p: &[f64], law: &DoubleTanh) -> (f64, f64) {
+/// Residual torque along the smoothed motion under a law of friction, and the same over the torque.
+fn residual(prepared: &Prepared, p: &[f64], law: &dyn Fn(f64) -> f64) -> (f64, f64) {
     let problem = &prepared.problem;
     let (eta, e) = (&p[FRICTION..], problem.nuisance);
     let (mut square, mut torque, mut n) = (0.0, 0.0, 0usize);
@@ -269,7 +295,7 @@ fn residual(prepared: &Prepared, p: &[f64], law: &DoubleTanh) -> (f64, f64) {
             let row = k * e..(k + 1) * e;
             let known = record.m[row.clone()].iter().zip(&record.h[row]).zip(eta);
             let known: f64 = known.map(|((m, h), x)| (m * a + h) * x).sum();
-            let d = record.tau[k] - known - law.torque(v);
+            let d = record.tau[k] - known - law(v);
             square += d * d;
             torque += record.tau[k] * record.tau[k];
             n += 1;

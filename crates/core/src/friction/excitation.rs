@@ -52,6 +52,20 @@ pub enum FrictionError {
         "inspect the log's torque and position channels"
     )]
     NoEstimate { joint: String },
+    #[explain(
+        "the friction law of joint {joint} explains nothing: it leaves {left:.0} % of the torque, and no friction at all {without:.0} %",
+        "check the torque channel, its unit and sign, and the velocities; log slow reversals with torques well above their noise"
+    )]
+    ExplainsNothing {
+        joint: String,
+        left: f64,
+        without: f64,
+    },
+    #[explain(
+        "the friction of joint {joint} comes out below zero: over the speeds covered it drives the joint",
+        "check the sign of the torque or the position; a torque that gravity or a spring holds against the friction does the same"
+    )]
+    Drives { joint: String },
 }
 
 /// Share of its range that a joint must travel to count as moving.

@@ -102,6 +102,9 @@ pub struct JointEstimate {
     pub rmse: f64,
     /// The same relative to the torque.
     pub relative_error: f64,
+    /// The same with no friction at all.
+    #[serde(skip)]
+    pub without_law: f64,
     pub samples: usize,
     /// Cut-offs of the other joints' accelerations [Hz], one per joint; infinite where only the position filter acts.
     #[serde(skip)]
@@ -116,6 +119,19 @@ impl JointEstimate {
     pub fn cancels(&self) -> bool {
         let (one, two) = (self.law.coulomb_1, self.law.coulomb_2);
         one.abs() + two.abs() > CANCEL * (one + two).abs()
+    }
+
+    /// Power that the friction takes from the joint, in the mean over the curve [W].
+    pub fn power(&self) -> f64 {
+        let power = self.curve.iter().map(|p| p.v * p.torque);
+        power.sum::<f64>() / self.curve.len().max(1) as f64
+    }
+
+    /// The slowest speed covered at which the friction drives the joint, beyond its 95 % band.
+    pub fn drives_at(&self) -> Option<f64> {
+        let below = |p: &&FrictionCurvePoint| p.torque * p.v.signum() < -1.96 * p.std;
+        let speeds = self.curve.iter().filter(below).map(|p| p.v);
+        speeds.min_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
     /// Half the 95 % band of the curve over its torque, the largest over the speeds covered.

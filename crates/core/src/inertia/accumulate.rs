@@ -19,6 +19,8 @@ const MOST_BLOCKS: usize = 512;
 /// One block of time: the R factor of each joint's rows.
 #[derive(Debug, Clone, Default)]
 pub struct BlockFactor {
+    /// Of the logs that were merged.
+    pub log: usize,
     /// Uninterrupted stretch that the block belongs to; correlation ends at its borders.
     pub stretch: usize,
     /// Times of the first and the last row [s]; equal where they are not known.
@@ -201,7 +203,10 @@ impl Accumulator {
 }
 
 /// Several triangles, one under the other.
-fn stacked<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize) -> RFactor {
+pub(super) fn stacked<'a>(
+    parts: impl IntoIterator<Item = &'a DMatrix<f64>>,
+    columns: usize,
+) -> RFactor {
     let mut factor = RFactor::new(columns);
     for part in parts {
         factor.fold(part.transpose().as_slice());
@@ -256,8 +261,10 @@ impl BlockFactors {
     /// Joins the block factors of another set of logs with the same columns; stretches stay apart.
     pub fn merge(&mut self, other: BlockFactors) {
         let shift = self.blocks.last().map_or(0, |b| b.stretch + 1);
+        let logs = self.blocks.last().map_or(0, |b| b.log + 1);
         self.blocks.extend(other.blocks.into_iter().map(|mut b| {
             b.stretch += shift;
+            b.log += logs;
             for part in b.scores.iter_mut().flat_map(|s| &mut s.blocks) {
                 part.stretch += shift;
             }
@@ -317,6 +324,7 @@ impl BlockFactors {
             each.map(|(r, places)| r.select_columns(places)).collect()
         };
         let blocks = self.blocks.iter().map(|b| BlockFactor {
+            log: b.log,
             stretch: b.stretch,
             span: b.span,
             rows: b.rows,

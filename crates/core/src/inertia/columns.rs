@@ -23,6 +23,8 @@ pub enum Own {
     Law(usize),
     /// What the torque changes over a sample: a torque that is logged late or early, in samples.
     TorqueRate,
+    /// What that rate changes over a sample: a drive that gives way under its torque, in samples squared.
+    TorqueBend,
 }
 
 impl Own {
@@ -34,6 +36,7 @@ impl Own {
             Own::Offset => "offset",
             Own::Law(k) => DoubleTanh::NAMES[k],
             Own::TorqueRate => "torque rate",
+            Own::TorqueBend => "torque bend",
         }
     }
 
@@ -45,7 +48,7 @@ impl Own {
             Own::Coulomb => sign(v),
             Own::Offset => 1.0,
             Own::Saturating(slope) => (slope * v).tanh(),
-            Own::Law(_) | Own::TorqueRate => 0.0,
+            Own::Law(_) | Own::TorqueRate | Own::TorqueBend => 0.0,
         }
     }
 }
@@ -259,11 +262,11 @@ impl RegressorColumns {
         }
     }
 
-    /// The same columns with a torque's rate of its own for each joint, the last of its own terms.
+    /// The same columns with a torque's rate and its bend for each joint, the last two of its own terms.
     pub fn with_torque_rates(&self) -> RegressorColumns {
         let mut columns = self.clone();
         for own in &mut columns.own {
-            own.push(Own::TorqueRate);
+            own.extend([Own::TorqueRate, Own::TorqueBend]);
         }
         columns
     }
@@ -271,15 +274,17 @@ impl RegressorColumns {
     /// Whether these are columns [`Self::with_torque_rates`].
     pub fn have_torque_rates(&self) -> bool {
         let mut own = self.own.iter();
-        own.any(|own| own.last() == Some(&Own::TorqueRate))
+        own.any(|own| own.last() == Some(&Own::TorqueBend))
     }
 
-    /// Fills in what the torques change over a sample.
+    /// Fills in what the torques and their rates change over a sample.
     pub(super) fn fill_torque_rates(&self, sample: &MotionSample<'_>, out: &mut [f64]) {
         for (j, own) in self.own.iter().enumerate() {
-            if own.last() == Some(&Own::TorqueRate) {
+            if own.last() == Some(&Own::TorqueBend) {
                 let [before, after] = sample.tau_beside.map(|tau| tau[j]);
-                out[self.offset(j) + self.unknowns_of(j) - 1] = (after - before) / 2.0;
+                let end = self.offset(j) + self.unknowns_of(j);
+                out[end - 2] = (after - before) / 2.0;
+                out[end - 1] = after - 2.0 * sample.tau[j] + before;
             }
         }
     }

@@ -1,11 +1,14 @@
 //! Stretches of a log in which several joints leave many times their usual residual: something pushes the robot there.
+//!
+//! The blocks that are looked at are not fitted, so a motion that the others do not have leaves more for the parameters'
+//! own uncertainty: a residual counts beside what the fit of the others can say of the block.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::{BlockFactor, BlockFactors};
 use super::columns::Own;
 use super::solution::FitError;
-use super::solve::{Weighting, fit};
+use super::solve::{Fit, Weighting, fit};
 
 /// Numbers that decide what a jump is.
 struct Limits {
@@ -56,8 +59,9 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
             blocks: std::mem::take(&mut kept),
             ..factors.without_blocks()
         };
-        theta = fit(&part, Weighting::Wls)?.theta;
-        (ratios, usual) = over_median(factors, &blocks, &theta);
+        let found = fit(&part, Weighting::Wls)?;
+        (ratios, usual) = over_usual(factors, &blocks, &found);
+        theta = found.theta;
         if round == LIMITS.rounds {
             break;
         }
@@ -89,31 +93,44 @@ fn coulomb(factors: &BlockFactors, theta: &DVector<f64>, j: usize) -> f64 {
     at.map_or(0.0, |at| theta[factors.columns.first_own(j) + at].abs())
 }
 
-/// Rms residual of each block and joint over the joint's median, 0 where it does not move; and the medians.
-fn over_median(
+/// Rms residual of each block and joint over what is usual, the joint's median together with the uncertainty of the fit
+/// in the block; 0 where the joint does not move. And the medians.
+fn over_usual(
     factors: &BlockFactors,
     blocks: &[&BlockFactor],
-    theta: &DVector<f64>,
+    fit: &Fit,
 ) -> (Vec<Vec<f64>>, Vec<f64>) {
     let n = factors.columns.joints;
     let mut all = vec![vec![0.0; n]; blocks.len()];
     let mut usual = vec![0.0; n];
     for j in 0..n {
-        let own = factors.own_unknowns(theta, j);
+        let own = factors.own_unknowns(&fit.theta, j);
+        let place = |c: usize| factors.columns.unknown(j, c);
+        let covariance = DMatrix::from_fn(own.len(), own.len(), |a, b| {
+            fit.covariance[(place(a), place(b))]
+        });
         let mut seen = Vec::with_capacity(blocks.len());
-        for (block, out) in blocks.iter().zip(&mut all) {
+        let mut uncertain = vec![0.0; blocks.len()];
+        for ((block, out), uncertain) in blocks.iter().zip(&mut all).zip(&mut uncertain) {
             let r = &block.r[j];
             if r.iter().all(|x| *x == 0.0) {
                 continue;
             }
-            let square = factors.parts(r, j).residual_square(&own);
-            out[j] = (square / block.rows.max(1) as f64).sqrt();
+            let parts = factors.parts(r, j);
+            let rows = block.rows.max(1) as f64;
+            out[j] = (parts.residual_square(&own) / rows).sqrt();
+            *uncertain = (parts.x * &covariance)
+                .component_mul(&parts.x)
+                .sum()
+                .max(0.0)
+                / rows;
             seen.push(out[j]);
         }
         seen.sort_by(f64::total_cmp);
         let median = seen.get(seen.len() / 2).copied().unwrap_or(0.0);
-        for out in &mut all {
-            out[j] = if median > 0.0 { out[j] / median } else { 0.0 };
+        for (out, uncertain) in all.iter_mut().zip(uncertain) {
+            let usual = median.hypot(uncertain.sqrt());
+            out[j] = if usual > 0.0 { out[j] / usual } else { 0.0 };
         }
         usual[j] = median;
     }

@@ -1,11 +1,15 @@
-//! What a torque that is logged late or early changes in a fit.
+//! What a torque that is logged late, and a drive that gives way, change in a fit.
 //!
 //! A controller sets a torque, holds it and logs it at times of its own: a row's torque is of its position to within a
 //! step or so. Late by d it is tau - d tau', and friction's part of tau' is viscous friction times an acceleration: half
 //! a millisecond takes two percent off a light joint's inertia, and its residual hardly shows. The rate of each joint's
 //! torque as one more column shows how late the rows let it be; a fit without that column is wrong by as much.
+//!
+//! A drive of stiffness k that is read at its motor stands tau / k before its link, whose inertia M then asks for
+//! M tau'' / k less: tau'' over the square of the joint's frequency with its motor held. The bend of each torque as another
+//! column shows how soft the rows let the drive be.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
 use super::columns::Own;
@@ -15,16 +19,24 @@ use super::solve::{Fit, weights_of};
 /// Standard deviation of a delay beforehand, in samples: a command is logged with the position before or after it.
 const DELAY_SAMPLES: f64 = 0.5;
 
+/// Standard deviation of a drive's compliance beforehand, as 1 / frequency squared with its motor held: gears of arms
+/// lie at 10 to 40 Hz. Half the frequency: stiff arms hold no inertia any more; twice: soft ones are sure of a wrong one.
+const SOFT_HZ: f64 = 20.0;
+
 /// The rows of columns [`with_torque_rates`](super::columns::RegressorColumns::with_torque_rates) without the rates.
 pub fn without_rates(sums: &BlockFactors) -> BlockFactors {
-    sums.with_own(&sums.columns.places(|own| *own != Own::TorqueRate))
+    let own = |own: &Own| !matches!(own, Own::TorqueRate | Own::TorqueBend);
+    sums.with_own(&sums.columns.places(own))
 }
 
-/// Adds to a fit's covariance the second moment of what delays change in it: their mean and scatter by `sums`, rows with
-/// the rates, and what is known of them before. Nothing where the rows determine no fit.
-pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
+/// Adds to a fit's covariance the second moment of what delays and soft drives change in it: their mean and scatter by
+/// `sums`, rows with the rates, and what is known of them before. `step` is that of the samples \[s\]. Nothing where the
+/// rows determine no fit.
+pub fn widen_by_delay(sums: &BlockFactors, step: f64, fit: &mut Fit) -> Option<()> {
     let columns = &sums.columns;
-    let (n, u) = (columns.joints, fit.theta.len());
+    let (joints, u) = (columns.joints, fit.theta.len());
+    let n = 2 * joints;
+    let softness = (std::f64::consts::TAU * SOFT_HZ * step).powi(-2);
     let correlated = fit.rows as f64 / fit.effective_rows.max(1.0);
     let weights = weights_of(sums, &fit.residual_std);
     let mut equations = NormalEquations::of(u + n);
@@ -32,9 +44,9 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
         let own = columns.unknowns_of(j);
         // the rates stand behind all other unknowns
         let place = |c: usize| match c {
-            c if c == own - 1 => u + j,
+            c if c + 2 >= own => u + 2 * j + (c + 2 - own),
             c if c < columns.shared => c,
-            c => columns.unknown(j, c) - j,
+            c => columns.unknown(j, c) - 2 * j,
         };
         let rows = sums.parts(&sums.joint(j), j).products();
         equations.add(&place, *weight, &rows);
@@ -45,10 +57,21 @@ pub fn widen_by_delay(sums: &BlockFactors, fit: &mut Fit) -> Option<()> {
     let by_delay = &inverse * &cross;
     let score = target.rows(u, n) - cross.tr_mul(&(&inverse * target.rows(0, u)));
     let known = (normal.view((u, u), (n, n)) - cross.tr_mul(&by_delay)) / correlated;
-    let scatter = (known + DMatrix::identity(n, n) / DELAY_SAMPLES.powi(2))
+    let before = DVector::from_fn(n, |k, _| match k % 2 {
+        0 => DELAY_SAMPLES.powi(-2),
+        _ => softness.powi(-2),
+    });
+    let scatter = (known + DMatrix::from_diagonal(&before))
         .cholesky()?
         .inverse();
-    let mean = &scatter * score / correlated;
+    let mut mean = &scatter * score / correlated;
+    let mut scatter = scatter;
+    // what a drive gives way is below zero, and of a stiff one nothing: only what the rows show of it counts
+    for k in (1..n).step_by(2) {
+        mean[k] = mean[k].min(0.0);
+        scatter.row_mut(k).fill(0.0);
+        scatter.column_mut(k).fill(0.0);
+    }
     fit.covariance += &by_delay * (scatter + &mean * mean.transpose()) * by_delay.transpose();
     Some(())
 }
@@ -87,7 +110,8 @@ mod tests {
             let (v, a) = motion(k * STEP);
             let rate = (torque(k + 1.0) - torque(k - 1.0)) / 2.0;
             plain.add(0, STEP, &[a, v, torque(k), torque(k)]);
-            with.add(0, STEP, &[a, v, rate, torque(k), torque(k)]);
+            let bend = torque(k + 1.0) - 2.0 * torque(k) + torque(k - 1.0);
+            with.add(0, STEP, &[a, v, rate, bend, torque(k), torque(k)]);
         }
         let with = with.finish();
         let mut found = fit(&plain.finish(), Weighting::Wls).unwrap();
@@ -95,7 +119,7 @@ mod tests {
         assert!((&same.theta - &found.theta).amax() < 1e-12);
         let error = |fit: &Fit| (fit.theta[0] - TRUE[0]) / fit.covariance[(0, 0)].sqrt();
         let before = error(&found);
-        widen_by_delay(&with, &mut found).unwrap();
+        widen_by_delay(&with, STEP, &mut found).unwrap();
         let blind = TRUE[1] * DELAY_SAMPLES * STEP;
         [
             before,

@@ -23,6 +23,7 @@ pub mod instruments;
 pub mod jumps;
 pub mod late;
 pub mod law_start;
+pub mod left_out;
 pub mod refine;
 pub mod robust;
 pub mod scores;

@@ -40,6 +40,12 @@ pub struct CutoffCost {
     pub smear: f64,
     /// By the noise of the positions that it lets through.
     pub noise: f64,
+    /// Interval over which that noise is even, as the rounding of an encoder of such steps \[m or rad\].
+    #[serde(default)]
+    pub step: f64,
+    /// Share of the mean square of the filtered acceleration that it makes.
+    #[serde(default)]
+    pub share: f64,
 }
 
 impl CutoffCost {
@@ -69,6 +75,10 @@ struct Squares {
     /// By the narrower filter, which takes noise too.
     change: f64,
     noise: f64,
+    /// Of the noise's interval, of the acceleration that it makes and of the whole.
+    step: f64,
+    shaken: f64,
+    acceleration: f64,
     rows: usize,
 }
 
@@ -157,6 +167,11 @@ impl<'a> CutoffTrial<'a> {
             cutoff_hz: *cutoff_hz,
             smear: ((s.change - s.noise).max(0.0) / s.rows as f64).sqrt(),
             noise: (s.noise / s.rows as f64).sqrt(),
+            step: (s.step / s.rows as f64).sqrt(),
+            share: match s.acceleration > 0.0 {
+                true => s.shaken / s.acceleration,
+                false => 0.0,
+            },
         };
         let of_joint = |squares: &Vec<Squares>| {
             let pairs = self.cutoffs_hz.iter().zip(squares);
@@ -232,10 +247,15 @@ impl OneJoint<'_> {
         let smear = channel(&|k| here[k] - f(again[k]));
         let more = channel(&|k| f(v[k] + level * noise_v[k]) - here[k]);
         let less = channel(&|k| f(v[k] - level * noise_v[k]) - here[k]);
-        let rows = design.run(&[&smear, &more, &less])?;
+        let shaken = channel(&|k| level * noise_a[k]);
+        let acceleration = channel(&|k| a[k]);
+        let rows = design.run(&[&smear, &more, &less, &shaken, &acceleration])?;
         for (row, _) in moves.iter().enumerate().filter(|(_, moves)| **moves) {
             sum.change += rows[0][row].powi(2);
             sum.noise += 0.5 * (rows[1][row].powi(2) + rows[2][row].powi(2));
+            sum.step += level * level;
+            sum.shaken += rows[3][row].powi(2);
+            sum.acceleration += rows[4][row].powi(2);
             sum.rows += 1;
         }
         Ok(())

@@ -217,6 +217,9 @@ fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<
     Ok(())
 }
 
+/// What tells a file beside a URDF from any other.
+pub const SIDE: &str = "# What the URDF cannot hold:";
+
 /// A model file that takes links and inertials from the URDF beside it.
 fn side_file(
     file: &ModelFile,
@@ -253,7 +256,7 @@ fn side_file(
         });
     }
     Ok(format!(
-        "{}# What the URDF cannot hold: drive inertias, couplings, friction, offsets. A model file: give\n\
+        "{}{SIDE} drive inertias, couplings, friction, offsets. A model file: give\n\
          # it as -m; links and inertials are read from the URDF beside it.\n\n{}",
         hashed(notes),
         side.sections()?

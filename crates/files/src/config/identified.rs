@@ -119,7 +119,9 @@ impl ModelFile {
         })
     }
 
-    /// Covariance in the order of [`Model::parameters`], row-major; 0 where unknown.
+    /// Second moments, in the order of [`Model::parameters`], of what the parameters in use are off the true ones: the
+    /// covariance of the estimates, and what a model that predicts with other numbers is off those. Row-major; 0 where
+    /// unknown.
     pub fn model_covariance(&self, model: &Model) -> Vec<f64> {
         let (inertial, joints) = (model.robot.parameters(), model.robot.joint_names());
         let mut keys: Vec<String> = inertial.iter().map(|p| p.name.to_string()).collect();
@@ -132,7 +134,25 @@ impl ModelFile {
             keys.extend(names.iter().map(|n| format!("{n}:{joint}")));
         }
         keys.extend(joints.iter().map(|j| format!("offset:{j}")));
-        self.covariance_of(&keys)
+        let mut moments = self.estimated_covariance_of(&keys);
+        let off: Vec<f64> = keys.iter().map(|key| self.off_estimate(key)).collect();
+        for (row, a) in moments.chunks_exact_mut(keys.len().max(1)).zip(&off) {
+            row.iter_mut().zip(&off).for_each(|(x, b)| *x += a * b);
+        }
+        moments
+    }
+
+    /// What the parameter of a key in use is off its estimate, where one stands beside it.
+    fn off_estimate(&self, key: &str) -> f64 {
+        let estimate = self.estimates.iter().find(|e| match &e.joint {
+            Some(joint) => key.strip_suffix(joint.as_str()) == Some(&format!("{}:", e.name)),
+            None => e.name == key,
+        });
+        let parameter = self.parameters.iter().find(|p| p.key() == key);
+        let pair = parameter.zip(estimate);
+        pair.map_or(0.0, |(parameter, estimate)| {
+            parameter.in_use() - estimate.value
+        })
     }
 
     /// Puts a joint's friction parameters in place of those that the file has of it, of which the covariance

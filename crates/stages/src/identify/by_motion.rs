@@ -94,14 +94,7 @@ pub(super) fn by_motion(
     let errors = errors.validation.errors.joints.into_iter();
     for (j, (joint, error)) in found.joints.iter_mut().zip(errors).enumerate() {
         found.fit.residual_std[j] *= error.rmse / joint.rmse;
-        *joint = JointResidual {
-            joint: error.joint,
-            unit: error.unit,
-            rmse: error.rmse,
-            relative_error: error.relative_error,
-            relative_error_moving: error.relative_error_moving,
-            relative_error_rest: error.relative_error_rest,
-        };
+        *joint = JointResidual::of(error);
     }
     let file = found.model(machine, None);
     let smoothed = machine.smoothed_as(&found.position_cutoffs);

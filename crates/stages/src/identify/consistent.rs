@@ -8,14 +8,15 @@ use serde::Serialize;
 use super::error::IdentifyError;
 use super::estimate::Estimated;
 use super::logged_robot::LoggedRobot;
-use super::residual::RelativeError;
 use cft_ident_core::inertia::columns::{Own, RegressorColumns};
 use cft_ident_core::inertia::feasible::{
-    ConsistencyProblem, Feasible, FrictionColumns, PRIOR_WEIGHT, with_friction,
+    ConsistencyProblem, Feasible, FrictionColumns, PRIOR_WEIGHT, feasible,
 };
+use cft_ident_core::inertia::left_out::{FitsOnLeftOut, LeftOut, left_out};
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
 use cft_ident_core::math::covariance::information_rows;
 use cft_ident_core::math::descent::Ending;
+use cft_ident_core::number;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::bodies::StandardMap;
 use cft_ident_core::robot::standard::{Body, STANDARD, pseudo_inertia};
@@ -27,12 +28,15 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 pub struct ConsistentLinks {
     pub links: Vec<ConsistentLink>,
     pub drives: Vec<DriveInertia>,
-    /// Residual of the free fit.
-    pub relative_error_before: Vec<RelativeError>,
-    /// Residual of the consistent one.
-    pub relative_error_after: Vec<RelativeError>,
+    /// Whether the model computes torques with them, and not with the plain fit.
+    pub in_use: bool,
+    /// What both fits leave on blocks left out; nothing where the fit is not linear in its rows, or they are too few.
+    pub left_out: Vec<LeftOutResidual>,
     /// Weight of the prior beside the rows.
     pub prior_weight: f64,
+    /// Most by which the weighted sum of squares is above its least over all physically consistent parameters, over
+    /// itself.
+    pub duality_gap: f64,
     pub iterations: usize,
     pub status: Ending,
     /// Links whose mass properties in the robot file no body can have, so that a plain body stands for them.
@@ -43,6 +47,16 @@ pub struct ConsistentLinks {
     /// How much the residual of each joint grows.
     #[serde(skip)]
     growth: Vec<f64>,
+}
+
+/// What both fits leave of a joint's torque on blocks left out, fractions.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LeftOutResidual {
+    pub joint: String,
+    pub consistent: f64,
+    pub unconstrained: f64,
+    /// The consistent one leaves more, by more than chance.
+    pub worse: bool,
 }
 
 /// A link that can exist.
@@ -166,26 +180,39 @@ pub(super) fn consistent(
     let u = fit.theta.len();
     let towards = rows.columns(0, u) * (&fit.theta - &basis.shift);
     rows.set_column(u, &towards);
+    let friction = friction_of(&basis.sums.columns, fastest);
     let task = ConsistencyProblem {
         map: &map,
         bodies: &bodies,
         factor: &rows,
         effective: fit.effective_rows / fit.rows as f64,
+        friction: &friction,
     };
-    let found = with_friction(&task, &friction_of(&basis.sums.columns, fastest))?;
-    // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
+    let found = feasible(&task)?;
+    // parts that determine no fit by themselves are not tried
+    let tried = left_out(&basis.sums, &basis.parts, &weights, &task)
+        .ok()
+        .flatten();
     let bound = residual_of(&basis.sums, &found.theta)?;
     let growth = |(free, bound): (&f64, &f64)| if *free > 0.0 { bound / free } else { 1.0 };
     let growth: Vec<f64> = free.iter().zip(&bound).map(growth).collect();
-    let before: Vec<f64> = fit.relative_error.iter().map(|e| e.all).collect();
-    let after: Vec<f64> = before.iter().zip(&growth).map(|(e, g)| e * g).collect();
+    let squares: f64 = growth.iter().map(|g| g * g * fit.effective_rows).sum();
     let (links, drives) = links_and_drives(&machine.robot, &map, &found);
+    let names = machine.robot.joint_names().iter();
+    let residual = |(joint, of): (&String, &LeftOut)| LeftOutResidual {
+        joint: joint.clone(),
+        consistent: of.consistent,
+        unconstrained: of.plain,
+        worse: of.costs,
+    };
+    let joints = tried.iter().flat_map(|tried| &tried.joints);
     Ok(ConsistentLinks {
         links,
         drives,
-        relative_error_before: RelativeError::each(machine, &before),
-        relative_error_after: RelativeError::each(machine, &after),
+        in_use: !tried.as_ref().is_some_and(FitsOnLeftOut::plain_is_better),
+        left_out: names.zip(joints).map(residual).collect(),
         prior_weight: PRIOR_WEIGHT,
+        duality_gap: found.gap / squares.max(f64::MIN_POSITIVE),
         iterations: found.iterations,
         status: found.ending,
         impossible_priors: impossible(&map, &bodies, &found.given),
@@ -221,16 +248,47 @@ impl ConsistentLinks {
             ));
         }
         if self.status == Ending::IterationLimit {
-            out.push(
-                "the search for physically consistent links did not settle; its last result stands"
-                    .into(),
-            );
+            out.push(format!(
+                "the search for physically consistent links ended before its optimum: the duality gap is {} of the sum of squares",
+                number::percent(self.duality_gap)
+            ));
         }
+        out.extend(self.worse_on_left_out());
         out
+    }
+
+    /// Joints whose torque physically consistent parameters fit worse by more than chance: a finding about the machine.
+    fn worse_on_left_out(&self) -> Option<String> {
+        let worse: Vec<String> = self
+            .left_out
+            .iter()
+            .filter(|of| of.worse)
+            .map(|of| {
+                let [consistent, plain] = [of.consistent, of.unconstrained].map(number::percent);
+                format!("{} {consistent} (unconstrained {plain})", of.joint)
+            })
+            .collect();
+        let then = match self.in_use {
+            _ if worse.is_empty() => return None,
+            true => {
+                "the model computes with the physically consistent parameters; --unconstrained writes the plain fit alone"
+            }
+            false => {
+                "the model computes with the plain fit, which is better on other logs too; files of links are exported from the physically consistent parameters"
+            }
+        };
+        Some(format!(
+            "no physically consistent parameters fit these torques as well as unconstrained ones, on blocks left out of both fits: {}. The gain of a torque channel is wrong, the robot file lacks a body or a drive, or what is logged is no torque of the joint; {then}",
+            worse.join(", ")
+        ))
     }
 
     /// Writes the parameters beside those of a model whose first ones are the unknowns of the fit.
     pub(super) fn write_into(&self, model: &mut ModelFile) {
+        write(&self.links, &self.drives, model);
+        if !self.in_use {
+            return;
+        }
         for (p, value) in model.parameters.iter_mut().zip(&self.values) {
             p.consistent = Some(*value);
         }
@@ -240,7 +298,6 @@ impl ConsistentLinks {
                 *std *= growth;
             }
         }
-        write(&self.links, &self.drives, model);
     }
 }
 
@@ -330,8 +387,9 @@ fn project_in(
         bodies: &bodies(&model.robot, &map),
         factor: &rows,
         effective: 1.0,
+        friction: &friction,
     };
-    let found = with_friction(&task, &friction)?;
+    let found = feasible(&task)?;
     if !found.theta.iter().all(|x| x.is_finite()) {
         return Ok(());
     }

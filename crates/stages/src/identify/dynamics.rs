@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::consistent::ConsistentLinks;
 use super::estimate::Account;
-use super::gains::Gain;
+use super::gains::{Gain, LSQ_WITH_GAINS};
 use super::hold_out::Held;
 use super::known_friction::FrictionOfFit;
 use super::logged_robot::LoggedRobot;
@@ -52,8 +52,11 @@ pub struct IdentifiedDynamics {
     pub samples: u64,
     /// Effective sample size, of all joints.
     pub effective_samples: f64,
-    /// Residual of the fit.
+    /// Residual of the model that is written, on the logs that were fitted, as `validate` gives it.
     pub joints: Vec<JointResidual>,
+    /// Residual of the plain fit in the rows in which each joint moves, where the model computes with physically consistent parameters.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unconstrained_residual: Vec<RelativeError>,
     /// The fit to the motion, where one was asked for; `parameters` and `joints` are its own then.
     #[serde(rename = "open_loop", skip_serializing_if = "Option::is_none")]
     pub by_motion: Option<MotionFit>,
@@ -96,7 +99,12 @@ pub struct EssentialFit {
 impl IdentifiedDynamics {
     /// The model: friction as it was known, and what was fitted, with their joint covariance.
     pub fn model(&self, machine: &LoggedRobot, friction: Option<&ModelFile>) -> ModelFile {
-        let mut model = new_model(machine, "lsq", &self.inputs);
+        let command = if self.gains.is_empty() {
+            "lsq"
+        } else {
+            LSQ_WITH_GAINS
+        };
+        let mut model = new_model(machine, command, &self.inputs);
         let estimator = self.account.estimator;
         model.provenance.estimator = (estimator != EstimatorKind::Wls).then_some(estimator);
         model.parameters = self.unknowns.iter().map(FittedUnknown::parameter).collect();

@@ -8,11 +8,11 @@ use super::error::IdentifyError;
 use super::known_friction::{of_joint, of_refinement, with_friction};
 use super::logged_robot::LoggedRobot;
 use super::passes::{Passes, PositionFilter, SimulatedLoop};
-use cft_ident_core::inertia::accumulate::BlockFactors;
+use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
 use cft_ident_core::inertia::add_processing;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::departure;
-use cft_ident_core::inertia::encoder::{GRIDS, add_scatter};
+use cft_ident_core::inertia::encoder::{add_scatter, bias};
 use cft_ident_core::inertia::feasible::nearest;
 use cft_ident_core::inertia::instruments::{self, Instrumental};
 use cft_ident_core::inertia::late;
@@ -94,6 +94,8 @@ pub struct Estimated {
     pub fit: Fit,
     /// Covariance of the unknowns and of the known friction of each joint, in this order.
     pub covariance: DMatrix<f64>,
+    /// What noise of the positions makes of the unknowns, where that is known.
+    pub bias: Option<DVector<f64>>,
     pub basis: Basis,
     pub account: Account,
 }
@@ -101,8 +103,21 @@ pub struct Estimated {
 /// The rows that the fit is about, reduced.
 pub struct Basis {
     pub sums: BlockFactors,
+    /// The same in parts that can be left out; none where the fit is not linear in its rows.
+    pub parts: Vec<BlockFactor>,
     /// What their solution lacks to the fit's parameters: a law that they are linear about.
     pub shift: DVector<f64>,
+}
+
+impl Basis {
+    /// Rows that no law shifts, of so many unknowns.
+    fn in_one_block(sums: &BlockFactors, unknowns: usize) -> Self {
+        Basis {
+            sums: sums.in_one_block(),
+            parts: Vec::new(),
+            shift: DVector::zeros(unknowns),
+        }
+    }
 }
 
 /// What turns other readings of the logs into a fit of the same kind.
@@ -142,7 +157,7 @@ impl Solver {
 }
 
 /// A fit before its uncertainty is widened, its rows, and what makes fits of the same kind of other readings.
-type Found = (Fit, BlockFactors, Solver);
+type Found = (Fit, Basis, Solver);
 
 /// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
 /// (18), which is then refined.
@@ -164,7 +179,7 @@ pub fn estimate(
         // rows weighted otherwise inform the inertias alone; the friction stays as it was refined
         columns = found.columns;
     }
-    let (mut fit, sums, solver) = match estimator {
+    let (mut fit, mut basis, solver) = match estimator {
         EstimatorKind::Oe => refined(passes, &columns, law, shown)?,
         EstimatorKind::Wls if law => refined(passes, &columns, law, shown)?,
         EstimatorKind::Irls => {
@@ -178,17 +193,21 @@ pub fn estimate(
         EstimatorKind::Ols => linear(passes, &columns, solve::Weighting::Ols)?,
         EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,
     };
-    widen(passes, &columns, &solver, &mut fit)?;
-    departure::widen_by_departure(&sums, &mut fit);
-    let (columns, shift) = match &solver {
-        Solver::Refined(refined) => (refined.columns.with_free_friction(), refined.shift()),
-        _ => (columns, DVector::zeros(fit.theta.len())),
+    let bias = widen(passes, &columns, &solver, &mut fit)?;
+    departure::widen_by_departure(&basis.sums, &mut fit);
+    let columns = match &solver {
+        Solver::Refined(refined) => {
+            basis.shift = refined.shift();
+            refined.columns.with_free_friction()
+        }
+        _ => columns,
     };
     Ok(Estimated {
         covariance: with_friction(&columns, &fit),
         columns,
         fit,
-        basis: Basis { sums, shift },
+        bias,
+        basis,
         account,
     })
 }
@@ -223,12 +242,12 @@ fn with_known_friction(
             held: [true; GRADIENT],
         };
     }
-    let shift = DVector::zeros(u);
     Ok(Estimated {
         columns,
         fit,
         covariance,
-        basis: Basis { sums, shift },
+        bias: None,
+        basis: Basis::in_one_block(&sums, u),
         account: account.clone(),
     })
 }
@@ -241,7 +260,11 @@ fn linear(
 ) -> Result<Found, IdentifyError> {
     let sums = first_reading(passes, columns)?;
     let found = fit(&sums, estimator)?;
-    Ok((found, sums.in_one_block(), Solver::Linear(estimator)))
+    let basis = Basis {
+        parts: sums.in_parts(),
+        ..Basis::in_one_block(&sums, found.theta.len())
+    };
+    Ok((found, basis, Solver::Linear(estimator)))
 }
 
 /// Rows as the robot file says, with samples at standstill where they count.
@@ -283,10 +306,10 @@ fn refined(
         false => columns.clone(),
     };
     let refined = refinement(passes, start, account)?;
-    let sums = refined.factors.in_one_block();
+    let basis = Basis::in_one_block(&refined.factors, refined.fit.theta.len());
     Ok((
         refined.fit.clone(),
-        sums,
+        basis,
         Solver::Refined(Box::new(refined)),
     ))
 }
@@ -334,7 +357,8 @@ fn robust_regression(
         down_weighted: Some(down_weighted[j]),
         ..JointAccount::default()
     });
-    Ok((fit, sums.in_one_block(), Solver::Robust(Box::new(weigher))))
+    let basis = Basis::in_one_block(&sums, fit.theta.len());
+    Ok((fit, basis, Solver::Robust(Box::new(weigher))))
 }
 
 /// The regressor along simulated positions as instruments.
@@ -371,16 +395,18 @@ fn instrumental(
     account.status = status;
     account.iterations = iterations;
     let solver = Solver::Instrumental(Box::new((fit.clone(), simulate_by)));
-    Ok((fit, sums.in_one_block(), solver))
+    let basis = Basis::in_one_block(&sums, fit.theta.len());
+    Ok((fit, basis, solver))
 }
 
-/// Adds to the uncertainty of a fit what a narrower position filter and the encoders' grid move.
+/// Adds to the uncertainty of a fit what a narrower position filter and the encoders' grid move; and what noise of the
+/// positions makes of it, where that is known.
 fn widen(
     passes: &mut Passes,
     columns: &RegressorColumns,
     solver: &Solver,
     fit: &mut Fit,
-) -> Result<(), IdentifyError> {
+) -> Result<Option<DVector<f64>>, IdentifyError> {
     passes.work.doing("uncertainty");
     let read = solver.columns(columns);
     let mut weigher = solver.weigher();
@@ -393,7 +419,7 @@ fn widen(
         Solver::Linear(_) if passes.have_torque_rates() => {
             let rates = read.with_torque_rates();
             let sums = passes.read(PositionFilter::Narrower, &rates, None)?;
-            late::widen_by_delay(&sums, fit);
+            late::widen_by_delay(&sums, passes.shortest_step(), fit);
             solver.solve(late::without_rates(&sums), None)?
         }
         _ => {
@@ -402,21 +428,21 @@ fn widen(
         }
     };
     add_processing(fit, &again);
-    if passes
-        .machine
-        .robot
-        .transmission()
-        .encoder_steps()
-        .is_some()
-    {
-        let mut shifted = Vec::new();
-        for grid in 0..GRIDS {
-            let mut weigher = solver.weigher();
-            if let Some(sums) = passes.read_shifted(read, grid, weigher.as_mut())? {
-                shifted.push(solver.solve(sums, weigher.as_ref())?);
-            }
-        }
-        add_scatter(fit, &shifted);
+    let grids = passes.machine.robot.transmission().encoder_steps();
+    let wls = matches!(solver, Solver::Linear(solve::Weighting::Wls));
+    if grids.is_none() && !wls {
+        return Ok(None);
     }
-    Ok(())
+    let mut again = Vec::new();
+    for grid in 0..passes.readings_again() {
+        let mut weigher = solver.weigher();
+        if let Some(sums) = passes.read_shifted(read, grid, weigher.as_mut())? {
+            again.push(solver.solve(sums, weigher.as_ref())?);
+        }
+    }
+    if grids.is_none() {
+        return Ok(bias(fit, &again));
+    }
+    add_scatter(fit, &again);
+    Ok(None)
 }

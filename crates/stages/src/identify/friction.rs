@@ -304,11 +304,17 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
     let mut out = Vec::new();
     if e.ending != Ending::Converged {
         out.push(format!(
-            "{joint}: the search ended without converging ({})",
+            "{joint}: the search ended without converging ({}): none of its parameters is identified",
             match e.ending {
                 Ending::IterationLimit => "at the limit of iterations",
                 _ => "it diverged",
             }
+        ));
+    }
+    if let Some(speed) = e.drives_at() {
+        out.push(format!(
+            "{joint}: at a speed of {} the friction law drives the joint, which no friction does: do not use it there",
+            number::significant(speed, 2)
         ));
     }
     let Nis {
@@ -347,6 +353,7 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
         ));
     }
     out.extend(missed_plateaus(found));
+    let settled = e.ending == Ending::Converged;
     for (k, value) in e.values.iter().enumerate() {
         match value.verdict {
             Verdict::LowerBound => out.push(format!(
@@ -354,7 +361,7 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
                 DoubleTanh::NAMES[k],
                 number::significant(value.value, 3)
             )),
-            Verdict::NotIdentifiable if !e.one_term_lacks(k) => out.push(format!(
+            Verdict::NotIdentifiable if settled && !e.one_term_lacks(k) => out.push(format!(
                 "{joint}: these data cannot determine {}; log slower reversals and more speeds",
                 DoubleTanh::NAMES[k]
             )),

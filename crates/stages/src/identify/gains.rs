@@ -22,6 +22,9 @@ use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::correction::Edit;
 use cft_ident_logs::log::{Provenance, TorqueUnit};
 
+/// The command of a model whose gains were fitted by a known load.
+pub(super) const LSQ_WITH_GAINS: &str = "lsq --fit-gains";
+
 /// A log in which the last link carries a payload.
 #[derive(Debug, Clone)]
 pub struct PayloadLog {

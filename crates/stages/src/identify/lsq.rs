@@ -24,8 +24,10 @@ use super::reduced::reduced_log::{MadeWith, ReducedLog};
 use super::repeated::each_row_once;
 use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{FittedUnknown, columns, unknowns};
+use super::validate::errors_on_fitted;
 use super::weakest::weakest;
 use cft_ident_core::inertia::accumulate::RelativeResidual;
+use cft_ident_core::inertia::encoder::correct;
 use cft_ident_core::inertia::essential::{Essential, essential};
 use cft_ident_core::inertia::gains::by_gains;
 use cft_ident_core::inertia::solution::FitError;
@@ -125,12 +127,19 @@ pub fn lsq(
         }
         false => None,
     };
+    // estimates without their bias; a model predicts best with what was fitted to positions as noisy as these
+    if let Some(bias) = estimated.bias.take() {
+        let stay = !consistent.as_ref().is_some_and(|of| of.in_use);
+        let fit = &mut estimated.fit;
+        correct(&mut fit.theta, &mut fit.covariance, &bias, stay);
+    }
     let Estimated {
         columns,
         fit,
         mut covariance,
         account,
         basis: Basis { sums, .. },
+        ..
     } = estimated;
     let u = fit.theta.len();
     covariance
@@ -193,15 +202,7 @@ pub fn lsq(
     warnings.extend(
         shown.map(|shown| format!("{shown}; take the plain number unless it was measured so")),
     );
-    let names = machine.robot.joint_names().iter().enumerate();
-    let joints = names.map(|(j, joint)| JointResidual {
-        joint: joint.clone(),
-        unit: machine.file.torque_unit(j),
-        rmse: fit.relative_error[j].rms,
-        relative_error: fit.relative_error[j].all,
-        relative_error_moving: fit.relative_error[j].moving,
-        relative_error_rest: fit.relative_error[j].rest,
-    });
+    let plain_error: Vec<f64> = fit.relative_error.iter().map(left).collect();
     let mut found = IdentifiedDynamics {
         held: Held::default(),
         by_motion: None,
@@ -214,7 +215,11 @@ pub fn lsq(
         weakest_direction: weakest(&fit, &unknowns),
         samples: fit.rows * machine.robot.joints() as u64,
         effective_samples: fit.effective_rows * machine.robot.joints() as f64,
-        joints: joints.collect(),
+        unconstrained_residual: match &consistent {
+            Some(of) if of.in_use => RelativeError::each(machine, &plain_error),
+            _ => Vec::new(),
+        },
+        joints: Vec::new(),
         friction: friction_of_fit,
         friction_prior,
         position_cutoffs,
@@ -230,9 +235,12 @@ pub fn lsq(
         warnings,
         setup: of_geometry,
     };
+    // every figure is that of the numbers that are written
+    let file = found.model(machine, friction.map(|(_, file)| file));
+    let errors = errors_on_fitted(machine, &file, logs, control)?;
+    found.joints = errors.joints.into_iter().map(JointResidual::of).collect();
     // what is set aside is looked at row by row
     if reduced.is_empty() {
-        let file = found.model(machine, friction.map(|(_, file)| file));
         let smoothed = machine.smoothed_as(&found.position_cutoffs);
         let tried = refined(&file, &machine.name)
             .and_then(|model| hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control));

@@ -8,12 +8,12 @@ use super::control::{Control, Work};
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
-use super::own_settings::OwnSettings;
+use super::own_settings::{JointCost, OwnSettings};
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::accumulate_weighted;
 use cft_ident_core::inertia::closed_loop::LoopGains;
 use cft_ident_core::inertia::columns::RegressorColumns;
-use cft_ident_core::inertia::encoder::{GRIDS, accumulate_shifted};
+use cft_ident_core::inertia::encoder::{self, GRIDS, NOISY, PositionNoise, accumulate_shifted};
 use cft_ident_core::inertia::instruments::{self, ReferenceSource};
 use cft_ident_core::inertia::jumps::{Jump, jumps};
 use cft_ident_core::inertia::robust::Weigher;
@@ -32,6 +32,9 @@ pub struct SimulatedLoop {
     #[serde(skip)]
     pub gains: LoopGains,
 }
+
+/// Chooses the noise that is added to positions.
+const NOISE_SEED: u64 = 1;
 
 /// Which filter positions come through before they are differentiated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,6 +151,12 @@ impl<'a> Passes<'a> {
         }
     }
 
+    /// The shortest sampling step of the logs that were read [s].
+    pub(super) fn shortest_step(&self) -> f64 {
+        let steps = self.steps.iter().copied();
+        steps.reduce(f64::min).unwrap_or(1e-3)
+    }
+
     /// Sampling step of a log that was read [s].
     fn step_of(&self, log: usize) -> f64 {
         self.steps.get(log).copied().unwrap_or(1e-3)
@@ -229,8 +238,7 @@ impl<'a> Passes<'a> {
 
     /// Readings of a log besides the first: by a narrower position filter, and on the encoders' grids.
     fn others(&self) -> u64 {
-        let encoders = self.machine.robot.transmission().encoder_steps();
-        1 + encoders.map_or(0, |_| u64::from(GRIDS))
+        1 + u64::from(self.readings_again())
     }
 
     /// Remembers what the first reading of a log found.
@@ -296,17 +304,80 @@ impl<'a> Passes<'a> {
         total.ok_or(IdentifyError::NoLog)
     }
 
-    /// Positions rounded anew on a shifted grid of the encoders.
+    /// Readings of a log with its positions read by the encoders once more: on so many shifted grids, or with their noise.
+    pub(super) fn readings_again(&self) -> u32 {
+        let known = self.machine.robot.transmission().encoder_steps();
+        known.map_or(NOISY, |_| GRIDS)
+    }
+
+    /// Intervals of the noise of a log's positions, where it says something in a fit \[m or rad\].
+    fn noise_that_tells(&self, log: usize) -> Option<Vec<f64>> {
+        let of_joint = &self.own.get(log)?.costs.of_joint;
+        let tells = |cost: &JointCost| encoder::tells(cost.at.share);
+        let step = |cost: &Option<JointCost>| cost.as_ref().map_or(0.0, |cost| cost.at.step);
+        let steps = || of_joint.iter().map(step).collect();
+        of_joint.iter().flatten().any(tells).then(steps)
+    }
+
+    /// A log whose positions get noise of their own level once more; as it is where that says nothing.
+    fn read_noisy(
+        &self,
+        columns: RegressorColumns,
+        reading: u32,
+        index: usize,
+        weigher: Option<&mut Weigher>,
+    ) -> Result<BlockFactors, IdentifyError> {
+        let log = &self.logs[index];
+        let steps = self.noise_that_tells(index);
+        if let Log::Reduced(part) = log {
+            let noisy = match steps {
+                None => None,
+                Some(_) => part.shifted_rows(reading, columns.clone())?,
+            };
+            return Ok(match noisy {
+                Some(rows) => rows,
+                None => part.rows(columns)?,
+            });
+        }
+        let mut noise = steps.map(|steps| PositionNoise::new(&steps, reading, NOISE_SEED));
+        let settings = self.settings(PositionFilter::Declared, index);
+        let mut open = self.machine.open(log, self.control)?;
+        let read = accumulate_weighted(
+            &self.machine.robot,
+            &columns,
+            weigher,
+            &settings,
+            &mut |block| {
+                let more = open.read(block)?;
+                if let Some(noise) = &mut noise {
+                    noise.add(block);
+                }
+                Ok(more)
+            },
+        );
+        Ok(read.map_err(|e| open.ended(e))?.0.in_one_block())
+    }
+
+    /// Positions read by the encoders once more.
     pub(super) fn read_shifted(
         &mut self,
         columns: &RegressorColumns,
         grid: u32,
         mut weigher: Option<&mut Weigher>,
     ) -> Result<Option<BlockFactors>, IdentifyError> {
+        let unknown = self.machine.robot.transmission().encoder_steps().is_none();
+        if unknown && (0..self.logs.len()).all(|log| self.noise_that_tells(log).is_none()) {
+            return Ok(None);
+        }
         let mut all = Vec::new();
         for (index, log) in self.logs.iter().enumerate() {
             let settings = self.settings(PositionFilter::Declared, index);
             let columns = self.columns_of(columns, index);
+            if unknown {
+                all.push(self.read_noisy(columns, grid, index, weigher.as_deref_mut())?);
+                self.work.advance(1);
+                continue;
+            }
             if let Log::Reduced(part) = log {
                 all.extend(part.shifted_rows(grid, columns)?);
                 continue;

@@ -152,7 +152,7 @@ fn coulomb_level(columns: &RegressorColumns, fit: &Fit, joint: usize) -> f64 {
     let coulomb = own.filter(|(_, own)| match own {
         Own::Coulomb | Own::Saturating(_) => true,
         Own::Law(k) => (1..3).contains(k),
-        Own::Viscous | Own::Offset | Own::TorqueRate => false,
+        Own::Viscous | Own::Offset | Own::TorqueRate | Own::TorqueBend => false,
     });
     coulomb
         .map(|(k, _)| fit.theta[first + k])

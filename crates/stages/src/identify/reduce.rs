@@ -12,7 +12,6 @@ use super::passes::{Passes, PositionFilter};
 use super::reduced::{MadeWith, Readings, ReducedLog, ReducedLogs};
 use super::repeated::each_row_once;
 use super::unknowns::columns;
-use cft_ident_core::inertia::encoder::GRIDS;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::robot_file::FrictionLawKind;
@@ -74,10 +73,8 @@ pub fn reduce(
         let declared = passes.read_condensed(&linear)?;
         let narrower = passes.read(PositionFilter::Narrower, &linear.with_torque_rates(), None)?;
         let mut shifted = Vec::new();
-        if machine.robot.transmission().encoder_steps().is_some() {
-            for grid in 0..GRIDS {
-                shifted.extend(passes.read_shifted(&linear, grid, None)?);
-            }
+        for grid in 0..passes.readings_again() {
+            shifted.extend(passes.read_shifted(&linear, grid, None)?);
         }
         let bounds_s = machine.bounds(log, control)?;
         let (Some(own), Some(summary), Some(provenance)) =

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::logged_robot::LoggedRobot;
+use cft_ident_core::validate::JointError;
 
 /// A joint's residual relative to its torque, a fraction.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -41,6 +42,23 @@ pub struct JointResidual {
 }
 
 impl JointResidual {
+    /// Of the errors of a validation.
+    pub(super) fn of(error: JointError) -> Self {
+        JointResidual {
+            joint: error.joint,
+            unit: error.unit,
+            rmse: error.rmse,
+            relative_error: error.relative_error,
+            relative_error_moving: error.relative_error_moving,
+            relative_error_rest: error.relative_error_rest,
+        }
+    }
+
+    /// The error that is spoken of: of the rows in which the joint moves, where it does.
+    pub fn headline(&self) -> f64 {
+        self.relative_error_moving.unwrap_or(self.relative_error)
+    }
+
     /// Whether it moves at all.
     pub fn moves(&self) -> bool {
         self.relative_error_moving.is_some() || self.relative_error_rest.is_none()

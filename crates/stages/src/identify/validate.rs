@@ -9,6 +9,7 @@ use super::error::IdentifyError;
 use super::in_memory::read_whole;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::model::refined;
 use super::of_robot::{Beyond, Places};
 use super::open_loop::{free_run, open_loop};
 use super::position_cutoff::known;
@@ -145,6 +146,30 @@ pub fn validate(
         found.open_loop = Some(simulated);
     }
     Ok(found)
+}
+
+/// The errors of a model on the logs that it was fitted to, as [`validate`] gives them.
+pub(super) fn errors_on_fitted(
+    machine: &LoggedRobot,
+    file: &ModelFile,
+    logs: &[Log],
+    control: &Control,
+) -> Result<TorqueErrors, IdentifyError> {
+    let model = refined(file, &machine.name)?;
+    let whole = not_reduced(logs);
+    let machine = match whole.is_empty() {
+        true => machine.clone(),
+        false => machine.with_position_cutoffs(&whole, &known(&model.model), control)?,
+    };
+    let found = reconstruct(
+        &machine,
+        (&model, file),
+        None,
+        logs,
+        control,
+        &mut |_, _| {},
+    )?;
+    Ok(found.validation.errors)
 }
 
 fn errors_of(
@@ -393,7 +418,7 @@ fn add_reduced(
             Own::Viscous => viscous_coulomb[0],
             Own::Coulomb => viscous_coulomb[1],
             Own::Offset => model.offset[j],
-            Own::Saturating(_) | Own::Law(_) | Own::TorqueRate => 0.0,
+            Own::Saturating(_) | Own::Law(_) | Own::TorqueRate | Own::TorqueBend => 0.0,
         }));
     }
     let rows = part.rows(columns)?;

@@ -2,9 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::{ConsistencyProblem, Feasible, feasible};
-use crate::inertia::solution::FitError;
-
 /// Where the friction of a joint stands among the unknowns, and up to which speed it is asked to take power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionColumns {
@@ -14,92 +11,70 @@ pub struct FrictionColumns {
     pub speed: f64,
 }
 
-impl FrictionColumns {
-    /// What is below zero where the friction drives at its greatest speed.
-    fn at_speed(&self, coulomb: f64, viscous: f64) -> f64 {
-        match self.speed.is_finite() {
-            true => coulomb + self.speed * viscous,
-            // whatever the level at rest, the slope decides
-            false => viscous,
-        }
-    }
+/// Friction levels before data: so much of the torque, and of one row's noise, that they neither stand against data nor
+/// are left without a size where data say nothing.
+const PLAIN_SHARE: f64 = 0.01;
+
+/// A level of friction that is above zero: its parts in the unknowns, and what it is before data.
+pub(super) struct Level {
+    pub parts: Vec<(usize, f64)>,
+    pub plain: f64,
 }
 
-/// What of a joint's friction is held at nothing: that as the joint begins to move, and that at the greatest speed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Held {
-    at_rest: bool,
-    at_speed: bool,
+/// The friction of a joint by levels: that as the joint begins to move, and that at its greatest speed.
+pub(super) struct Bounded {
+    at_rest: Option<Level>,
+    at_speed: Option<Level>,
 }
 
-impl Held {
-    /// Whether f_c follows f_v: friction is nothing at a speed that the joint reaches, and free below.
-    fn ties(self, of: &FrictionColumns) -> bool {
-        self.at_speed && !self.at_rest && of.speed.is_finite()
-    }
-}
-
-/// Least squares over physically consistent links, with friction f_c sgn v + f_v v that takes power from rest to
-/// the speeds given: what would drive is held at nothing, and the rest is fitted again.
-///
-/// # Errors
-/// [`FitError`].
-pub fn with_friction(
-    task: &ConsistencyProblem,
-    friction: &[FrictionColumns],
-) -> Result<Feasible, FitError> {
-    let free = Held {
-        at_rest: false,
-        at_speed: false,
-    };
-    let mut held = vec![free; friction.len()];
-    loop {
-        let factor = restricted(task.factor, friction, &held);
-        let restricted = ConsistencyProblem {
-            factor: &factor,
-            ..*task
+impl Bounded {
+    /// Of every joint; a level that no row shows is not asked for, and its unknowns stay at nothing.
+    pub fn of(friction: &[FrictionColumns], factor: &DMatrix<f64>) -> Vec<Self> {
+        let target = factor.column(factor.ncols() - 1).norm();
+        let level = |parts: Vec<(usize, f64)>| {
+            let mut column = factor.column(0) * 0.0;
+            for (unknown, part) in &parts {
+                column.axpy(*part, &factor.column(*unknown), 1.0);
+            }
+            let size = column.norm();
+            let plain = (1.0 + PLAIN_SHARE * target) / size;
+            (size > 0.0 && plain.is_finite()).then_some(Level { parts, plain })
         };
-        let mut found = feasible(&restricted)?;
-        let mut next = held.clone();
-        for ((of, held), next) in friction.iter().zip(&held).zip(&mut next) {
-            if held.ties(of) {
-                found.theta[of.coulomb] = -of.speed * found.theta[of.viscous];
+        let of = |of: &FrictionColumns| {
+            let FrictionColumns {
+                viscous,
+                coulomb,
+                speed,
+            } = *of;
+            let seen = [viscous, coulomb].map(|k| factor.column(k).amax() > 0.0);
+            match (seen, speed.is_finite()) {
+                // f_c = level at rest, f_v = (level at speed - level at rest) / speed
+                ([true, true], true) if speed > 0.0 => Bounded {
+                    at_rest: level(vec![(coulomb, 1.0), (viscous, -1.0 / speed)]),
+                    at_speed: level(vec![(viscous, 1.0 / speed)]),
+                },
+                // whatever the level at rest, the slope decides
+                ([_, true], false) | ([false, true], _) => Bounded {
+                    at_rest: level(vec![(coulomb, 1.0)]),
+                    at_speed: level(vec![(viscous, 1.0)]),
+                },
+                _ => Bounded {
+                    at_rest: level(vec![(coulomb, 1.0)]),
+                    at_speed: None,
+                },
             }
-            let (coulomb, viscous) = (found.theta[of.coulomb], found.theta[of.viscous]);
-            // one of the two at a time
-            if !held.at_rest && coulomb < 0.0 {
-                next.at_rest = true;
-            } else if !held.at_speed && of.at_speed(coulomb, viscous) < 0.0 {
-                next.at_speed = true;
-            }
-        }
-        if next == held {
-            return Ok(found);
-        }
-        held = next;
+        };
+        friction.iter().map(of).collect()
     }
-}
 
-/// The factor of rows without what is held: a column of zeros leaves its unknown at 0.
-fn restricted(factor: &DMatrix<f64>, friction: &[FrictionColumns], held: &[Held]) -> DMatrix<f64> {
-    let mut out = factor.clone();
-    for (of, held) in friction.iter().zip(held) {
-        if held.ties(of) {
-            // f_c = - f_v times the speed
-            let both = out.column(of.viscous) - out.column(of.coulomb) * of.speed;
-            out.set_column(of.viscous, &both);
-        } else if held.at_speed {
-            out.column_mut(of.viscous).fill(0.0);
-        }
-        if held.at_rest || held.ties(of) {
-            out.column_mut(of.coulomb).fill(0.0);
-        }
+    pub fn levels(&self) -> impl Iterator<Item = &Level> {
+        self.at_rest.iter().chain(&self.at_speed)
     }
-    out
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{ConsistencyProblem, feasible};
     use super::*;
     use crate::robot::{JointKind, Robot};
 
@@ -107,22 +82,23 @@ mod tests {
     fn found(wanted: [f64; 2], speed: f64) -> Vec<f64> {
         let robot = Robot::single_joint("q1", JointKind::Revolute);
         let map = robot.standard_map();
-        let mut factor = DMatrix::identity(4, 4);
+        let mut factor = DMatrix::identity(4, 4) * 1e3;
         for (k, value) in [0.5, wanted[0], wanted[1]].into_iter().enumerate() {
-            factor[(k, 3)] = value;
+            factor[(k, 3)] = 1e3 * value;
         }
-        let task = ConsistencyProblem {
-            map: &map,
-            bodies: &[None],
-            factor: &factor,
-            effective: 1.0,
-        };
         let columns = [FrictionColumns {
             viscous: 1,
             coulomb: 2,
             speed,
         }];
-        let found = with_friction(&task, &columns).unwrap();
+        let task = ConsistencyProblem {
+            map: &map,
+            bodies: &[None],
+            factor: &factor,
+            effective: 1.0,
+            friction: &columns,
+        };
+        let found = feasible(&task).unwrap();
         found.theta.iter().copied().collect()
     }
 
@@ -145,5 +121,17 @@ mod tests {
                 assert!(takes, "{wanted:?} {speed}: {theta:?}");
             }
         }
+    }
+
+    #[test]
+    fn friction_that_takes_power_is_left_as_it_is_wanted() {
+        for speed in [0.5, 3.0, f64::INFINITY] {
+            let theta = found([0.3, 0.2], speed);
+            assert!((theta[1] - 0.3).abs() < 1e-6, "{speed} {theta:?}");
+            assert!((theta[2] - 0.2).abs() < 1e-6, "{speed} {theta:?}");
+        }
+        // nothing at the greatest speed is as near as friction comes to one that drives there
+        let theta = found([-0.3, 0.2], 2.0);
+        assert!((theta[2] + 2.0 * theta[1]).abs() < 1e-3, "{theta:?}");
     }
 }

@@ -1,27 +1,30 @@
-//! Physically consistent link parameters: positive definite pseudo-inertias and drive inertias above zero.
+//! Physically consistent parameters: positive definite pseudo-inertias, drive inertias above zero, friction that takes power.
 //!
-//! The fit's R factor says how much the torques suffer for any parameters, so the nearest feasible
-//! ones are found on it, without reading a log again: least squares over ten free numbers a link
-//! ([`log_cholesky`]) and the logarithm of each drive's inertia, damped as Levenberg and Marquardt
-//! do. What torques do not determine is filled by a prior: the mass properties that the robot file gives,
-//! or a plain body, with a small weight in the same ten numbers.
+//! The torques are linear in the pseudo-inertias, so the least squares over them is a convex problem (Wensing, Kim and
+//! Slotine 2018). The fit's R factor says how much the torques suffer for any parameters, so it is solved on that, without
+//! reading a log again: Newton's steps on the sum of squares and the distance from a prior ([`cone`]), whose weight falls
+//! from stage to stage. What torques do not determine is filled by the prior: the mass properties that the robot file
+//! gives, or a plain body. The last stage ends at the optimum, and a duality gap says how near.
 
+mod cone;
+mod eliminated;
 mod friction;
-mod log_cholesky;
 
-pub use friction::{FrictionColumns, with_friction};
+pub use friction::FrictionColumns;
 
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::solution::FitError;
-use crate::math::descent::{Ending, StepControl, Trial, descend};
+use crate::math::MathError;
+use crate::math::descent::Ending;
 use crate::math::rfactor::RFactor;
 use crate::robot::bodies::StandardMap;
-use crate::robot::standard::{Body, STANDARD, pseudo_inertia};
-use log_cholesky::LogCholesky;
+use crate::robot::standard::{Body, STANDARD};
+use cone::{Cone, Inside, prior_of};
+use eliminated::EliminatedFactor;
 
-/// Weight of the prior: a number off by 1 (a factor e in mass or size) costs as much as one
-/// independent row of data that is off by a tenth of its noise.
+/// Weight of the prior: a body that is off by a factor e in mass or size costs as much as one independent row of data
+/// that is off by about a tenth of its noise.
 pub const PRIOR_WEIGHT: f64 = 0.01;
 /// The body that stands where a robot file gives none: 2 kg about the frame's origin, with a radius
 /// of gyration of 0.1 m along each axis.
@@ -32,16 +35,18 @@ pub const PLAIN: Body = Body {
 };
 /// Inertia of a drive before data [kg m^2 or kg].
 const PLAIN_DRIVE: f64 = 0.1;
-/// A step that lowers the cost by less than this share is the last.
-const SETTLED: f64 = 1e-6;
-/// Damping of the steps.
-const DAMPING: StepControl = StepControl::damping(5.0, 4.0, [1e-12, 1e12]);
-/// Most steps under each weight of the prior.
-const MAX_STEPS: usize = 300;
-/// Weights of the prior on the way to [`PRIOR_WEIGHT`].
-const WEIGHTS: [f64; 7] = [1e4, 1e3, 100.0, 10.0, 1.0, 0.1, PRIOR_WEIGHT];
-/// A number changes by at most this in one step.
-const FARTHEST: f64 = 2.0;
+/// Factor by which the weight of the prior falls from stage to stage.
+const FALL: f64 = 10.0;
+/// Most of Newton's steps under each weight.
+const MAX_STEPS: usize = 100;
+/// Squares of Newton's decrement, in units of the barrier: below the first a whole step is safe (Nesterov and
+/// Nemirovskii 1994) and near enough for the next weight; below the second the optimum is reached to the last digits.
+const NEAR: f64 = 0.06;
+const AT_END: f64 = 1e-14;
+/// Least part of the decrease that a step promises.
+const SUFFICIENT: f64 = 0.1;
+/// Shortest part of a step.
+const SHORTEST: f64 = 1e-9;
 
 /// What the search is given.
 #[derive(Debug, Clone)]
@@ -53,6 +58,8 @@ pub struct ConsistencyProblem<'a> {
     pub factor: &'a DMatrix<f64>,
     /// Effective sample size over rows: what correlated rows count.
     pub effective: f64,
+    /// Friction f_c sgn v + f_v v that takes power from rest to the speeds given.
+    pub friction: &'a [FrictionColumns],
 }
 
 /// Physically consistent parameters.
@@ -66,11 +73,15 @@ pub struct Feasible {
     pub drives: Vec<f64>,
     /// Whether each link's prior comes from the robot file.
     pub given: Vec<bool>,
+    /// Most by which the sum of squares, in independent rows, is above that of any other physically consistent
+    /// parameters, up to what the prior pulls: the duality gap.
+    pub gap: f64,
+    /// Converged where Newton's decrement proves the gap.
     pub ending: Ending,
     pub iterations: usize,
 }
 
-/// Least squares over physically consistent links.
+/// Least squares over physically consistent parameters: the same rows give the same numbers to the last digit.
 ///
 /// A given prior that no body can have counts as none.
 ///
@@ -79,49 +90,58 @@ pub struct Feasible {
 pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     let links = task.map.links.len();
     let drives = task.map.drives.len();
-    let mut prior = DVector::zeros(STANDARD * links + drives);
-    let mut given = Vec::with_capacity(links);
+    if !task.factor.iter().all(|x| x.is_finite()) {
+        return Err(not_finite(task.factor).into());
+    }
+    let rows = EliminatedFactor::of(task);
+    let (mut priors, mut given) = (Vec::with_capacity(links), Vec::with_capacity(links));
     for i in 0..links {
-        let of = |body: Body| log_cholesky::of(&pseudo_inertia(&body.standard()));
-        let own = task.bodies.get(i).copied().flatten().and_then(of);
+        let own = task.bodies.get(i).copied().flatten();
+        let own = own.and_then(|body| prior_of(&body.standard()));
         given.push(own.is_some());
-        if let Some(x) = own.or_else(|| of(PLAIN)) {
-            prior.rows_mut(STANDARD * i, STANDARD).copy_from_slice(&x);
-        }
+        priors.extend(own.or_else(|| prior_of(&PLAIN.standard())));
     }
-    let of_drives = STANDARD * links;
-    prior.rows_mut(of_drives, drives).fill(PLAIN_DRIVE.ln());
-
-    let reduced = EliminatedFactor::of(task);
-    let (mut x, mut iterations, mut ending) = (prior.clone(), 0, Ending::IterationLimit);
-    // from the prior outward: a search that begins without it runs along the border of what
-    // is consistent, where its numbers go to infinity and it hardly moves
-    for weight in WEIGHTS {
-        let at = |x: DVector<f64>| reduced.at(task.map, x, &prior, weight);
-        let found = descend(at(x), &DAMPING, MAX_STEPS, &mut |from, damping| {
-            let step = from.damped_step(weight, damping);
-            let next = at(&from.x + step.map(|s| s.clamp(-FARTHEST, FARTHEST)));
-            let (lowest, cost) = (from.cost, next.cost);
-            Ok::<_, FitError>(match cost < lowest {
-                true if lowest - cost <= SETTLED * cost => Trial::Last(next),
-                true => Trial::Accepted(next),
-                false => Trial::Rejected,
-            })
-        })?;
-        x = found.0.x;
-        ending = found.1;
-        iterations += found.2;
+    let mut numbers = vec![PLAIN_DRIVE; drives];
+    numbers.extend(rows.plain_friction());
+    let cone = Cone {
+        links: priors,
+        numbers,
+    };
+    let mut at = cone.start().ok_or_else(|| not_finite(task.factor))?;
+    let (mut iterations, mut decrement) = (0, f64::INFINITY);
+    // from the prior outward, where Newton's steps are long: it weighs as much as the rows at first
+    let misfit = rows.residual(&at).norm_squared().max(PRIOR_WEIGHT);
+    let stages = (misfit / PRIOR_WEIGHT).log(FALL).ceil() as i32;
+    for stage in (0..=stages).rev() {
+        let enough = if stage == 0 { AT_END } else { NEAR };
+        let stage = Stage {
+            rows: &rows,
+            cone: &cone,
+            weight: PRIOR_WEIGHT * FALL.powi(stage),
+        };
+        let steps;
+        (at, steps, decrement) = stage.descend(at, enough);
+        iterations += steps;
     }
-    let (standard, _) = standard_at(task.map, &x);
-    let mapped = &task.map.matrix * &standard;
+    let last = Stage {
+        rows: &rows,
+        cone: &cone,
+        weight: PRIOR_WEIGHT,
+    };
+    let gap = last.gap(&at);
+    let standard = at.standard();
     Ok(Feasible {
-        theta: reduced.complete(&mapped),
+        theta: rows.complete(&standard),
         links: (0..links)
             .map(|i| std::array::from_fn(|k| standard[STANDARD * i + k]))
             .collect(),
-        drives: standard.as_slice()[of_drives..].to_vec(),
+        drives: at.numbers[..drives].to_vec(),
         given,
-        ending,
+        gap,
+        ending: match decrement <= NEAR {
+            true => Ending::Converged,
+            false => Ending::IterationLimit,
+        },
         iterations,
     })
 }
@@ -147,143 +167,100 @@ pub fn nearest(
         bodies: &bodies,
         factor: &factor,
         effective,
+        friction: &[],
     };
     Ok(feasible(&task)?.theta)
 }
 
-/// Standard parameters, and the derivatives of each link's by its own numbers, column by column; a drive's is its own.
-fn standard_at(
-    map: &StandardMap,
-    x: &DVector<f64>,
-) -> (DVector<f64>, Vec<[[f64; STANDARD]; STANDARD]>) {
-    let links = map.links.len();
-    let mut s = x.map(f64::exp);
-    let of_link = |i: usize| {
-        let at = STANDARD * i;
-        let own: LogCholesky = std::array::from_fn(|k| x[at + k]);
-        let (values, columns) = log_cholesky::standard(&own);
-        s.rows_mut(at, STANDARD).copy_from_slice(&values);
-        columns
-    };
-    let slopes = (0..links).map(of_link).collect();
-    (s, slopes)
+/// The first entry of a factor that is no number.
+fn not_finite(factor: &DMatrix<f64>) -> MathError {
+    let at = factor.iter().position(|x| !x.is_finite()).unwrap_or(0);
+    let rows = factor.nrows().max(1);
+    MathError::NotFinite {
+        row: at % rows,
+        column: at / rows,
+        value: factor.iter().nth(at).copied().unwrap_or(f64::NAN),
+    }
 }
 
-/// Where a search stands.
-struct Point {
-    x: DVector<f64>,
-    /// Residual of the data and its slopes by the numbers.
-    residual: DVector<f64>,
-    jacobian: DMatrix<f64>,
-    /// Distance from the prior.
-    off: DVector<f64>,
-    cost: f64,
+/// The search under one weight of the prior.
+struct Stage<'a> {
+    rows: &'a EliminatedFactor,
+    cone: &'a Cone,
+    weight: f64,
 }
 
-impl Point {
-    /// Least-squares step with the columns' own size as damping.
-    fn damped_step(&self, weight: f64, damping: f64) -> DVector<f64> {
-        let n = self.jacobian.ncols();
-        // prior and damping have one row a number: the rows of the data go under their triangle
+impl Stage<'_> {
+    fn cost(&self, at: &Inside) -> f64 {
+        self.rows.residual(at).norm_squared() + self.weight * self.cone.distance(at)
+    }
+
+    /// Newton's step in the own coordinates of a point, by least squares and not by its squares; and the decrement's
+    /// square in units of the barrier. Nothing where numbers leave the finite.
+    fn step(&self, at: &Inside) -> Option<(DVector<f64>, f64)> {
+        let jacobian = at.in_own_coordinates(&self.rows.rows);
+        let n = jacobian.ncols();
+        let half = (0.5 * self.weight).sqrt();
+        let towards = (self.cone.unit() - self.cone.pull(at)) * half;
         let mut triangle = vec![0.0; (n + 1) * (n + 1)];
-        for (c, column) in self.jacobian.column_iter().enumerate() {
-            let size = (weight + damping * (column.norm_squared() + weight)).sqrt();
-            triangle[c * (n + 2)] = size;
-            triangle[c * (n + 1) + n] = -weight * self.off[c] / size;
+        for (k, towards) in towards.iter().enumerate() {
+            triangle[k * (n + 2)] = half;
+            triangle[k * (n + 1) + n] = *towards;
         }
         let mut factor = RFactor::of_triangle(n + 1, triangle);
-        let mut rows = self.jacobian.clone().insert_column(n, 0.0);
-        rows.set_column(n, &-&self.residual);
+        let mut rows = jacobian.insert_column(n, 0.0);
+        rows.set_column(n, &-self.rows.residual(at));
         factor.fold(rows.transpose().as_slice());
         let r = factor.r();
         let right = r.view((0, n), (n, 1)).column(0).into_owned();
         let square = r.view((0, 0), (n, n));
-        square
-            .solve_upper_triangular(&right)
-            .unwrap_or_else(|| DVector::zeros(n))
-    }
-}
-
-/// The factor with the unknowns that no link has a part in solved for.
-struct EliminatedFactor {
-    /// Columns of the factor: free ones first, then mapped ones.
-    order: Vec<usize>,
-    free: usize,
-    r: DMatrix<f64>,
-    /// What standard parameters do to the rows of the mapped unknowns, and what those rows are to be.
-    rows: DMatrix<f64>,
-    target: DVector<f64>,
-}
-
-impl EliminatedFactor {
-    fn of(task: &ConsistencyProblem) -> Self {
-        let u = task.factor.ncols() - 1;
-        let p = task.map.matrix.nrows();
-        let mapped = |c: &usize| *c < p && task.map.matrix.row(*c).amax() > 0.0;
-        let (mapped, mut order): (Vec<usize>, Vec<usize>) = (0..u).partition(mapped);
-        let free = order.len();
-        order.extend(mapped);
-        let ordered = task.factor.select_columns(&[&order[..], &[u]].concat());
-        let mut factor = RFactor::new(u + 1);
-        factor.fold(ordered.transpose().as_slice());
-        let (r, m) = (factor.r(), u - free);
-        let scale = task.effective.sqrt();
-        let chosen = task.map.matrix.select_rows(&order[free..]);
-        EliminatedFactor {
-            rows: r.view((free, free), (m, m)) * scale * chosen,
-            target: r.view((free, u), (m, 1)).column(0) * scale,
-            order,
-            free,
-            r,
-        }
+        let step = square.solve_upper_triangular(&right);
+        let step = step.filter(|step| step.iter().all(|x| x.is_finite()))?;
+        // the Hessian is twice the square of the triangle
+        let decrement = 2.0 * right.norm_squared() / self.weight;
+        Some((step, decrement))
     }
 
-    fn at(&self, map: &StandardMap, x: DVector<f64>, prior: &DVector<f64>, weight: f64) -> Point {
-        let (s, slopes) = standard_at(map, &x);
-        let residual = &self.rows * &s - &self.target;
-        let mut jacobian = self.rows.clone();
-        for (c, mut column) in jacobian.column_iter_mut().enumerate() {
-            match slopes.get(c / STANDARD) {
-                Some(slopes) => {
-                    let own = self.rows.columns(c / STANDARD * STANDARD, STANDARD);
-                    own.mul_to(&SVector::from(slopes[c % STANDARD]), &mut column);
+    /// Steps until the decrement is small `enough`, or digits are used up; how many they were, and the last decrement.
+    fn descend(&self, start: Inside, enough: f64) -> (Inside, usize, f64) {
+        let (mut at, mut before) = (start, f64::INFINITY);
+        for taken in 0..MAX_STEPS {
+            let Some((step, decrement)) = self.step(&at) else {
+                return (at, taken, before);
+            };
+            // near the optimum every step squares the distance, until rounding is what is left of it
+            let rounding = decrement < NEAR && decrement > 0.25 * before;
+            if decrement <= enough || rounding {
+                return (at, taken, decrement);
+            }
+            let (cost, promised) = (self.cost(&at), self.weight * decrement);
+            let mut part = at.longest(&step);
+            loop {
+                let next = at.after(&step, part);
+                let lower = |next: &Inside| {
+                    decrement < NEAR || self.cost(next) <= cost - SUFFICIENT * part * promised
+                };
+                if let Some(next) = next.filter(lower) {
+                    at = next;
+                    break;
                 }
-                None => column *= s[c],
+                part *= 0.5;
+                if part < SHORTEST {
+                    return (at, taken, decrement);
+                }
             }
+            before = decrement;
         }
-        let off = &x - prior;
-        Point {
-            cost: residual.norm_squared() + weight * off.norm_squared(),
-            x,
-            residual,
-            jacobian,
-            off,
-        }
+        (at, MAX_STEPS, before)
     }
 
-    /// All unknowns from the shared parameters of the map.
-    fn complete(&self, shared: &DVector<f64>) -> DVector<f64> {
-        let u = self.order.len();
-        let m = u - self.free;
-        let known = DVector::from_fn(m, |k, _| shared[self.order[self.free + k]]);
-        let rest = self.r.view((0, u), (self.free, 1))
-            - self.r.view((0, self.free), (self.free, m)) * &known;
-        let mut theta = DVector::zeros(u);
-        // back substitution; a column that no row excites stays at 0
-        let sizes = (0..self.free).map(|i| self.r[(i, i)].abs());
-        let largest = sizes.fold(0.0, f64::max);
-        let mut free = vec![0.0; self.free];
-        for i in (0..self.free).rev() {
-            let beyond: f64 = (i + 1..self.free).map(|k| self.r[(i, k)] * free[k]).sum();
-            if self.r[(i, i)].abs() > 1e-12 * largest {
-                free[i] = (rest[i] - beyond) / self.r[(i, i)];
-            }
-            theta[self.order[i]] = free[i];
-        }
-        for (k, c) in self.order[self.free..].iter().enumerate() {
-            theta[*c] = known[k];
-        }
-        theta
+    /// Duality gap of the sum of squares with the prior's pull: what their gradient gives along the point itself. Near the
+    /// optimum that gradient is the weight over the point, positive definite for every link and number.
+    fn gap(&self, at: &Inside) -> f64 {
+        let jacobian = at.in_own_coordinates(&self.rows.rows);
+        let slope =
+            jacobian.tr_mul(&self.rows.residual(at)) * 2.0 + self.cone.pull(at) * self.weight;
+        slope.dot(&self.cone.unit())
     }
 }
 

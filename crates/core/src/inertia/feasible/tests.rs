@@ -79,6 +79,7 @@ fn without_priors(map: &StandardMap, factor: &DMatrix<f64>) -> Feasible {
         bodies: &bodies,
         factor,
         effective: 1.0,
+        friction: &[],
     };
     feasible(&task).unwrap()
 }
@@ -165,6 +166,7 @@ fn a_prior_fills_in_where_torques_determine_nothing() {
         bodies: &given,
         factor: &factor,
         effective: 1.0,
+        friction: &[],
     };
     let found = feasible(&task).unwrap();
     for (i, link) in found.links.iter().enumerate() {

@@ -6,7 +6,7 @@ use super::quality_of_fit::{bodies, condition, consistent, fit_quality};
 use crate::report::figure::{ErrorFigure, JointBars};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
-use crate::report::table::Columns;
+use crate::report::table::{Columns, unbroken};
 use crate::report::words::{escaped, listed};
 use crate::report::{Figure, Finding, Headline, Report, Tone, Writer, summary, usual};
 use cft_ident_core::number;
@@ -43,7 +43,12 @@ pub fn lsq(of: &Lsq) -> Report {
     next(&mut report.page(), &first_screen::local(of.path));
     report.terminal().line("");
     gains(&mut report.terminal(), &of.found.gains);
-    let relative: Vec<f64> = of.found.joints.iter().map(|e| e.relative_error).collect();
+    let relative: Vec<f64> = of
+        .found
+        .joints
+        .iter()
+        .map(JointResidual::headline)
+        .collect();
     let (joints, more) = summary::most_wrong(&relative);
     residuals(&mut report.usual(), of.found, &joints);
     if let Some(more) = more {
@@ -94,7 +99,7 @@ fn bars(of: &Lsq) -> ErrorFigure {
     let joints = moving.map(|joint| JointBars {
         joint: joint.joint.clone(),
         before: None,
-        after: joint.relative_error.into(),
+        after: joint.headline().into(),
     });
     ErrorFigure {
         title: "Relative torque error on the fitted data".to_owned(),
@@ -139,11 +144,11 @@ fn next(writer: &mut Writer, path: &str) {
 /// The error of the fit beside what is usual, and whether the model can be used.
 fn words(of: &Lsq) -> Words {
     let joints: Vec<&JointResidual> = of.found.joints.iter().filter(|j| j.moves()).collect();
-    let square: f64 = joints.iter().map(|j| j.relative_error.powi(2)).sum();
+    let square: f64 = joints.iter().map(|j| j.headline().powi(2)).sum();
     let rms = (square / joints.len().max(1) as f64).sqrt();
     let torque_is = of.machine.file.log.torque_is;
     let unusual = rms > usual::band(torque_is)[1];
-    let useless = joints.iter().filter(|j| j.relative_error >= 1.0);
+    let useless = joints.iter().filter(|j| j.headline() >= 1.0);
     let useless = listed(useless.map(|j| j.joint.as_str()));
     let figure = |label, value, tone| Figure { label, value, tone };
     let tone = match (useless.is_empty(), unusual) {
@@ -153,12 +158,12 @@ fn words(of: &Lsq) -> Words {
     };
     let mut figures = vec![figure("error", number::percent(rms), tone)];
     let worst = joints.iter();
-    let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
+    let worst = worst.max_by(|a, b| a.headline().total_cmp(&b.headline()));
     let mut over = String::new();
     if let Some(worst) = worst.filter(|_| joints.len() > 1) {
         let value = format!(
             "{} ({})",
-            number::percent(worst.relative_error),
+            number::percent(worst.headline()),
             worst.joint
         );
         figures.push(figure("largest", value, Tone::Plain));
@@ -201,7 +206,7 @@ const OUTLYING_ERROR: f64 = 0.05;
 
 /// Joints whose error is far above those of the others, a sentence each.
 fn far_off(found: &IdentifiedDynamics) -> Vec<String> {
-    let error = |j: usize| found.joints[j].relative_error;
+    let error = |j: usize| found.joints[j].headline();
     let moving = || (0..found.joints.len()).filter(|j| found.joints[*j].moves());
     let median = |without: usize| {
         let others = moving().filter(|k| *k != without);
@@ -228,10 +233,10 @@ pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics, joints: &[usiz
     let torque = |v: f64| number::significant(v, 3);
     let rows = joints.iter();
     let rows = rows.map(|&j| (&found.joints[j], found.fit.torque_rms[j]));
-    let caption = "residual of the fit, on the logs that were fitted";
+    let caption = "residual of the model, on the logs that were fitted";
     let columns = Columns::new(caption, rows)
         .words("joint", |(joint, _)| &joint.joint)
-        .percent("relative error", |(joint, _)| joint.relative_error)
+        .percent("relative error", |(joint, _)| joint.headline())
         .numbers("residual rms", |(joint, _)| torque(joint.rmse))
         .numbers("torque rms", |(joint, rms)| match joint.moves() {
             true => torque(rms),
@@ -239,6 +244,14 @@ pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics, joints: &[usiz
         })
         .words("unit", |(joint, _)| joint.unit);
     writer.table(columns);
+    let plain = &found.unconstrained_residual;
+    if !plain.is_empty() {
+        let shown = joints.iter().map(|&j| {
+            let error = number::percent(plain[j].relative_error);
+            unbroken(&format!("{} {error}", plain[j].joint))
+        });
+        writer.line(&format!("unconstrained residual: {}", listed(shown)));
+    }
 }
 
 /// The fit to the motion: the friction that it added, and errors of simulated positions before and after.

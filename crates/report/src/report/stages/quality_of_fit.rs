@@ -132,7 +132,7 @@ pub(super) fn bodies(found: &ConsistentLinks) -> Table {
     columns.into()
 }
 
-/// Drives that can exist, and by how much the fit suffers from links that can.
+/// Drives that can exist, and how near the search came to its optimum.
 pub(super) fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
     let drives = found.drives.iter();
     let drives =
@@ -141,14 +141,9 @@ pub(super) fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
     if !drives.is_empty() {
         terminal.line(&format!("drive inertias: {drives}"));
     }
-    let both = found.relative_error_before.iter();
-    let both = both.zip(&found.relative_error_after);
-    let change = both.map(|(before, after)| {
-        let [from, to] = [before, after].map(|e| number::percent(e.relative_error));
-        unbroken(&format!("{} {from} to {to}", before.joint))
-    });
-    terminal.paragraph(&format!(
-        "what consistency costs the fit: {}",
-        listed(change)
+    terminal.line(&format!(
+        "physically consistent fit: duality gap {} of the sum of squares, after {} steps",
+        number::percent(found.duality_gap),
+        found.iterations
     ));
 }

@@ -204,9 +204,9 @@ impl ReducedLog {
         narrower.rows(self.name(), columns)
     }
 
-    /// Whether its rows by the narrower filter hold the rates of torques; those of 0.2 do not.
+    /// Whether its rows by the narrower filter hold the rates and bends of torques; those of before 0.4 do not.
     pub(in crate::identify) fn holds_torque_rates(&self) -> bool {
-        self.readings.narrower.width() > self.readings.declared.width()
+        self.readings.narrower.width() == self.readings.declared.width() + 2
     }
 
     /// Its rows with positions rounded anew on a shifted grid; none of a robot whose encoders are not known.
