@@ -1,3 +1,4 @@
+use crate::robot::standard::pseudo_inertia;
 use super::*;
 use crate::robot::cft::{Setup, Structure};
 use crate::robot::tree::{Coordinate, Link, Tree};

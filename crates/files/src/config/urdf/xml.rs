@@ -148,6 +148,12 @@ impl<'a> Element<'a, '_> {
         self.node.range()
     }
 
+    /// Itself and all elements in it, however deep.
+    pub(super) fn descendants(self) -> impl Iterator<Item = Self> {
+        let elements = self.node.descendants().filter(Node::is_element);
+        elements.map(move |node| Self { node, ..self })
+    }
+
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
         self.node.attribute(name)
     }
