@@ -23,6 +23,7 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>)
         channels,
         keep: Vec::new(),
         held: None,
+        even: None,
         band_hz: None,
     };
     Ok((plan, Vec::new()))
@@ -70,6 +71,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, V
         channels: channels.collect(),
         keep: machine.file.log.keep.clone(),
         held: None,
+        even: None,
         band_hz: Some(machine.settings().cutoff_hz),
     };
     let refused = log.refused().map(|error| refusal(error.explanation()));

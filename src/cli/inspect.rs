@@ -93,15 +93,15 @@ fn looked_at(
         None => RawReader::open_plain(spec, &section),
     };
     let mut log = open()?;
-    let (plan, refused) = match machine {
+    let (mut plan, refused) = match machine {
         Some(machine) => columns::of_robot(&log, machine),
         None => columns::guessed(&mut log)?,
     };
     let stop = || context.interrupted();
     let found = look(&mut log, &plan, &stop)?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;
-    if findings.hides() {
-        let found = look_again(&mut open()?, &plan, &findings, &stop)?;
+    while plan.hides(&findings) {
+        let found = look_again(&mut open()?, &mut plan, &findings, &stop)?;
         findings = found.ok_or_else(CliError::interrupted)?;
     }
     findings.faults.splice(0..0, refused);

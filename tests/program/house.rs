@@ -84,9 +84,15 @@ const DOORS: &[(&str, &str)] = &[
     // one to read, one to write
     ("mcap", "log/recording/format/mcap.rs|output/mcap.rs"),
     ("rusqlite", "log/recording/format/bag.rs"),
-    ("flate2", "log/content.rs|log/table/zip.rs|output/log.rs"),
+    (
+        "flate2",
+        "log/content.rs|log/table/zip.rs|log/table/mat.rs|output/log.rs",
+    ),
     ("parquet", "log/table/parquet.rs|output/parquet.rs"),
     ("zstd", "log/content.rs|output/log.rs"),
+    ("lz4", "log/content.rs"),
+    ("lzma_rs", "log/content.rs"),
+    ("bzip2", "log/content.rs"),
     ("resvg", "report/figure/png.rs"),
     ("sha2", "log/source.rs"),
     ("roxmltree", "config/urdf/xml.rs"),

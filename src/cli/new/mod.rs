@@ -299,14 +299,18 @@ pub(super) fn describe(
             cft_ident_logs::log::list(seen.other_topics.iter().map(String::as_str))
         ));
     }
-    let torques = |joint: &JointColumns| !matches!(joint.torque_unit, Some("A" | "V" | "%"));
     if let (Some(spec), Some(_)) = (&args.log, &args.urdf)
         && mapping.torque_is == "joint"
-        && mapping.joints.iter().all(torques)
+        && mapping.joints.iter().all(JointColumns::is_torque)
         && let Some(text) = weights::warning(&file, spec, context)?
     {
         warnings.push(text);
     }
+    warnings.extend(
+        chain
+            .as_ref()
+            .and_then(|chain| tip_before(chain, &mapping, args)),
+    );
     let (shape, model, cutoff_hz) = (draft.shape.clone(), draft.model(), draft.cutoff_hz());
     Ok(Described {
         text,
@@ -318,6 +322,34 @@ pub(super) fn describe(
         mapping,
         seen,
     })
+}
+
+/// Says where the arm ends, where the last joints of a URDF have no columns: a gripper that was not logged.
+fn tip_before(chain: &UrdfChain, mapping: &Mapping, args: &Args) -> Option<String> {
+    let has = |joint: &JointColumns| joint.position.is_some() && joint.torque.is_some();
+    let last = mapping.joints.iter().rposition(has)?;
+    let without = mapping
+        .joints
+        .get(last + 1..)
+        .filter(|rest| !rest.is_empty())?;
+    if !mapping.joints[..=last].iter().all(has) {
+        return None;
+    }
+    let joint = &mapping.joints[last].joint;
+    let link = chain
+        .links
+        .iter()
+        .find(|link| link.joint.as_ref() == Some(joint))?;
+    let names = cft_ident_logs::log::list(without.iter().map(|joint| joint.joint.as_str()));
+    let [urdf, log] = [
+        args.urdf.as_ref()?.display().to_string(),
+        args.log.as_ref()?.to_string(),
+    ];
+    Some(format!(
+        "the log has no columns of {names}; where they stood still, the arm ends before them: `cft-ident new {}-arm --urdf {urdf} --tip {} --log {log}`",
+        args.name.display(),
+        link.name.as_ref()?
+    ))
 }
 
 /// Lines of a terminal that say what is to be looked at.

@@ -292,7 +292,14 @@ impl Draft<'_> {
     /// Where the times come from, and which topic of a recording is read.
     fn clock(&self, seen: &SeenColumns, out: &mut String) {
         match &seen.clock {
-            ClockSource::Messages => {}
+            ClockSource::Messages => {
+                if let Some(hz) = seen.even_hz {
+                    let _ = writeln!(
+                        out,
+                        "rate_hz = {hz:?}   # CHECK IT: messages were sampled evenly, as their positions show; their stamps are not when"
+                    );
+                }
+            }
             ClockSource::Rate { hz, coarse: None } => {
                 let _ = writeln!(out, "rate_hz = {hz:?}   # the log has no times");
             }

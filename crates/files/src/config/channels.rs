@@ -70,7 +70,7 @@ impl RobotFile {
         let channels = self.log.joint.get(names.get(joint)?)?;
         let unit = channels.torque_unit.filter(|unit| !unit.is_torque())?;
         let scaled = channels.torque_scale.is_some() && !self.log.relative_gains;
-        (!scaled).then(|| unit.label())
+        (!scaled).then(|| unit.kept_label())
     }
 
     /// Joints whose torque channels nothing relates to those of the others: channels that are no torques
@@ -160,8 +160,8 @@ impl RobotFile {
             let kind = robot.joint_kind(index);
             let key = |name: &str| format!("[log.joint.{joint}] {name}");
             let unit = given.position_unit.unwrap_or(match kind {
-                JointKind::Prismatic => PositionUnit::Metre,
-                JointKind::Revolute => PositionUnit::Radian,
+                JointKind::Prismatic => PositionUnit::METRE,
+                JointKind::Revolute => PositionUnit::RADIAN,
             });
             let gain = given.position_sign.unwrap_or(1.0) * given.position_scale.unwrap_or(1.0);
             let (gain, label) = (gain * unit.in_si(), unit.label());
@@ -171,7 +171,8 @@ impl RobotFile {
                 label,
                 [gain, given.position_offset.unwrap_or(0.0)],
                 || key("position"),
-            );
+            )
+            .said(given.position_unit.is_some(), given.position_scale);
             layout.positions[index].wrap = given.wrap.map(|range| (range * gain).abs());
             layout.velocities[index] = channel(
                 &given.velocity,
@@ -179,7 +180,8 @@ impl RobotFile {
                 label,
                 [gain, 0.0],
                 || key("velocity"),
-            );
+            )
+            .said(given.position_unit.is_some(), given.position_scale);
             let gain = given.torque_sign.unwrap_or(1.0) * given.torque_scale.unwrap_or(1.0);
             let gain = gain * given.torque_unit.map_or(1.0, TorqueUnit::in_si);
             layout.torques[index] = channel(
@@ -188,7 +190,8 @@ impl RobotFile {
                 (given.torque_unit).map_or(kind.torque_unit(), TorqueUnit::label),
                 [gain, given.torque_offset.unwrap_or(0.0)],
                 || key("torque"),
-            );
+            )
+            .said(given.torque_unit.is_some(), given.torque_scale);
         }
         if !self.log.gears.is_empty() {
             let offsets = layout.positions.iter_mut();
@@ -213,11 +216,11 @@ impl RobotFile {
             let given = self.log.actuator.get(*name).unwrap_or(&plain);
             let key = |what: &str| format!("[log.actuator.{name}] {what}");
             let unit = given.position_unit.unwrap_or(match index {
-                2 => PositionUnit::Radian,
-                _ => PositionUnit::Metre,
+                2 => PositionUnit::RADIAN,
+                _ => PositionUnit::METRE,
             });
             let size = match unit {
-                PositionUnit::Counts => ENCODER_SCALE[index],
+                PositionUnit::COUNTS => ENCODER_SCALE[index],
                 other => other.in_si(),
             };
             let scale = size * given.position_scale.unwrap_or(1.0);
@@ -230,7 +233,8 @@ impl RobotFile {
                     given.home.unwrap_or(0.0),
                 ],
                 || key("position"),
-            );
+            )
+            .said(given.position_unit.is_some(), given.position_scale);
             layout.positions[index].wrap = given.wrap.map(|range| (range * scale).abs());
             layout.torques[index] = channel(
                 &given.volts,
@@ -241,7 +245,8 @@ impl RobotFile {
                     0.0,
                 ],
                 || key("volts"),
-            );
+            )
+            .said(false, given.volts_scale);
         }
         layout
     }

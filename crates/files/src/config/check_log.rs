@@ -140,7 +140,7 @@ fn joint_channels(
     let at = |key| ["log", "joint", joint, key];
     let position_fits = match channels.position_unit {
         None => true,
-        Some(PositionUnit::Counts) => channels.position_scale.is_some(),
+        Some(PositionUnit::COUNTS) => channels.position_scale.is_some(),
         Some(unit) => match kind {
             JointKind::Prismatic => unit.is_length(),
             JointKind::Revolute => unit.is_angle(),
@@ -148,11 +148,15 @@ fn joint_channels(
     };
     if !position_fits {
         let remedy = match kind {
-            _ if channels.position_unit == Some(PositionUnit::Counts) => {
+            _ if channels.position_unit == Some(PositionUnit::COUNTS) => {
                 "give `position_scale`, metres or radians per count"
             }
-            JointKind::Prismatic => "a prismatic joint is logged in \"m\", \"cm\" or \"mm\"",
-            JointKind::Revolute => "a revolute joint is logged in \"rad\", \"deg\" or \"turns\"",
+            JointKind::Prismatic => {
+                "a prismatic joint is logged in \"m\", \"cm\" or \"mm\", or another length"
+            }
+            JointKind::Revolute => {
+                "a revolute joint is logged in \"rad\", \"deg\" or \"turns\", or another angle"
+            }
         };
         return Err(document.value(&at("position_unit"), "does not fit the joint", remedy));
     }
@@ -203,7 +207,7 @@ fn actuator_channels(
     let at = |key| ["log", "actuator", name, key];
     let turns = name == COORDINATES[2];
     let fits = match channels.position_unit {
-        None | Some(PositionUnit::Counts) => true,
+        None | Some(PositionUnit::COUNTS) => true,
         Some(unit) if unit.is_length() => !turns,
         Some(_) => turns,
     };

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::detectors::excitation::JointMotion;
 use super::fault::{FaultKind, LogFault, Severity};
 use super::words::ChannelRole;
-use crate::log::Bridge;
+use crate::log::{Bridge, EvenSpacing};
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -119,6 +119,9 @@ pub struct Findings {
     /// Rows for which each sample was held.
     #[serde(skip)]
     pub held: Option<usize>,
+    /// Rows lie evenly though their stamps do not.
+    #[serde(skip)]
+    pub even: Option<EvenSpacing>,
 }
 
 /// What becomes of rows.
@@ -207,11 +210,6 @@ impl Findings {
     ) {
         let whole = LogFault::whole(severity, kind, self.duration_s, effect, remedy);
         self.faults.insert(0, LogFault { rows, ..whole });
-    }
-
-    /// Whether something hides the rest, so that a second look sees more ([`super::look_again`]).
-    pub fn hides(&self) -> bool {
-        !self.wraps.is_empty() || self.held.is_some()
     }
 
     /// Gives every fault its time by the log's own clock, which has `zero` where times are 0 [s].

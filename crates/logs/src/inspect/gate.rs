@@ -62,14 +62,24 @@ impl Gate {
         };
         let held = held.filter(|_| !keep.contains(&RowFault::SampleAndHold));
         let mut marked = Vec::new();
-        if held.is_some() || !found.wraps.is_empty() {
+        for _ in 0..MAX_READINGS {
+            let first = mending.wraps.is_empty();
+            let even = found.even.filter(|_| mending.even.is_none());
+            if !(even.is_some() || first && (held.is_some() || !found.wraps.is_empty())) {
+                break;
+            }
             mending.held = held;
-            mending.wraps = vec![None; positions];
+            mending.even = mending.even.or(even);
+            mending.wraps.resize(positions, None);
             for (place, range) in &found.wraps {
                 mending.wraps[*place] = Some(*range);
             }
-            let turning = found.faults.into_iter();
-            marked.extend(turning.filter(|fault| fault.kind == FaultKind::WrappedEncoder));
+            let hiding = |fault: &LogFault| match fault.kind {
+                FaultKind::WrappedEncoder => true,
+                FaultKind::IrregularClock => even.is_some(),
+                _ => false,
+            };
+            marked.extend(found.faults.into_iter().filter(hiding));
             (found, origin, ..) = match read(&mending)? {
                 Some(again) => again,
                 None => return Ok(None),
@@ -247,6 +257,9 @@ impl Gate {
                 "torques of 0 in motion that does not go with them: left out, and nothing is differentiated across"
             }
             FaultKind::Spike => "bridged by the rows beside them",
+            FaultKind::IrregularClock => {
+                "stamps jitter, and positions were sampled evenly: put on an even clock"
+            }
             FaultKind::FailedRead => "left out, and the log is interpolated over a few of them",
             _ => "left out, and nothing is differentiated across",
         };

@@ -8,6 +8,7 @@ use super::detectors::failed::FailedReads;
 use super::detectors::flat::Flat;
 use super::detectors::repeats::Repeats;
 use super::detectors::replays::Replays;
+use super::detectors::sampling::SamplingTimes;
 use super::detectors::spike::Spikes;
 use super::detectors::step::{FreshRows, Freshness, Leaps};
 use super::detectors::turn::Turns;
@@ -199,6 +200,9 @@ impl Track {
 pub struct LogJudge {
     pub(super) depth: Depth,
     pub(super) clock: LogClock,
+    pub(super) sampling: SamplingTimes,
+    /// Typical step of the first rows [s].
+    first_step: f64,
     pub(super) tracks: Vec<Track>,
     pub(super) failed: FailedReads,
     pub(super) repeats: Repeats,
@@ -256,6 +260,8 @@ impl LogJudge {
         Self {
             depth,
             clock: LogClock::default(),
+            sampling: SamplingTimes::default(),
+            first_step: 0.0,
             fresh_rows: FreshRows::new(positions.len()),
             keep: Vec::new(),
             band_hz: NOISE_BAND_HZ,
@@ -280,6 +286,7 @@ impl LogJudge {
         }
         if self.clock.rows == 0 {
             let dt = typical_step(times);
+            self.first_step = dt;
             for &index in &self.positions {
                 let track = &mut self.tracks[index];
                 track.excitation = Some(Excitation::new(dt, track.channel.speed));
@@ -316,6 +323,7 @@ impl LogJudge {
         let row = &mut self.row[0];
         let each = times.iter().enumerate().map(|(k, t)| {
             gather(row, columns, &self.positions, k);
+            self.sampling.take(*t, self.first_step, row);
             self.fresh_rows.look(*t, row)
         });
         each.collect()

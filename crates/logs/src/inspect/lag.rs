@@ -13,11 +13,13 @@ const MAX_STRETCHES: usize = 8;
 pub(super) const MIN_DELAY_ROWS: f64 = 2.0;
 /// A shorter one is not reported without a model: what other joints do to a joint looks like one [s].
 const MIN_DELAY_S: f64 = 0.01;
+/// Share of a delay within which another estimate is the same.
+const SAME_DELAY_SHARE: f64 = 0.2;
 /// Deviations from 0 at which a delay is believed.
 const MIN_DEVIATIONS: f64 = 6.0;
 
 /// What to do about a delay.
-pub(super) const REMEDY: &str = "take both from one message or one cycle of the controller; in recordings of two topics `torque_delay_s` in [log] of the robot file takes a delay off";
+pub(super) const REMEDY: &str = "take both from one message or one cycle of the controller; `torque_delay_s` in [log] of the robot file takes a delay off";
 
 /// A warning where the stretches of the log agree in a delay.
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
@@ -30,11 +32,14 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
     if pairs.is_empty() {
         return;
     }
-    let Some(DelayEstimate { delay_s, std_s }) = delay(judge, &pairs) else {
+    let Some(DelayEstimate { delay_s, std_s }) = delay(judge, &pairs, |_| true) else {
         return;
     };
     let least = (MIN_DELAY_ROWS * clock.dt).max(MIN_DEVIATIONS * std_s);
     if delay_s.abs() < least.max(MIN_DELAY_S) {
+        return;
+    }
+    if !is_borne_out(judge, &pairs, delay_s, clock.dt) {
         return;
     }
     let side = if delay_s > 0.0 { "behind" } else { "ahead of" };
@@ -47,12 +52,36 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
     draft.of_log(fault, judge.clock.rows, effect, REMEDY);
 }
 
-fn delay(judge: &LogJudge, pairs: &[(usize, usize)]) -> Option<DelayEstimate> {
+/// Whether halves of the log, and most joints by themselves, show the same delay: couplings between joints and
+/// ripple make others of each.
+fn is_borne_out(judge: &LogJudge, pairs: &[(usize, usize)], delay_s: f64, dt: f64) -> bool {
+    let same = |found: DelayEstimate| {
+        let within = (MIN_DELAY_ROWS * dt).max(SAME_DELAY_SHARE * delay_s.abs());
+        (found.delay_s - delay_s).abs() < within
+    };
+    let halves = [0, 1].map(|half| delay(judge, pairs, |k| k % 2 == half));
+    let joints = pairs
+        .iter()
+        .filter(|pair| delay(judge, &[**pair], |_| true).is_some_and(same));
+    halves.into_iter().all(|found| found.is_some_and(same)) && 2 * joints.count() > pairs.len()
+}
+
+fn delay(
+    judge: &LogJudge,
+    pairs: &[(usize, usize)],
+    takes: impl Fn(usize) -> bool,
+) -> Option<DelayEstimate> {
     let mut delay = DelayEstimator::default();
     let (mut q, mut tau) = (Vec::new(), Vec::new());
-    for window in judge.windows.spread(MAX_STRETCHES) {
+    for (k, window) in judge.windows.spread(MAX_STRETCHES).enumerate() {
+        let half = |row: usize| 2 * k + usize::from(2 * row >= window.t.len());
         delay.begin_stretch();
-        for (row, t) in window.t.iter().enumerate() {
+        for (row, t) in window
+            .t
+            .iter()
+            .enumerate()
+            .filter(|(row, _)| takes(half(*row)))
+        {
             q.clear();
             tau.clear();
             for (position, torque) in pairs {

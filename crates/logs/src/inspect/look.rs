@@ -4,7 +4,7 @@ use super::channel::InspectedChannel;
 use super::fault::{FaultKind, Severity};
 use super::findings::{Findings, RowCost};
 use super::judge::{Depth, LogJudge};
-use crate::log::{LogError, RawBlock, RawReader, RowFault, Unwrap};
+use crate::log::{EvenClock, EvenSpacing, LogError, RawBlock, RawReader, RowFault, Unwrap};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,30 +32,49 @@ pub struct ColumnPlan {
     pub keep: Vec<RowFault>,
     /// Rows for which each sample was held: only fresh rows are looked at.
     pub held: Option<usize>,
+    /// Rows lie evenly though their stamps do not.
+    pub even: Option<EvenSpacing>,
     /// Band that a fit keeps \[Hz\]; none where nobody has declared it.
     pub band_hz: Option<f64>,
 }
 
-/// Looks at a log again where the first look found what hides the rest: positions that begin
-/// anew, samples that were held. `None` where there is none of it, or `stop` asks for it.
+impl ColumnPlan {
+    /// Whether a look by it found what hides the rest, so that another one sees more ([`look_again`]).
+    pub fn hides(&self, found: &Findings) -> bool {
+        let turning = |(place, _): &(usize, f64)| self.channels[*place].wrap.is_none();
+        found.wraps.iter().any(turning)
+            || (found.held.is_some() && self.held.is_none())
+            || (found.even.is_some() && self.even.is_none())
+    }
+}
+
+/// Looks at a log again where the look before found what hides the rest: positions that begin
+/// anew, samples that were held, stamps that jitter. `None` where `stop` asks for it.
 ///
 /// # Errors
 /// A file that can no longer be read.
 pub fn look_again(
     log: &mut RawReader,
-    plan: &ColumnPlan,
+    plan: &mut ColumnPlan,
     first: &Findings,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Findings>, LogError> {
-    let mut plan = plan.clone();
     for (place, range) in &first.wraps {
         plan.channels[*place].wrap = Some(*range);
     }
     plan.held = first.held;
-    let Some(mut found) = look(log, &plan, stop)? else {
+    plan.even = plan.even.or(first.even);
+    let Some(mut found) = look(log, plan, stop)? else {
         return Ok(None);
     };
-    let hiding = [FaultKind::WrappedEncoder, FaultKind::SampleAndHold];
+    let hiding = [
+        FaultKind::WrappedEncoder,
+        FaultKind::SampleAndHold,
+        FaultKind::IrregularClock,
+    ];
+    found
+        .faults
+        .retain(|fault| fault.kind != FaultKind::IrregularClock || first.even.is_none());
     let faults = first.faults.iter();
     let faults = faults.filter(|fault| hiding.contains(&fault.kind));
     found.faults.extend(faults.cloned());
@@ -66,6 +85,7 @@ pub fn look_again(
     found.rows = first.rows;
     found.wraps.clone_from(&first.wraps);
     found.held = first.held;
+    found.even = found.even.or(first.even);
     found.sort();
     Ok(Some(found))
 }
@@ -90,6 +110,7 @@ pub fn look(
     let mut turning: Vec<Option<Unwrap>> = (plan.channels.iter())
         .map(|planned| planned.wrap.map(Unwrap::new))
         .collect();
+    let mut even = plan.even.map(EvenClock::new);
     let mut fresh = plan.held.map(|rows| FreshRows::new(rows, plan));
     let mut block = RawBlock::default();
     while log.read(&mut block)? {
@@ -99,6 +120,9 @@ pub fn look(
         }
         if let Some(fresh) = &mut fresh {
             fresh.keep(&mut block);
+        }
+        if let Some(even) = &mut even {
+            block.t.iter_mut().for_each(|t| *t = even.take(*t));
         }
         for (planned, turning) in plan.channels.iter().zip(&mut turning) {
             let column = &mut block.columns[planned.column];

@@ -1,8 +1,9 @@
 //! From what the detectors gathered to faults: all thresholds stand here and in [`super::shape`].
 
-use super::detectors::clock::ClockFacts;
+use super::detectors::clock::{ClockFacts, GAP};
 use super::detectors::excitation::JointMotion;
 use super::detectors::grain;
+use super::detectors::sampling::EvenRows;
 use super::draft::{FaultList, rows_text, seconds};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
@@ -16,6 +17,8 @@ use crate::log::round_within;
 const UNEVEN_STEPS_SHARE: f64 = 0.05;
 /// Jitter from which it is worth knowing.
 const JITTER_SHARE: f64 = 0.02;
+/// Jitter up to which a lost row can be told from a late one [steps, rms].
+const MAX_JITTER_STEPS: f64 = 0.2;
 
 impl LogJudge {
     /// What there is to say about the log.
@@ -55,7 +58,7 @@ fn conclude(judge: &LogJudge) -> Findings {
         duration_s: judge.clock.duration(),
         rate_hz: rate,
         jitter: rate.map(|_| clock.jitter),
-        even_rate_hz: even_rate(judge, &clock),
+        even_rate_hz: draft.found.even_rate_hz.or(even_rate(judge, &clock)),
         gaps: clock.gaps.iter().map(gap).collect(),
         channels: places
             .map(|place| channel_facts(judge, place, rate))
@@ -208,6 +211,13 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     let remedy = "sort the rows by time, or split the file where a second recording begins";
     let fault = (Error, FaultKind::BackwardTime, None);
     draft.stretches(fault, &seen.backward, &effect, remedy);
+    let jitters = |rows: &EvenRows| {
+        clock.jitter > JITTER_SHARE || rows.off_s > JITTER_SHARE * rows.even.step_s
+    };
+    if let Some(rows) = judge.sampling.even().filter(jitters) {
+        jitter(judge, clock, rows, draft);
+        return;
+    }
     gap_faults(clock, draft);
     if clock.uneven > UNEVEN_STEPS_SHARE || clock.jitter > JITTER_SHARE {
         let severity = match clock.uneven > UNEVEN_STEPS_SHARE {
@@ -225,6 +235,52 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
         let fault = (severity, FaultKind::IrregularClock, None);
         draft.of_log(fault, seen.rows, effect, remedy);
     }
+}
+
+/// Stamps that are not when rows were sampled: put on an even clock, or refused where a lost row cannot be told.
+fn jitter(judge: &LogJudge, clock: &ClockFacts, rows: EvenRows, draft: &mut FaultList) {
+    let seen = &judge.clock;
+    let EvenRows { even, off_s, .. } = rows;
+    let mean = seen.duration() / seen.rows.saturating_sub(1).max(1) as f64;
+    let in_bursts = clock.long > GAP * clock.dt;
+    if !in_bursts && off_s < MAX_JITTER_STEPS * even.step_s {
+        gap_faults(clock, draft);
+        let effect = format!(
+            "stamps are off by {} rms, and the positions show that rows were sampled evenly, every {}: they are put on an even clock",
+            seconds(off_s),
+            seconds(even.step_s)
+        );
+        let remedy =
+            "log the time at which a sample was taken, not at which it was written or received";
+        let fault = (Warning, FaultKind::IrregularClock, None);
+        draft.of_log(fault, seen.rows, effect, remedy);
+        draft.acts(fault);
+        draft.found.even = Some(even);
+        return;
+    }
+    let rate = match in_bursts {
+        true => 1.0 / mean,
+        false => 1.0 / even.step_s,
+    };
+    let rate = round_within(rate, 0.01 * rate);
+    let effect = match in_bursts {
+        true => format!(
+            "rows come in bursts, {} apart in them and {} on average, and the positions show that they were sampled evenly, at about {rate} Hz: by their stamps no velocity can be formed",
+            seconds(clock.dt),
+            seconds(mean)
+        ),
+        false => format!(
+            "stamps are off by {} rms, {:.0} % of a step, and the positions show that rows were sampled evenly, at about {rate} Hz: by their stamps no velocity can be formed",
+            seconds(off_s),
+            100.0 * off_s / even.step_s
+        ),
+    };
+    let remedy = format!(
+        "`rate_hz = {rate}` in [log] of the robot file puts rows on an even clock; or a counter of samples in the log as `time`"
+    );
+    let fault = (Error, FaultKind::IrregularClock, None);
+    draft.of_log(fault, seen.rows, effect, &remedy);
+    draft.found.even_rate_hz = Some(rate);
 }
 
 fn often(times: usize, what: &str) -> String {

@@ -103,12 +103,18 @@ pub fn words(name: &str) -> Vec<Word> {
 /// Words that make a command of whatever they stand in; an arm that leads is no measurement of the one that follows.
 const COMMANDS: &str = "\
     ref refs reference cmd cmds command commands commanded des desired target setpoint goal \
-    wanted sp leader master operator teleop action ctrl soll sollwert setp demand";
+    wanted sp leader master operator teleop action actions ctrl soll sollwert setp demand ip";
 
 /// Words of what is about a channel and no channel itself.
 const ASIDE: &str = "\
     error err errors deviation limit limits max min std var variance temp temperature status \
     flag fault warning enabled mode gain kp kd counter id power energy stiffness";
+
+/// Words of what is measured in the space of the tool, and of no joint.
+const CARTESIAN: &str = "tcp eef cartesian cart wrench fts";
+
+/// Words of torques that were made from a model or are the world's, and that no drive was measured to give.
+const NOT_MEASURED: &str = "ext external hat contact disturbance residual et";
 
 const ACCELERATIONS: &str = "acceleration accelerations accel acc ddq qdd qddot ddtheta qacc";
 const VELOCITIES: &str = "\
@@ -116,10 +122,10 @@ const VELOCITIES: &str = "\
     qvel spd geschwindigkeit";
 const POSITIONS: &str = "\
     position positions pos angle angles ang q theta thetas jpos encoder enc posn winkel poz qpos \
-    stroke strokes extension extensions travel displacement elongation hub weg lage fbpos";
+    stroke strokes extension extensions travel displacement elongation hub weg lage fbpos mp";
 const TORQUES: &str = "\
     jtrq torque torques effort efforts force forces tau taus moment moments trq tq mom jtau qfrc \
-    frc kraft drehmoment jnttrq trqs";
+    frc kraft drehmoment jnttrq trqs mt et";
 /// What makes torques; `current` is an adjective where another of these words stands beside it.
 const CURRENTS: &str = "\
     current currents curr cur iq amps amp ampere strom voltage voltages volts volt spannung";
@@ -191,9 +197,20 @@ pub fn is_command(words: &[Word]) -> bool {
     has(words, COMMANDS) || words.windows(2).any(|pair| desired(pair) || out(pair))
 }
 
-/// Whether words are of what is about a channel and no channel itself.
+/// Whether words are of what is about a channel and no channel itself, or of the tool and no joint.
 pub fn is_aside(words: &[Word]) -> bool {
-    has(words, ASIDE)
+    // UR's `tool_vector`, KUKA's `RIst.X`
+    let of_tool = |pair: &[Word]| match &*pair[0].text {
+        "tool" => lists("vector force accelerometer pose", &pair[1].text),
+        "ri" | "rs" => lists("st ist sol soll", &pair[1].text),
+        _ => false,
+    };
+    has(words, ASIDE) || has(words, CARTESIAN) || words.windows(2).any(of_tool)
+}
+
+/// Whether words of a torque say that it is an estimate of what acts from outside, and no measured torque.
+pub fn is_external(words: &[Word]) -> bool {
+    has(words, NOT_MEASURED)
 }
 
 /// What words say a channel holds, whether or not it was commanded; `None` where nothing.

@@ -3,6 +3,8 @@
 use super::LogError;
 use super::layout::{Channel, Layout, column_number};
 use super::names::{escape, list, nearest};
+use super::unit::{self, POSITIONS, TORQUES, UnitKind};
+use cft_ident_core::number::significant;
 
 /// Where a channel stands and how its numbers become SI.
 #[derive(Debug, Clone, Copy)]
@@ -28,25 +30,46 @@ pub(super) struct Header<'a> {
 
 impl Header<'_> {
     pub(super) fn columns(&self, layout: &Layout) -> Result<ScaledColumns, LogError> {
-        let each = |channels: &[Channel], what: &str| -> Result<Vec<ScaledColumn>, LogError> {
-            let of = |(channel, joint)| self.find(channel, &format!("{what} of {joint}"));
-            channels.iter().zip(&layout.joints).map(of).collect()
+        let each = |channels: &[Channel], what: &str, of: &[UnitKind]| {
+            let found = channels.iter().zip(&layout.joints).map(|(channel, joint)| {
+                let found = self.find(channel, &format!("{what} of {joint}"))?;
+                Ok((channel, joint, found))
+            });
+            let found = found.collect::<Result<Vec<_>, LogError>>()?;
+            // what stands in brackets and differs from joint to joint names them
+            let stated: Vec<_> = (found.iter())
+                .map(|(.., at)| name_and_unit(&self.names[at.index]).1)
+                .collect();
+            let alike = stated.len() < 2 || stated.windows(2).any(|pair| pair[0] == pair[1]);
+            for (channel, joint, at) in &found {
+                self.check_unit(channel, (joint, what), &self.names[at.index], (of, alike))?;
+            }
+            Ok::<_, LogError>(found.into_iter().map(|(.., at)| at).collect::<Vec<_>>())
         };
         let time = match layout.section.rate_hz {
             Some(_) => None,
-            None => Some(self.find(&of_one_column(self.names, &layout.time), "time")?),
+            None => {
+                let found = self.find(&of_one_column(self.names, &layout.time), "time")?;
+                self.check_time(&layout.time, &self.names[found.index])?;
+                Some(found)
+            }
         };
-        let positions = each(&layout.positions, layout.what())?;
-        let torques = each(&layout.torques, "torque")?;
+        let of_positions = if layout.temperatures {
+            &[][..]
+        } else {
+            &POSITIONS
+        };
+        let positions = each(&layout.positions, layout.what(), of_positions)?;
+        let torques = each(&layout.torques, "torque", &TORQUES)?;
         // A velocity is optional unless the robot file names its column.
         let wanted = |c: &Channel| c.key.is_some() || position_of(self.names, c).is_some();
         let velocities = match layout.velocities.iter().all(wanted) {
-            true => each(&layout.velocities, "velocity"),
+            true => each(&layout.velocities, "velocity", of_positions),
             false => Ok(Vec::new()),
         };
         // nothing is fitted to velocities: those in another unit are none
         let velocities = match velocities {
-            Err(LogError::Unit { .. }) => Vec::new(),
+            Err(LogError::Unit { .. } | LogError::UnknownUnit { .. }) => Vec::new(),
             found => found?,
         };
         Ok(ScaledColumns {
@@ -70,7 +93,6 @@ impl Header<'_> {
                 count: more + 1,
             });
         }
-        self.check_unit(channel, &self.names[index])?;
         Ok(ScaledColumn {
             index,
             factor: channel.factor,
@@ -97,23 +119,119 @@ impl Header<'_> {
         }
     }
 
-    /// Refuses a header that states another unit than the one that the number is read in.
-    fn check_unit(&self, channel: &Channel, name: &str) -> Result<(), LogError> {
-        let stated = unit_of(name);
-        let units = stated.and_then(known_unit).zip(known_unit(&channel.unit));
+    /// Refuses a header that states another unit than the one that the number is read in, or one that nobody knows.
+    fn check_unit(
+        &self,
+        channel: &Channel,
+        (joint, what): (&str, &str),
+        name: &str,
+        (of, alike): (&[UnitKind], bool),
+    ) -> Result<(), LogError> {
+        let Some(text) = unit_of(name).filter(|_| !of.is_empty()) else {
+            return Ok(());
+        };
+        let place = format!("[log.joint.{}] of the robot file", escape(joint));
+        let velocity = what == "velocity";
+        let what = if velocity { "position" } else { what };
+        let declared = unit::stated(&channel.unit, of);
+        let Some(stated) = unit::stated(text, of) else {
+            let label = !alike || is_label(text, joint) || !is_bracketed(name);
+            if label || channel.unit_is_said || declared.is_none() {
+                return Ok(());
+            }
+            return Err(LogError::UnknownUnit {
+                at: self.at.clone(),
+                column: escape(name),
+                unit: escape(text),
+                remedy: format!(
+                    "write what one of it is in {place}: `{what}_scale = ..`, {} per {}; or the unit that it is, `{what}_unit = \"..\"`, of {}",
+                    channel.unit,
+                    escape(text),
+                    list(unit::labels(of))
+                ),
+            });
+        };
+        let Some(declared) = declared else {
+            return Ok(());
+        };
+        let same = stated.unit.label == declared.unit.label;
+        // the scale of the robot file may be that of the units
+        let ratio = stated.times * stated.unit.size / declared.unit.size;
+        let scaled = (channel.scale / ratio - 1.0).abs() < 1e-3;
+        let drives = matches!(stated.unit.of, UnitKind::Current | UnitKind::Share);
+        let fits = match stated.times == 1.0 && same {
+            true => velocity || !stated.rate,
+            false if drives && stated.unit.of == declared.unit.of => {
+                channel.scale != 1.0 && !scaled
+            }
+            false => stated.unit.of == declared.unit.of && scaled && channel.scale != 1.0,
+        };
+        if fits {
+            return Ok(());
+        }
+        let lines = match stated.times {
+            1.0 => format!("`{what}_unit = \"{}\"`", stated.unit.label),
+            times => format!(
+                "`{what}_unit = \"{}\"` and `{what}_scale = {}`",
+                stated.unit.label,
+                significant(times, 9)
+            ),
+        };
+        Err(LogError::Unit {
+            at: self.at.clone(),
+            column: escape(name),
+            found: stated.shown(),
+            declared: declared.unit.label.to_owned(),
+            remedy: format!("set {lines} in {place}, or correct the header"),
+        })
+    }
+
+    /// The same of the time.
+    fn check_time(&self, channel: &Channel, name: &str) -> Result<(), LogError> {
+        let units = unit_of(name)
+            .and_then(time_unit)
+            .zip(time_unit(&channel.unit));
         let Some((found, declared)) = units.filter(|(found, declared)| found != declared) else {
             return Ok(());
         };
         Err(LogError::Unit {
             at: self.at.clone(),
             column: escape(name),
-            found,
-            declared,
+            found: found.to_owned(),
+            declared: declared.to_owned(),
             remedy: format!(
-                "set the unit of this column to \"{found}\" in the [log] section of the robot file, or correct the header"
+                "set `time_unit = \"{found}\"` in [log] of the robot file, or correct the header"
             ),
         })
     }
+}
+
+/// Words that say how something was measured, and no unit.
+const DESCRIBING: &str = "\
+    raw filtered filt filter measured meas act actual est estimated motor mot joint jnt link axis drive encoder enc \
+    left right load side abs rel ist state value signal data in out sensor feedback fbk robot arm smooth";
+
+/// Whether a text in brackets names a joint or says how something was measured: `[A1]`, `(filtered)`, `[elbow]`.
+pub(crate) fn is_label(text: &str, joint: &str) -> bool {
+    let parts = |text: &str| -> Vec<String> {
+        let words = text.split(|c: char| !c.is_alphanumeric());
+        words
+            .filter(|w| !w.is_empty())
+            .map(str::to_lowercase)
+            .collect()
+    };
+    let (words, joint) = (parts(text), parts(joint));
+    let numbered = |word: &str| word.ends_with(|c: char| c.is_ascii_digit());
+    text.contains('=')
+        || words.is_empty()
+        || words.iter().any(|word| {
+            let described = DESCRIBING.split_whitespace().any(|known| known == word);
+            described || numbered(word) || joint.contains(word)
+        })
+}
+
+fn is_bracketed(name: &str) -> bool {
+    name_and_unit(name).1.is_some()
 }
 
 /// A clock of two columns, `sec+nanosec`, by the first of them; its name finds the other.
@@ -185,39 +303,23 @@ fn suffix_unit(name: &str) -> Option<&str> {
 }
 
 /// Units of quantities that no channel is of.
-const OTHERS: [&str; 18] = [
-    "%", "c", "°c", "degc", "k", "rpm", "hz", "w", "j", "ma", "mrad", "kg", "bar", "pa", "um",
-    "min", "h", "date",
+const OTHERS: [&str; 15] = [
+    "c", "°c", "degc", "k", "rpm", "hz", "w", "j", "bar", "pa", "min", "h", "date", "m/s^2", "utc",
 ];
 
 pub(super) fn is_unit(text: &str) -> bool {
-    known_unit(text).is_some() || OTHERS.contains(&&*text.to_lowercase())
+    let lower = text.to_lowercase();
+    let any = || unit::stated(text, &POSITIONS).or_else(|| unit::stated(text, &TORQUES));
+    time_unit(text).is_some() || OTHERS.contains(&&*lower) || any().is_some()
 }
 
-/// One spelling for the units that headers state; a rate is known by its numerator.
-fn known_unit(text: &str) -> Option<&'static str> {
-    let lower = text.to_lowercase();
-    let unit = lower.split('/').next()?.trim();
-    Some(match unit {
-        "deg" | "°" | "degree" | "degrees" => "deg",
-        "rad" | "radian" | "radians" => "rad",
-        "m" | "meter" | "metre" | "meters" | "metres" => "m",
-        "mm" => "mm",
-        "cm" => "cm",
-        "turn" | "turns" | "rev" | "revs" | "revolutions" => "turns",
-        "counts" | "count" | "ticks" => "counts",
-        "n" | "newton" => "N",
-        "kn" => "kN",
-        "knm" => "kNm",
-        "ncm" => "Ncm",
-        "mnm" | "nmm" => "mNm",
-        "nm" | "n m" | "n.m" | "n·m" | "n*m" => "Nm",
-        "a" | "ampere" | "amps" => "A",
-        "v" | "volt" | "volts" => "V",
+/// One spelling for the units of time that headers state.
+fn time_unit(text: &str) -> Option<&'static str> {
+    Some(match &*text.trim().to_lowercase() {
         "s" | "sec" | "second" | "seconds" => "s",
-        "ms" => "ms",
-        "us" | "µs" | "μs" => "us",
-        "ns" => "ns",
+        "ms" | "msec" | "millisecond" | "milliseconds" => "ms",
+        "us" | "µs" | "μs" | "usec" => "us",
+        "ns" | "nsec" => "ns",
         _ => return None,
     })
 }

@@ -1,6 +1,6 @@
 //! Files opened for what they hold: decompressed on the way, and known by their first bytes.
 
-use std::io::{self, BufReader, Chain, Cursor, Read};
+use std::io::{self, BufReader, Chain, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::stream::Hashed;
@@ -17,6 +17,9 @@ pub(super) enum Compression {
     None,
     Gzip,
     Zstd,
+    Xz,
+    Lz4,
+    Bzip2,
 }
 
 pub(super) type Bytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
@@ -64,11 +67,15 @@ impl Content {
         let raw = Hashed::new(file);
         let mut file = raw.clone();
         let mut magic = Vec::new();
-        let read = Read::by_ref(&mut file).take(4).read_to_end(&mut magic);
+        let read = Read::by_ref(&mut file).take(6).read_to_end(&mut magic);
         read.map_err(fail)?;
         let compression = match magic[..] {
             [0x1f, 0x8b, ..] => Compression::Gzip,
-            _ if magic == ZSTD => Compression::Zstd,
+            _ if magic.starts_with(&ZSTD) => Compression::Zstd,
+            _ if magic == XZ => Compression::Xz,
+            _ if magic.starts_with(&LZ4) => Compression::Lz4,
+            // its level, then the beginning of pi
+            [b'B', b'Z', b'h', b'1'..=b'9', b'1', b'A'] => Compression::Bzip2,
             _ => Compression::None,
         };
         let mut rest = plain(Cursor::new(magic).chain(file), compression).map_err(fail)?;
@@ -153,6 +160,9 @@ fn has_two_lines(text: &[u8]) -> bool {
     whole.filter(described).count() >= 2
 }
 
+/// First bytes of what xz and lz4 compressed.
+const XZ: [u8; 6] = *b"\xfd7zXZ\0";
+const LZ4: [u8; 4] = [0x04, 0x22, 0x4d, 0x18];
 /// First bytes of what zstd compressed.
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 /// Bytes that a message may take once it is decompressed, per byte that it takes compressed.
@@ -197,6 +207,27 @@ pub fn unpacked(packed: &[u8]) -> io::Result<Vec<u8>> {
     zstd::stream::decode_all(packed)
 }
 
+/// A chunk of a ROS 1 bag, at most so many bytes of it.
+pub(super) fn unpacked_chunk(packed_by: &str, packed: Vec<u8>, most: u64) -> io::Result<Vec<u8>> {
+    let mut plain = Vec::new();
+    match packed_by {
+        "none" => return Ok(packed),
+        "bz2" => {
+            let decoder = bzip2::read::BzDecoder::new(packed.as_slice());
+            decoder.take(most).read_to_end(&mut plain)?;
+        }
+        "lz4" => {
+            let decoder = lz4::Decoder::new(packed.as_slice())?;
+            decoder.take(most).read_to_end(&mut plain)?;
+        }
+        other => {
+            let problem = format!("a chunk is packed by `{other}`, which is not read");
+            return Err(io::Error::new(io::ErrorKind::Unsupported, problem));
+        }
+    }
+    Ok(plain)
+}
+
 struct CutOff(io::ErrorKind, String);
 
 impl Read for CutOff {
@@ -213,5 +244,15 @@ fn plain(
         Compression::None => Box::new(file),
         Compression::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(file))),
         Compression::Zstd => Box::new(zstd::stream::read::Decoder::new(file)?),
+        Compression::Xz => {
+            // the crate unpacks a file as a whole
+            let mut plain = tempfile::tempfile()?;
+            lzma_rs::xz_decompress(&mut BufReader::new(file), &mut plain)
+                .map_err(|error| io::Error::new(io::ErrorKind::UnexpectedEof, error.to_string()))?;
+            plain.seek(SeekFrom::Start(0))?;
+            Box::new(BufReader::new(plain))
+        }
+        Compression::Lz4 => Box::new(lz4::Decoder::new(file)?),
+        Compression::Bzip2 => Box::new(bzip2::read::MultiBzDecoder::new(file)),
     })
 }

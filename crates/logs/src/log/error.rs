@@ -135,11 +135,42 @@ pub enum LogError {
         at: String,
         column: String,
         /// Unit in the header.
-        found: &'static str,
+        found: String,
         /// Unit that was declared or assumed.
-        declared: &'static str,
+        declared: String,
         remedy: String,
     },
+    /// A header that states a unit which nobody knows.
+    #[explain(
+        "{at}: column `{column}` is in `{unit}`, which is no unit that is known",
+        remedy
+    )]
+    UnknownUnit {
+        at: String,
+        column: String,
+        unit: String,
+        remedy: String,
+    },
+    /// A row that lists other joints than the first.
+    #[explain(
+        "{at}: the row does not list the joints of the first row, {names}",
+        "part the log where the joints change, or delete these rows"
+    )]
+    OtherNames { at: String, names: String },
+    /// A table of another form.
+    #[explain("{at}: column `{column}` holds {what}", remedy)]
+    Cells {
+        at: String,
+        column: String,
+        what: &'static str,
+        remedy: String,
+    },
+    /// Columns of times that differ.
+    #[explain(
+        "{at}: `{column}` is another time than that of the first channel: each channel has a clock of its own",
+        "export all channels with one sample time, or interpolate them onto one clock"
+    )]
+    Clocks { at: String, column: String },
     /// A row with more or fewer fields than the header.
     #[explain(
         "{at}: the row has {found} fields, the header names {expected}",

@@ -20,6 +20,10 @@ pub struct Channel {
     pub wrap: Option<f64>,
     /// The key of the robot file that names this column; absent for a name of the contract.
     pub key: Option<String>,
+    /// Whether the robot file states the unit of the logged number, or a scale for it.
+    pub unit_is_said: bool,
+    /// The scale that it states beside the unit, 1 where there is none.
+    pub scale: f64,
 }
 
 impl Channel {
@@ -32,7 +36,16 @@ impl Channel {
             offset: 0.0,
             wrap: None,
             key: None,
+            unit_is_said: false,
+            scale: 1.0,
         }
+    }
+
+    /// The same with what the robot file says of its unit and of its scale.
+    pub fn said(mut self, unit: bool, scale: Option<f64>) -> Self {
+        self.unit_is_said = unit || scale.is_some();
+        self.scale = scale.unwrap_or(1.0);
+        self
     }
 }
 

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use super::even::EvenSpacing;
+
 /// Follows one position that begins anew after its range, through its turns.
 #[derive(Debug)]
 pub(crate) struct Unwrap {
@@ -53,6 +55,8 @@ pub struct Mending {
     pub wraps: Vec<Option<f64>>,
     /// Rows for which each sample was held: only fresh ones are handed out.
     pub held: Option<usize>,
+    /// The even clock of rows whose stamps jitter.
+    pub even: Option<EvenSpacing>,
     /// Whether rows that repeat others in the middle of a motion stay.
     pub keep_repeats: bool,
     /// Numbers to replace, in the order of time.

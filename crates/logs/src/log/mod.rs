@@ -10,7 +10,9 @@
 mod arrays;
 mod columns;
 mod content;
+mod delayed;
 mod error;
+mod even;
 mod held_files;
 mod json_text;
 mod layout;
@@ -35,11 +37,13 @@ mod text;
 mod time;
 mod time_unit;
 mod two_clocks;
+mod unit;
 
 pub use arrays::Arrays;
 pub use cft_ident_core::block::Block;
 pub use content::REDUCED;
 pub use error::LogError;
+pub use even::EvenSpacing;
 pub use layout::{Channel, Conversion, DeclaredChannels, Layout};
 pub use mend::{Bridge, Mending};
 pub use names::{escape, escape_whole, nearest};
@@ -47,20 +51,24 @@ pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
 pub use recording::{CdrReader, StateGroup, TopicFacts, Value};
 pub use section::{
-    ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
-    PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
+    ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection, RowFault,
+    Stamp, TimeUnit, TorqueIs,
 };
 pub use shared::shares_rows;
 pub use source::{DataRole, Provenance, begins_with, sha256};
 pub use spec::{LogSpec, Span};
 pub use temperatures::Temperatures;
 pub use time::Instant;
+pub use unit::{PositionUnit, TorqueUnit};
 
+pub(crate) use columns::is_label;
 pub use columns::unit_of;
 pub use content::unpacked;
+pub(crate) use even::{EvenClock, EvenFit};
 pub use layout::channel;
 pub(crate) use mend::Unwrap;
 pub use names::{did_you_mean, is_hidden, list};
 pub(crate) use pass::round_within;
 pub(crate) use recording::{DelayEstimate, DelayEstimator};
 pub use source::{bytes, named_beside, named_beside_of, remedy, sha256_of_bytes, shown};
+pub(crate) use unit::{POSITIONS, TORQUES, UnitKind, spoken as spoken_unit, stated as stated_unit};

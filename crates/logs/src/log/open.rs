@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::LogError;
 use super::columns::choose;
 use super::content::Content;
+use super::delayed::DelayedRows;
 use super::layout::Layout;
 use super::recording::{
     JoinedTopics, JointStates, MessageRows, format_of, has_none, of_joints, of_topics,
@@ -30,6 +31,20 @@ pub(super) fn open(
     layout: &Layout,
     strictness: Strictness,
 ) -> Result<Opened, LogError> {
+    let mut opened = opened(files, layout, strictness)?;
+    let torques = !opened.layout.joints.is_empty() && !opened.layout.torques.is_empty();
+    if let Some(delay_s) = layout.section.torque_delay_s
+        && strictness == Strictness::Refuse
+        && torques
+        && !opened.rows.takes_delay()
+    {
+        let hold = opened.layout.zero_order_hold;
+        opened.rows = Box::new(DelayedRows::new(opened.rows, delay_s, hold));
+    }
+    Ok(opened)
+}
+
+fn opened(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Opened, LogError> {
     if let [path, more @ ..] = files
         && (more.is_empty() || table::begins(path))
     {
@@ -76,9 +91,15 @@ pub(super) fn open(
             Ok(recorded(Box::new(states), layout, refused))
         }
         // any other messages are read by the paths of their numbers
-        Err(error) if has_none(&error) && layout.joints.is_empty() => {
-            let rows = JoinedTopics::of_all(files, layout.section.topic.as_deref())?;
-            Ok(recorded(Box::new(rows), layout.clone(), None))
+        Err(error) if layout.joints.is_empty() => {
+            let topic = layout.section.topic.as_deref();
+            if topic.is_none() && !has_none(&error) {
+                return Err(error);
+            }
+            match JoinedTopics::of_all(files, topic) {
+                Ok(rows) => Ok(recorded(Box::new(rows), layout.clone(), None)),
+                Err(other) => Err(if has_none(&error) { other } else { error }),
+            }
         }
         Err(error) => Err(refused.unwrap_or(error)),
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::columns::{time_of, unit_of};
 use super::content::Content;
+use super::even::{DeclaredEven, EvenClock};
 use super::layout::Layout;
 use super::open::open;
 use super::rows::{LogRows, Strictness, counted};
@@ -43,6 +44,8 @@ pub(super) struct LogPass {
     /// Times of the first and the last row handed out [s].
     used: Option<(f64, f64)>,
     pub(super) samples: u64,
+    /// The even clock of a recording whose rate is given.
+    even: Option<EvenClock>,
     /// Whether a row was read, and those at the beginning that have no time yet and are left out.
     begun: bool,
     unstamped: u64,
@@ -93,6 +96,19 @@ impl LogPass {
         if !stated && let Some(column) = time_of(pass.rows.names(), &pass.layout.time) {
             pass.recognise(column)?;
         }
+        if let Some(rate) = pass.layout.section.rate_hz
+            && pass.rows.is_recording()
+        {
+            let (mut rows, mut origin) = (pass.again()?, None);
+            let mut declared = DeclaredEven::default();
+            while let Some(stamp) = rows.next()? {
+                let t = stamp.seconds(&mut origin);
+                if t.is_finite() {
+                    declared.take(t, rate);
+                }
+            }
+            pass.even = declared.clock(rate).map(EvenClock::new);
+        }
         Ok(pass)
     }
 
@@ -142,6 +158,11 @@ impl LogPass {
             self.unstamped,
             "rows at the beginning are stamped 0, before the clock was set, and are left out",
         ));
+        if let (Some(rate), true) = (self.layout.section.rate_hz, self.even.is_some()) {
+            shown.push(format!(
+                "messages are put on an even clock of {rate} Hz, as `rate_hz` says"
+            ));
+        }
         if let Some((unit, column)) = &self.recognised {
             let unit = unit.in_seconds().0;
             shown.push(format!(
@@ -166,6 +187,7 @@ impl LogPass {
             span: None,
             used: None,
             samples: 0,
+            even: None,
             begun: false,
             unstamped: 0,
             watch: None,
@@ -226,7 +248,15 @@ impl LogPass {
                 stamp = self.rows.next()?;
             }
         }
-        Ok(stamp.map(|stamp| stamp.seconds(&mut self.origin)))
+        // of messages that are there twice one has a place on an even clock
+        while self.even.is_some() && stamp.is_some() && self.rows.repeats() {
+            stamp = self.rows.next()?;
+        }
+        let t = stamp.map(|stamp| stamp.seconds(&mut self.origin));
+        Ok(match &mut self.even {
+            None => t,
+            Some(even) => t.map(|t| even.take(t)),
+        })
     }
 
     /// Rows at the beginning of a file that are all stamped 0, far from where its clock goes on.

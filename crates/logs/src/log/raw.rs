@@ -8,7 +8,7 @@ use super::content::Content;
 use super::layout::{Channel, Layout};
 use super::pass::LogPass;
 use super::recording::{self, StateGroup, TopicFacts, format_of, state_groups};
-use super::rows::Strictness;
+use super::rows::{Strictness, counted};
 use super::source::Provenance;
 use super::time::Instant;
 use super::two_clocks::rest_of;
@@ -85,6 +85,9 @@ pub struct RawReader {
     pass: LogPass,
     /// Fields that are neither empty nor a number, per column.
     words: Vec<u64>,
+    /// Time and numbers of the last row of the block before, and messages that repeat the one before them in everything.
+    last: (f64, Vec<f64>),
+    duplicates: u64,
 }
 
 impl RawReader {
@@ -98,7 +101,12 @@ impl RawReader {
         };
         let pass = LogPass::open(spec, layout, Strictness::Record)?;
         let words = vec![0; pass.rows.names().len()];
-        Ok(Self { pass, words })
+        Ok(Self {
+            pass,
+            words,
+            last: (f64::NAN, Vec::new()),
+            duplicates: 0,
+        })
     }
 
     /// Opens a log of no robot that is known, by what `section` says of topic, delimiter and rate.
@@ -195,6 +203,10 @@ impl RawReader {
     /// A file that can no longer be read, or a line without an end.
     pub fn read(&mut self, block: &mut RawBlock) -> Result<bool, LogError> {
         let width = self.words.len();
+        if let Some(t) = block.t.last() {
+            let row = block.columns.iter().filter_map(|column| column.last());
+            self.last = (*t, row.copied().collect());
+        }
         block.clear(width);
         let most = (RawBlock::NUMBERS / width.max(1)).clamp(16, RawBlock::ROWS);
         while block.rows() < most
@@ -207,6 +219,10 @@ impl RawReader {
                     continue;
                 }
                 self.pass.count(0, t, t);
+            }
+            if self.repeats(t, block) {
+                self.duplicates += 1;
+                continue;
             }
             self.pass.samples += 1;
             block.t.push(t);
@@ -223,6 +239,25 @@ impl RawReader {
         Ok(block.rows() > 0)
     }
 
+    /// Whether the current message is there twice, time included: nobody can delete it from a recording.
+    fn repeats(&self, t: f64, block: &RawBlock) -> bool {
+        let before = block.t.last().copied().unwrap_or(self.last.0);
+        if t != before || !self.is_recording() {
+            return false;
+        }
+        (0..self.words.len()).all(|column| {
+            let own = self.pass.rows.logged(column).unwrap_or(f64::NAN);
+            let last = match block.t.is_empty() {
+                true => self.last.1.get(column).copied(),
+                false => block
+                    .columns
+                    .get(column)
+                    .and_then(|all| all.last().copied()),
+            };
+            last.is_some_and(|last| last == own || (last.is_nan() && own.is_nan()))
+        })
+    }
+
     /// Time from the first to the last row so far [s].
     pub fn duration_s(&self) -> f64 {
         self.pass.duration_s()
@@ -235,7 +270,12 @@ impl RawReader {
 
     /// What was left out, one sentence each; call it after the last block.
     pub fn warnings(&self) -> Vec<String> {
-        self.pass.warnings()
+        let mut out = self.pass.warnings();
+        out.extend(counted(
+            self.duplicates,
+            "messages repeat the message before, time included, and are left out",
+        ));
+        out
     }
 
     pub(crate) fn breaks(&self) -> Vec<String> {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::arrays::{ArrayRows, Arrays};
+use super::even::EvenClock;
 use super::layout::{Channel, Layout};
 use super::mend::{Bridging, Failed, Held, Mending, Unwrap};
 use super::pass::LogPass;
@@ -27,6 +28,7 @@ pub struct Reader {
     held: Held,
     bridging: Bridging,
     failed: Failed,
+    even: Option<EvenClock>,
     /// Messages that repeat the one before them in everything.
     duplicates: u64,
     /// Rows at the end of the last block that may turn out to be stale.
@@ -95,6 +97,7 @@ impl Reader {
             held: Held::default(),
             bridging: Bridging::default(),
             failed: Failed::default(),
+            even: None,
             duplicates: 0,
             pending: Block::default(),
         };
@@ -112,6 +115,7 @@ impl Reader {
         };
         self.turning = positions.filter_map(turning).collect();
         self.held = Held::new(mending.held);
+        self.even = mending.even.map(EvenClock::new);
         self.bridging = Bridging::new(Arc::clone(&mending.bridges));
         self.failed = Failed::new(Arc::clone(&mending.failed));
         self.stale.keep = mending.keep_repeats;
@@ -189,7 +193,7 @@ impl Reader {
                 break;
             }
             let since = t - self.seen.map_or(t, |(first, _)| first);
-            if !self.failed.has(t) && !self.pass.spec.leaves_out(since) {
+            if (self.even.is_some() || !self.failed.has(t)) && !self.pass.spec.leaves_out(since) {
                 self.take(t, block)?;
             }
         }
@@ -330,6 +334,17 @@ impl Reader {
         if self.held.repeats(logged) {
             block.truncate(block.len() - 1);
             return Ok(());
+        }
+        let mut t = t;
+        if let Some(even) = &mut self.even {
+            t = even.take(t);
+            if self.failed.has(t) {
+                block.truncate(block.len() - 1);
+                return Ok(());
+            }
+            if let Some(last) = block.t.last_mut() {
+                *last = t;
+            }
         }
         let (q, tau) = (&mut block.q[at_q..], &mut block.tau[at_tau..]);
         for (place, unwrap) in &mut self.turning {

@@ -63,6 +63,11 @@ pub(super) trait LogRows: Send {
         true
     }
 
+    /// Whether it takes the delay of the torques off itself.
+    fn takes_delay(&self) -> bool {
+        false
+    }
+
     /// Whether the current row equals the one before it in all that the log holds of it.
     fn repeats(&self) -> bool {
         false

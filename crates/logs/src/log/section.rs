@@ -8,151 +8,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
-/// Unit of a logged position.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum PositionUnit {
-    /// Metre.
-    #[serde(rename = "m")]
-    Metre,
-    /// Centimetre.
-    #[serde(rename = "cm")]
-    Centimetre,
-    /// Millimetre.
-    #[serde(rename = "mm")]
-    Millimetre,
-    /// Radian.
-    #[serde(rename = "rad")]
-    Radian,
-    /// Degree.
-    #[serde(rename = "deg")]
-    Degree,
-    /// Whole turns.
-    #[serde(rename = "turns")]
-    Turn,
-    /// Encoder counts: those of the CFT robot's actuators by Table 5, of a joint by `position_scale`.
-    #[serde(rename = "counts")]
-    Counts,
-}
-
-impl PositionUnit {
-    /// As it is written in files.
-    pub const fn label(self) -> &'static str {
-        match self {
-            Self::Metre => "m",
-            Self::Centimetre => "cm",
-            Self::Millimetre => "mm",
-            Self::Turn => "turns",
-            Self::Radian => "rad",
-            Self::Degree => "deg",
-            Self::Counts => "counts",
-        }
-    }
-
-    /// Whether it is a length.
-    pub const fn is_length(self) -> bool {
-        matches!(self, Self::Metre | Self::Centimetre | Self::Millimetre)
-    }
-
-    /// Whether it is an angle.
-    pub const fn is_angle(self) -> bool {
-        matches!(self, Self::Radian | Self::Degree | Self::Turn)
-    }
-
-    /// SI units in one of it; 1 for counts, whose size depends on the coordinate.
-    pub const fn in_si(self) -> f64 {
-        match self {
-            Self::Metre | Self::Radian | Self::Counts => 1.0,
-            Self::Centimetre => 1e-2,
-            Self::Millimetre => 1e-3,
-            Self::Turn => std::f64::consts::TAU,
-            Self::Degree => std::f64::consts::PI / 180.0,
-        }
-    }
-}
-
-/// Unit of a logged torque or force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum TorqueUnit {
-    /// Newton.
-    #[serde(rename = "N")]
-    Newton,
-    /// Newton metre.
-    #[serde(rename = "Nm")]
-    NewtonMetre,
-    /// Kilonewton.
-    #[serde(rename = "kN")]
-    Kilonewton,
-    /// Kilonewton metre.
-    #[serde(rename = "kNm")]
-    KilonewtonMetre,
-    /// Newton centimetre.
-    #[serde(rename = "Ncm")]
-    NewtonCentimetre,
-    /// Millinewton metre.
-    #[serde(rename = "mNm")]
-    MillinewtonMetre,
-    /// Ampere of motor current, kept as such: the model is then in A.
-    #[serde(rename = "A")]
-    Ampere,
-    /// Volt at the amplifier, kept as such likewise.
-    #[serde(rename = "V")]
-    Volt,
-    /// Counts of a drive, kept as such likewise.
-    #[serde(rename = "counts")]
-    Counts,
-    /// Percent of a drive's rated torque or current, kept as such likewise.
-    #[serde(rename = "%")]
-    Percent,
-}
-
-impl TorqueUnit {
-    /// As it is written in files.
-    pub const fn label(self) -> &'static str {
-        match self {
-            Self::Newton => "N",
-            Self::NewtonMetre => "Nm",
-            Self::Kilonewton => "kN",
-            Self::KilonewtonMetre => "kNm",
-            Self::NewtonCentimetre => "Ncm",
-            Self::MillinewtonMetre => "mNm",
-            Self::Ampere => "A",
-            Self::Volt => "V",
-            Self::Counts => "counts",
-            Self::Percent => "%",
-        }
-    }
-
-    /// Whether it is a unit of force or torque, and not one that a gain takes to them.
-    pub const fn is_torque(self) -> bool {
-        self.is_force() || self.is_moment()
-    }
-
-    /// Whether it is a unit of force.
-    pub const fn is_force(self) -> bool {
-        matches!(self, Self::Newton | Self::Kilonewton)
-    }
-
-    /// Whether it is a unit of torque.
-    pub const fn is_moment(self) -> bool {
-        matches!(
-            self,
-            Self::NewtonMetre
-                | Self::KilonewtonMetre
-                | Self::NewtonCentimetre
-                | Self::MillinewtonMetre
-        )
-    }
-
-    /// N or Nm in one of it; 1 where it is no torque.
-    pub const fn in_si(self) -> f64 {
-        match self {
-            Self::Kilonewton | Self::KilonewtonMetre => 1e3,
-            Self::NewtonCentimetre => 1e-2,
-            Self::MillinewtonMetre => 1e-3,
-            _ => 1.0,
-        }
-    }
-}
+use super::unit::{PositionUnit, TorqueUnit};
 
 /// What the torque channel is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -378,7 +234,8 @@ pub struct LogSection {
     /// their steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_unit: Option<TimeUnit>,
-    /// Rate of a text log that has no column of times [Hz]: its rows lie evenly, the first at 0.
+    /// Rate of a text log that has no column of times [Hz]: its rows lie evenly, the first at 0. Messages of a
+    /// recording are put on an even clock of this rate, lost ones left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// Kinds of findings about rows that are reported but not acted upon: the rows stay in a fit as they
@@ -403,7 +260,7 @@ pub struct LogSection {
     /// Which time of a message counts.
     #[serde(default, skip_serializing_if = "is_default")]
     pub stamp: Stamp,
-    /// Time by which torques of a topic of their own lag behind the positions [s]; it is taken off.
+    /// Time by which torques lag behind the positions [s]; it is taken off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_delay_s: Option<f64>,
     /// Joint or actuator channels.

@@ -227,9 +227,9 @@ fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, LogError> {
     }
     found.sort_by_cached_key(|(_, path)| natural(&file_name(path)));
     let problem = match found.first() {
-        None => "holds no .mcap or .db3 file, and no dataset of LeRobot",
+        None => "holds no .mcap, .db3 or .bag file, and no dataset of LeRobot",
         Some((first, _)) if found.iter().any(|(other, _)| other != first) => {
-            "holds both .mcap and .db3 files"
+            "holds recordings of several formats"
         }
         Some(_) => return Ok(found.into_iter().map(|(_, path)| path).collect()),
     };

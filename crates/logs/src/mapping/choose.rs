@@ -5,13 +5,13 @@ use serde::Serialize;
 
 use super::column::LogColumn;
 use super::family::{How, temperatures};
-use super::fitting::{Taken, best, left, offered, without_common_head};
+use super::fitting::{Taken, best, external, left, offered, without_common_head};
 use super::look::{ClockSource, SeenColumns};
 use super::shown::{Known, shown};
 use super::units::{of_positions, of_torques, other_velocity, stated_position};
 use crate::inspect::ChannelRole;
 use crate::inspect::words::without_joint;
-use crate::log::escape;
+use crate::log::{TORQUES, UnitKind, escape, stated_unit};
 use cft_ident_core::robot::JointKind;
 
 /// One joint and its columns.
@@ -46,6 +46,16 @@ pub struct JointColumns {
     /// Columns are named by paths in messages.
     #[serde(skip)]
     pub by_path: bool,
+}
+
+impl JointColumns {
+    /// Whether its torque is one, by its unit, and not what drives a motor.
+    pub fn is_torque(&self) -> bool {
+        let of = self
+            .torque_unit
+            .and_then(|unit| stated_unit(unit, &TORQUES));
+        of.is_none_or(|unit| matches!(unit.unit.of, UnitKind::Force | UnitKind::Moment))
+    }
 }
 
 /// The joints, each with its columns, and what is to be looked at.
@@ -101,15 +111,21 @@ impl Mapping {
                 true => (&mut torque, "torques"),
                 false => (&mut position, "positions"),
             };
-            if what == "torques" && taken.columns.iter().flatten().all(|c| c.commanded) {
-                out.torque_is = "commanded";
-            }
             out.checks.push(format!(
                 "{what}: {} in the order of the joints, for they are what is left and no name says more",
                 escape(&taken.pattern)
             ));
             *place = Some(taken);
         }
+        let external = external(columns, &names);
+        if let (None, [first, ..]) = (&torque, &external[..]) {
+            out.warnings.push(format!(
+                "{} are estimates of what acts from outside, and no measured torques: they are not taken",
+                escape(first)
+            ));
+        }
+        out.others
+            .extend(external.iter().map(|pattern| escape(pattern)));
         let all = [position, velocity, torque];
         for (taken, (_, what)) in all.iter().zip(ROLES) {
             match taken {
@@ -213,7 +229,9 @@ impl Mapping {
             }
         };
         let others: Vec<String> = taken.others.iter().map(|other| escape(other)).collect();
-        let tie = taken.tie.then(|| format!("{pattern} or {}?", others[0]));
+        // of two that may be the torques the model is as good as the choice
+        let tie = taken.tie || (what == "torques" && !others.is_empty());
+        let tie = tie.then(|| format!("{pattern} or {}?", others[0]));
         let checks = check.into_iter().chain(tie);
         self.checks
             .extend(checks.map(|check| format!("{what}: {check}")));
@@ -242,7 +260,7 @@ impl Mapping {
         let limits: Vec<Option<f64>> = found.iter().map(|k| known[*k].torque).collect();
         let units = of_torques(&columns, &limits);
         let mut each = units.iter();
-        let current = each.any(|unit| unit.drive && unit.unit == Some("A"));
+        let current = each.any(|unit| unit.drive && matches!(unit.unit, Some("A" | "mA" | "uA")));
         for (k, unit) in found.iter().zip(units) {
             let joint = &mut self.joints[*k];
             (joint.torque_unit, joint.torque_scale) = (unit.unit, unit.scale);

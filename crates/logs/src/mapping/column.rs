@@ -1,6 +1,6 @@
 //! A column of a log, as its name and its numbers show it.
 
-use crate::inspect::words::{is_aside, is_command, joint, role, words};
+use crate::inspect::words::{is_aside, is_command, is_external, joint, role, words};
 use crate::inspect::{ChannelRole, InspectedChannel};
 
 /// A column of a log.
@@ -14,6 +14,8 @@ pub struct LogColumn {
     pub role: ChannelRole,
     /// It was commanded, or is of a machine that leads.
     pub commanded: bool,
+    /// It is an estimate of torques from outside, and no measured one.
+    pub external: bool,
     /// The joint that its name speaks of; empty where it names none.
     pub joint: String,
     /// The unit that its name states.
@@ -41,6 +43,7 @@ impl LogColumn {
             name: name.to_owned(),
             role,
             commanded: is_command(&spoken),
+            external: role == ChannelRole::Torque && is_external(&spoken),
             joint,
             ..Self::default()
         }

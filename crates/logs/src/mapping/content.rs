@@ -8,6 +8,8 @@ const MIN_CLOCK_ROWS: usize = 100;
 const MIN_SHARE_OF_EACH_STEP: f64 = 0.1;
 /// Likeness of a column to the differences of another that makes it its velocity.
 const VELOCITY_CORRELATION: f64 = 0.9;
+/// Share of the farthest travel from which a joint moves.
+const MIN_SHARE_OF_TRAVEL: f64 = 0.02;
 /// Part of the joints that must show such a velocity.
 const MIN_SHARE_OF_JOINTS: f64 = 0.6;
 
@@ -61,6 +63,49 @@ fn likeness(position: &[f64], velocity: &[f64]) -> f64 {
         true => (n * ab - a * b) / spread.sqrt(),
         false => 0.0,
     }
+}
+
+/// Median step upward of some times; 0 where there is none.
+pub(super) fn usual_step(times: &[f64]) -> f64 {
+    let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Likeness from which a column is the derivative of another and nothing beside it, where its size is that too.
+const SAME_CORRELATION: f64 = 0.999;
+const SAME_SIZE: f64 = 0.02;
+
+/// Whether a column is the derivative of a position by time, in its unit or by a factor of degrees.
+pub(super) fn is_rate_of(position: &[f64], other: &[f64], step: f64) -> bool {
+    if likeness(position, other) < SAME_CORRELATION {
+        return false;
+    }
+    let spread = |of: &dyn Fn(usize) -> f64| {
+        let all = (5..position.len().saturating_sub(5)).map(of);
+        all.filter(|x| x.is_finite())
+            .map(|x| x * x)
+            .sum::<f64>()
+            .sqrt()
+    };
+    let rate = spread(&|k| (position[k + 5] - position[k - 5]) / (10.0 * step));
+    let size = spread(&|k| other[k]) / rate;
+    [1.0, 1f64.to_degrees(), 1f64.to_radians()]
+        .iter()
+        .any(|known| (size / known - 1.0).abs() < SAME_SIZE)
+}
+
+/// Whether a column is the difference of two others, to a thousandth of its size.
+pub(super) fn is_difference(a: &[f64], b: &[f64], other: &[f64]) -> bool {
+    let rows = a.len().min(b.len()).min(other.len());
+    let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
+        let all = (0..rows).map(of);
+        all.filter(|x| x.is_finite()).map(|x| x * x).sum()
+    };
+    let size = sum(&|k| other[k]);
+    let off = |sign: f64| sum(&|k| other[k] - sign * (a[k] - b[k]));
+    size > 0.0 && off(1.0).min(off(-1.0)) < 1e-6 * size
 }
 
 /// How rough a column is: its steps beside its spread. Positions are smoother than torques.
@@ -135,8 +180,17 @@ fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, 
         if n == 0 || last >= m || joints.is_some_and(|j| j != n) {
             return;
         }
-        let positions = (0..n).map(|j| first + j * stride);
-        let like = positions.filter(|q| is_rate(*q, q + by)).count() as f64 / n as f64;
+        let positions = || (0..n).map(|j| first + j * stride);
+        // a joint that stands still shows no velocity
+        let travel = |q: usize| {
+            let finite = columns[q].iter().filter(|x| x.is_finite());
+            let (low, high) = finite.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+            (high - low).max(0.0)
+        };
+        let farthest = positions().map(travel).fold(0.0, f64::max);
+        let moving = || positions().filter(|q| travel(*q) > MIN_SHARE_OF_TRAVEL * farthest);
+        let like = moving().filter(|q| is_rate(*q, q + by)).count() as f64
+            / moving().count().max(1) as f64;
         // of equal ones the one with more joints
         let score = like + 1e-3 * n as f64;
         if like >= MIN_SHARE_OF_JOINTS && best.is_none_or(|(found, _)| score > found) {
@@ -211,6 +265,20 @@ mod tests {
         assert_eq!(rounded_step(&uneven), None);
         let late: Vec<f64> = (0..2000).map(|k| f64::from(k + k / 500)).collect();
         assert_eq!(rounded_step(&late), None);
+    }
+
+    #[test]
+    fn a_velocity_and_a_position_error_are_known_by_their_numbers() {
+        let (q, dq, tau) = (column('q', 0), column('v', 0), column('t', 0));
+        assert!(is_rate_of(&q, &dq, 0.002) && !is_rate_of(&q, &tau, 0.002));
+        assert!(!is_rate_of(
+            &q,
+            &dq.iter().map(|x| 3.0 * x).collect::<Vec<_>>(),
+            0.002
+        ));
+        let wanted: Vec<f64> = q.iter().zip(&tau).map(|(q, tau)| q + 1e-3 * tau).collect();
+        let error: Vec<f64> = wanted.iter().zip(&q).map(|(a, b)| b - a).collect();
+        assert!(is_difference(&wanted, &q, &error) && !is_difference(&wanted, &q, &tau));
     }
 
     #[test]

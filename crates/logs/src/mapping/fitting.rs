@@ -125,7 +125,7 @@ fn best_by<'a>(
     joints: &[&str],
     beside: Option<&str>,
 ) -> Option<Taken<'a>> {
-    let of_role = |c: &&LogColumn| c.role == role && c.commanded == commanded;
+    let of_role = |c: &&LogColumn| c.role == role && c.commanded == commanded && !c.external;
     let of_role: Vec<&LogColumn> = columns.iter().filter(of_role).collect();
     let mut found: Vec<Taken> = Vec::new();
     for family in families(&of_role, joints) {
@@ -190,9 +190,23 @@ pub(super) fn offered(columns: &[LogColumn], joints: usize) -> Vec<String> {
     found.take(OFFERED).map(|family| family.pattern).collect()
 }
 
+/// Families of torques that are estimates of what acts from outside.
+pub(super) fn external(columns: &[LogColumn], joints: &[&str]) -> Vec<String> {
+    let of: Vec<&LogColumn> = columns.iter().filter(|c| c.external).collect();
+    let found = families(&of, joints).into_iter();
+    let mut found: Vec<String> = found
+        .filter(|family| family.members.len() >= joints.len())
+        .map(|family| family.pattern)
+        .collect();
+    found.truncate(OFFERED);
+    found
+}
+
 /// The only one whose columns change, where there are several joints: what they lack, if they lack one kind alone.
+/// What was commanded is no measurement of it.
 pub(super) fn left<'a>(columns: &'a [LogColumn], joints: &[&str]) -> Option<Taken<'a>> {
-    let mut found = unsaid(columns, joints.len(), &|column| column.span() > 0.0);
+    let may_be = |column: &LogColumn| column.span() > 0.0 && !column.commanded;
+    let mut found = unsaid(columns, joints.len(), &may_be);
     found.sort_by_key(|family| std::cmp::Reverse(family.pattern.len()));
     let (only, others) = found.split_first().filter(|_| joints.len() > 1)?;
     let of_only = |column: &LogColumn| only.members.iter().any(|(_, own)| own.name == column.name);

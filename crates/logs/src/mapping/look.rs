@@ -52,6 +52,8 @@ pub struct SeenColumns {
     /// What columns are is known by what they hold: they have no names, or none that says it.
     pub by_content: bool,
     pub rate_hz: Option<f64>,
+    /// Rate at which messages lie evenly, whose stamps come in bursts or jitter \[Hz\].
+    pub even_hz: Option<f64>,
     pub duration_s: f64,
     pub name: String,
     pub provenance: Provenance,
@@ -75,7 +77,10 @@ pub fn look(
     let groups = log::topics(spec)?;
     let topic = match &asked.topic {
         Some(topic) => Some(topic.clone()),
-        None => chosen(&groups, &name)?,
+        None => match with_torques(spec, &groups)? {
+            None => chosen(&groups, &name)?,
+            found => found,
+        },
     };
     let section = LogSection {
         topic: topic.clone(),
@@ -90,7 +95,7 @@ pub fn look(
         true => None,
         false => Some(time_of(&mut log, &sample, &name)?),
     };
-    let headerless = log.names().first().is_some_and(|name| name == "#1");
+    let headerless = log.names().iter().all(|name| name.starts_with('#'));
     let at = time.as_ref().map(|(at, ..)| *at);
     // the time of a recording is its first column
     let at = at.or_else(|| messages.then_some(0));
@@ -110,6 +115,17 @@ pub fn look(
             (column.role, column.joint) = (role, joint);
             (column.by_content, column.commanded) = (true, false);
         }
+    }
+    if !by_content {
+        let step = time.as_ref().map_or(0.0, |(at, seconds, _)| {
+            seconds * content::usual_step(&sample[*at])
+        });
+        let step = if step > 0.0 {
+            step
+        } else {
+            asked.rate_hz.map_or(0.0, |hz| 1.0 / hz)
+        };
+        no_torques(&mut columns, &numbers, &sample, step);
     }
     let channels = numbers.iter().zip(&columns).map(|(k, column)| {
         let joint = Some(column.joint.as_str());
@@ -169,11 +185,45 @@ pub fn look(
         },
         topic,
         by_content,
+        even_hz: findings.even_rate_hz.filter(|_| messages),
         rate_hz: even_rate_hz.or(own_rate.flatten()).or(findings.rate_hz),
         duration_s: findings.duration_s,
         name,
         provenance: log.provenance()?,
     })
+}
+
+/// Takes torques for what they are where they equal the velocity or the error of the position of their joint.
+fn no_torques(columns: &mut [LogColumn], numbers: &[usize], sample: &[Vec<f64>], step: f64) {
+    let of = |role: ChannelRole, commanded: bool| -> Vec<usize> {
+        let is = |k: &usize| columns[*k].role == role && columns[*k].commanded == commanded;
+        (0..columns.len()).filter(is).collect()
+    };
+    let (torques, measured) = (
+        of(ChannelRole::Torque, false),
+        of(ChannelRole::Position, false),
+    );
+    let wanted = of(ChannelRole::Position, true);
+    let data = |k: usize| sample[numbers[k]].as_slice();
+    let same = |a: usize, b: usize| columns[a].joint == columns[b].joint;
+    let mut found = Vec::new();
+    for torque in torques {
+        for q in measured.iter().copied().filter(|q| same(*q, torque)) {
+            let is_rate = step > 0.0 && content::is_rate_of(data(q), data(torque), step);
+            let of_joint = wanted.iter().copied().filter(|wanted| same(*wanted, q));
+            let is_error = of_joint
+                .clone()
+                .any(|wanted| content::is_difference(data(wanted), data(q), data(torque)));
+            if is_rate {
+                found.push((torque, ChannelRole::Velocity));
+            } else if is_error {
+                found.push((torque, ChannelRole::Other));
+            }
+        }
+    }
+    for (torque, role) in found {
+        columns[torque].role = role;
+    }
 }
 
 /// The rate of the positions, where rows of a recording hold those of some joints alone: its first column is the time.
@@ -191,6 +241,32 @@ fn rate_of_positions(columns: &[LogColumn], numbers: &[usize], sample: &[Vec<f64
 fn unsaid(columns: &[LogColumn], joints: Option<usize>) -> bool {
     let as_many = |n: usize| n > 1 && [2 * n, 3 * n].contains(&columns.len());
     joints.is_some_and(as_many) && columns.iter().all(LogColumn::is_unsaid)
+}
+
+/// The only topic of other messages that holds positions and torques, where no joint states hold torques.
+fn with_torques(spec: &LogSpec, groups: &[StateGroup]) -> Result<Option<String>, MappingError> {
+    if groups.is_empty() || groups.iter().any(|group| group.holds[1]) {
+        return Ok(None);
+    }
+    let states: Vec<&String> = groups
+        .iter()
+        .flat_map(|g| g.with.iter().chain([&g.topic]))
+        .collect();
+    let holds = |fields: &[String], role: ChannelRole| {
+        let of = |field: &String| {
+            let column = LogColumn::named(field);
+            column.role == role && !column.commanded && !column.external
+        };
+        fields.iter().any(of)
+    };
+    let whole = |facts: &log::TopicFacts| {
+        !states.contains(&&facts.name)
+            && holds(&facts.fields, ChannelRole::Position)
+            && holds(&facts.fields, ChannelRole::Torque)
+    };
+    let mut found = log::listing(spec)?.into_iter().filter(whole);
+    let only = found.next().filter(|_| found.next().is_none());
+    Ok(only.map(|facts| facts.name))
 }
 
 /// The topic of the machine that was measured, where a recording holds several; leaders and commands are none.

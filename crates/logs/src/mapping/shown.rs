@@ -5,6 +5,7 @@ use super::family::{Family, Key, families};
 use super::units::{stated_position, stated_torque};
 use crate::inspect::ChannelRole;
 use crate::inspect::words::{joint, slides, words};
+use crate::log::{POSITIONS, TORQUES, UnitKind, stated_unit};
 use cft_ident_core::robot::JointKind;
 
 /// A joint of the robot, where a URDF names it.
@@ -104,11 +105,15 @@ fn kind_of(position: &LogColumn, torque: Option<&LogColumn>) -> JointKind {
     if own_name(&position.name).is_some() {
         position.name = "q_#".to_owned();
     }
-    let slid = match (stated_position(&position), force) {
-        (Some("m" | "mm" | "cm"), _) => true,
+    let of = |unit: Option<&str>, all: &[UnitKind]| Some(stated_unit(unit?, all)?.unit.of);
+    let slid = match (
+        of(stated_position(&position), &POSITIONS),
+        of(force, &TORQUES),
+    ) {
+        (Some(UnitKind::Length), _) => true,
         (Some(_), _) => false,
-        (None, Some("N" | "kN")) => true,
-        (None, Some("Nm" | "mNm" | "kNm" | "Ncm")) => false,
+        (None, Some(UnitKind::Force)) => true,
+        (None, Some(UnitKind::Moment)) => false,
         _ => pushed || slides(&words(&position.name)),
     };
     match slid {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::column::LogColumn;
 use crate::inspect::words::{NamedDrive, drive, lists, words};
-use crate::log::escape;
+use crate::log::{POSITIONS, TORQUES, UnitKind, escape, is_label, spoken_unit, stated_unit};
 use cft_ident_core::robot::JointKind;
 
 /// Largest position that a joint in radians has where it does not turn on and on.
@@ -27,72 +27,76 @@ pub(super) struct Unit {
     pub drive: bool,
 }
 
-/// Words that name a unit of positions and nothing else, and the unit; `m` and `rad` are the tool's own.
-const POSITIONS: [(&str, &str); 7] = [
-    ("deg", "deg degs degree degrees °"),
-    ("mm", "mm millimeter millimetre"),
-    ("cm", "cm centimeter centimetre"),
-    ("turns", "turn turns rev revs revolutions"),
-    ("counts", "counts count ticks tick inc increments pulses"),
-    ("rad", "rad rads radian radians"),
-    ("m", "meter meters metre metres"),
-];
-/// The same of torques, currents and voltages.
-const TORQUES: [(&str, &str); 10] = [
-    ("mNm", "mnm nmm"),
-    ("kNm", "knm"),
-    ("Ncm", "ncm"),
-    ("kN", "kn"),
-    ("%", "percent pct % load utilization"),
-    ("Nm", "nm n·m n*m n.m"),
-    ("N", "newton newtons"),
-    ("mA", "milliamps"),
-    ("A", "amp amps ampere amperes"),
-    ("V", "volt volts"),
-];
-/// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of axes.
-const SHORT_UNITS: [(&str, &str); 5] =
-    [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
+/// A unit as a name states it, and what of it one number counts; or a text in brackets that is none.
+#[derive(Debug, Clone, PartialEq)]
+enum SaidUnit {
+    Unit(&'static str, f64),
+    Unknown(String),
+}
 
 /// Words that name parts of robots too: units in brackets alone.
-const AMBIGUOUS: &str = "turn load count inc tick";
+const AMBIGUOUS: &str = "turn load count inc tick foot feet";
 
 /// The units that the names of columns of one kind state: in words where all do; in `q_base_turn` it is the joint's.
 fn stated_by_all(
     columns: &[&LogColumn],
     alike: &dyn Fn(usize, usize) -> bool,
-    known: &[(&'static str, &str)],
-) -> Vec<Option<&'static str>> {
-    let each: Vec<_> = columns.iter().map(|column| stated(column, known)).collect();
+    of: &[UnitKind],
+) -> Vec<Option<SaidUnit>> {
+    let each: Vec<_> = columns.iter().map(|column| said(column, of)).collect();
     let all = |k: usize| {
         let mut others = (0..each.len()).filter(|other| alike(k, *other));
         others.all(|other| each[other].is_some())
     };
-    let holds = |k: usize| columns[k].unit.is_some() || all(k);
-    let kept = (0..each.len()).map(|k| each[k].filter(|_| holds(k)));
-    kept.collect()
+    // what stands in brackets, is no unit and differs from joint to joint names them
+    let same = |k: usize| {
+        let mut others = (0..each.len()).filter(|other| *other != k);
+        each.len() < 2 || others.any(|other| columns[other].unit == columns[k].unit)
+    };
+    let holds = |k: usize| match &each[k] {
+        Some(SaidUnit::Unknown(_)) => same(k),
+        _ => columns[k].unit.is_some() || all(k),
+    };
+    (0..each.len())
+        .map(|k| each[k].clone().filter(|_| holds(k)))
+        .collect()
 }
 
-/// The unit that the name of a column states: in brackets, or in a word that means nothing else.
-fn stated(column: &LogColumn, known: &[(&'static str, &str)]) -> Option<&'static str> {
-    let of = |word: &str| {
-        let mut all = known.iter();
-        Some(all.find(|(_, words)| lists(words, word))?.0)
-    };
-    let bracket = column.unit.as_deref().unwrap_or_default().to_lowercase();
-    let short = SHORT_UNITS.iter().find(|(short, _)| *short == bracket);
-    let short = short.filter(|(_, unit)| known.iter().any(|(own, _)| own == unit));
+/// What the name of a column says of its unit: in brackets, or in words that mean nothing else.
+fn said(column: &LogColumn, of: &[UnitKind]) -> Option<SaidUnit> {
     let spoken = words(&column.name);
+    if let Some(bracket) = column.unit.as_deref() {
+        return match stated_unit(bracket, of) {
+            Some(found) if of.contains(&found.unit.of) && !found.rate => {
+                Some(SaidUnit::Unit(found.unit.label, found.times))
+            }
+            Some(found) => Some(SaidUnit::Unknown(found.shown())),
+            None if is_label(bracket, &column.joint) => None,
+            None => Some(SaidUnit::Unknown(bracket.to_owned())),
+        };
+    }
+    let sure: Vec<&str> = spoken.iter().map(|word| word.text.as_str()).collect();
+    let sure: Vec<&str> = sure
+        .into_iter()
+        .filter(|word| !lists(AMBIGUOUS, word))
+        .collect();
+    if sure.contains(&"grad") && of.contains(&UnitKind::Angle) {
+        return Some(SaidUnit::Unknown("grad".to_owned()));
+    }
+    if let Some(unit) = spoken_unit(&sure, of) {
+        return Some(SaidUnit::Unit(unit.label, 1.0));
+    }
     // `current_mA` ends with it; in `MACur` it is the motor's actual one
     let last = spoken.iter().rfind(|word| word.number().is_none());
-    let milli = last.filter(|word| word.text == "ma" && spoken.len() > 1);
-    of(&bracket)
-        .or(short.map(|(_, unit)| *unit))
-        .or_else(|| {
-            let mut sure = spoken.iter().filter(|word| !lists(AMBIGUOUS, &word.text));
-            sure.find_map(|word| of(&word.text))
-        })
-        .or_else(|| milli.and_then(|_| of("milliamps")))
+    let milli = last.is_some_and(|word| word.text == "ma" && spoken.len() > 1);
+    (milli && of.contains(&UnitKind::Current)).then_some(SaidUnit::Unit("mA", 1.0))
+}
+
+fn stated(column: &LogColumn, of: &[UnitKind]) -> Option<&'static str> {
+    match said(column, of)? {
+        SaidUnit::Unit(unit, _) => Some(unit),
+        SaidUnit::Unknown(_) => None,
+    }
 }
 
 /// The unit that the name of a position states.
@@ -108,7 +112,12 @@ pub(super) fn stated_torque(column: &LogColumn) -> Option<&'static str> {
 /// Whether a velocity is said to be in a unit that the position's does not go with.
 pub(super) fn other_velocity(velocity: &LogColumn, position: Option<&'static str>) -> bool {
     let rpm = words(&velocity.name).iter().any(|word| word.text == "rpm");
-    let stated = stated_position(velocity).filter(|unit| *unit != "rad" && *unit != "m");
+    let of_rate = |text: &str| Some(stated_unit(text, &POSITIONS)?.unit.label);
+    let stated = match velocity.unit.as_deref() {
+        Some(bracket) => of_rate(bracket),
+        None => stated_position(velocity),
+    };
+    let stated = stated.filter(|unit| *unit != "rad" && *unit != "m");
     rpm || stated != position.filter(|unit| *unit != "rad" && *unit != "m")
 }
 
@@ -157,17 +166,20 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
         }
     };
     let each = columns.iter().zip(kinds).zip(&stated);
-    each.map(|((column, kind), stated)| match *stated {
+    let length = |unit: &str| {
+        stated_unit(unit, &POSITIONS).is_some_and(|found| found.unit.of == UnitKind::Length)
+    };
+    each.map(|((column, kind), stated)| match stated {
         None => guessed(*kind, column),
-        Some("rad" | "m") => Unit::default(),
-        Some("counts") => Unit {
+        Some(SaidUnit::Unknown(unit)) => Unit::unknown(column, unit, "position"),
+        Some(SaidUnit::Unit("counts", _)) => Unit {
             check: Some("counts: give position_scale, rad or m per count".to_owned()),
             ..Unit::of("counts")
         },
-        Some(unit) if matches!(unit, "mm" | "cm") == (*kind == JointKind::Prismatic) => {
-            Unit::of(unit)
+        Some(SaidUnit::Unit(unit, times)) if length(unit) == (*kind == JointKind::Prismatic) => {
+            Unit::times(unit, *times)
         }
-        Some(unit) => Unit {
+        Some(SaidUnit::Unit(unit, _)) => Unit {
             check: Some(format!(
                 "`{}` is in {unit}, which does not go with the kind of its joint",
                 escape(&column.name)
@@ -182,24 +194,32 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
 pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<Unit> {
     let guessed = guessed_torque(columns, limits);
     let stated = stated_by_all(columns, &|_, _| true, &TORQUES);
-    let of = |(k, column): (usize, &&LogColumn)| {
-        match (stated[k], drive(&words(&column.name))) {
-        (Some("mA"), _) => Unit {
-            scale: Some(1e-3),
-            check: Some("currents in mA, which the scale makes A: give torque constant times gear ratio times 0.001 for Nm".to_owned()),
-            ..driving("A")
-        },
-        (Some("A"), _) | (None, NamedDrive::Current) => driving("A"),
-        (Some("V"), _) | (None, NamedDrive::Voltage) => driving("V"),
-        (Some("%"), _) => rated("percent of a rated torque", "100"),
-        (Some("Nm" | "N"), _) => Unit::default(),
-        (Some(unit), _) => Unit::of(unit),
+    let of = |(k, column): (usize, &&LogColumn)| match (&stated[k], drive(&words(&column.name))) {
+        (Some(SaidUnit::Unknown(unit)), _) => Unit::unknown(column, unit, "torque"),
+        (Some(SaidUnit::Unit(unit, times)), _) => {
+            let found = stated_unit(unit, &TORQUES).map(|found| found.unit.of);
+            let check = match found {
+                Some(UnitKind::Share) => Some("percent of a rated torque or current: give torque_scale of each joint, its rated torque [N or Nm] over 100".to_owned()),
+                Some(UnitKind::Counts) => Some("counts of a drive: give torque_scale of each joint, N or Nm per count".to_owned()),
+                _ => None,
+            };
+            let drive = matches!(
+                found,
+                Some(UnitKind::Current | UnitKind::Voltage | UnitKind::Share | UnitKind::Counts)
+            );
+            Unit {
+                drive,
+                check,
+                ..Unit::times(unit, *times)
+            }
+        }
+        (None, NamedDrive::Current) => driving("A"),
+        (None, NamedDrive::Voltage) => driving("V"),
         // one sentence for all of them
         (None, _) => Unit {
             check: guessed.check.clone().filter(|_| k == 0),
             ..guessed.clone()
         },
-    }
     };
     columns.iter().enumerate().map(of).collect()
 }
@@ -208,6 +228,33 @@ impl Unit {
     fn of(unit: &'static str) -> Self {
         Self {
             unit: Some(unit),
+            ..Self::default()
+        }
+    }
+
+    /// A unit of which one number counts so much; SI units need no key.
+    fn times(unit: &'static str, times: f64) -> Self {
+        let plain = ["rad", "m", "N", "Nm"].contains(&unit);
+        Self {
+            unit: Some(unit).filter(|_| !plain),
+            scale: Some(times).filter(|times| *times != 1.0),
+            ..Self::default()
+        }
+    }
+
+    fn unknown(column: &LogColumn, unit: &str, what: &str) -> Self {
+        let name = escape(&column.name);
+        let unit = escape(unit);
+        let text = match &*unit {
+            "grad" => format!(
+                "`{name}` says grad, which is {what}_unit = \"grad\" (400 a turn) or, in German, \"deg\""
+            ),
+            _ => format!(
+                "`{name}` is in {unit}, which is no {what} unit that is known: give {what}_scale, what one of it is in SI units"
+            ),
+        };
+        Self {
+            check: Some(text),
             ..Self::default()
         }
     }
@@ -220,12 +267,12 @@ fn driving(unit: &'static str) -> Unit {
     }
 }
 
-fn rated(what: &str, part: &str) -> Unit {
+fn rated(what: &str, unit: &'static str, part: &str) -> Unit {
     Unit {
         check: Some(format!(
-            "{what}: give torque_scale, the rated torque of the joint over {part}"
+            "{what} then give torque_scale of each joint, its rated torque [N or Nm] over {part}; where they are Nm, torque_unit = \"Nm\""
         )),
-        ..Unit::default()
+        ..driving(unit)
     }
 }
 
@@ -243,11 +290,11 @@ fn guessed_torque(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
     };
     let whole = columns.iter().all(|c| c.whole);
     if whole && most <= 300.0 {
-        return rated(&format!("whole numbers up to {most}: percent?"), "100");
+        return rated(&format!("whole numbers up to {most}: percent?"), "%", "100");
     }
     if whole && most <= 3000.0 && known.iter().all(|ratio| *ratio > 1.5) {
         let what = format!("whole numbers up to {most}: thousandths of a rated torque?");
-        return rated(&what, "1000");
+        return rated(&what, "permille", "100");
     }
     if beyond {
         return Unit {

@@ -114,9 +114,9 @@ fn nan_infinity_and_text_in_a_number_are_reported_with_line_and_column() {
 }
 
 #[test]
-fn a_decimal_comma_and_half_a_clock_time_are_recognised() {
+fn a_decimal_comma_among_points_and_half_a_clock_time_are_recognised() {
     says(
-        "t;q_q1;tau_q1\n0;1,5;2\n1;2;3\n",
+        "t;q_q1;tau_q1\n0;1,5;2.5\n1;2;3\n",
         &["log.csv:2", "`1,5`", "decimal points"],
     );
     says(

@@ -330,7 +330,10 @@ fn unit(machine: &LoggedRobot, j: usize, ratio: bool) -> String {
     let torque = machine.robot.joint_unit(j);
     let name = &machine.robot.joint_names()[j];
     let channels = machine.file.log.joint.get(name);
-    match channels.and_then(|c| c.torque_unit).map(TorqueUnit::label) {
+    match channels
+        .and_then(|c| c.torque_unit)
+        .map(TorqueUnit::kept_label)
+    {
         Some(channel) if channel != torque => format!("{torque}/{channel}"),
         _ => "1".to_owned(),
     }

@@ -4,8 +4,10 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::number;
+use cft_ident_core::robot::JointKind;
 use cft_ident_core::validate::{Reconstructed, TorqueErrors};
 use cft_ident_logs::log::Instant;
+use std::f64::consts::TAU;
 
 /// Share of its travel by which a joint of the same robot may stand beyond its limits: stops give way, zeros drift.
 const BEYOND_LIMITS_SHARE: f64 = 0.1;
@@ -16,6 +18,8 @@ const ROWS_BEYOND_SHARE: f64 = 0.01;
 pub(super) struct Places {
     /// Limits of each joint that has some, widened.
     limits: Vec<Option<[f64; 2]>>,
+    /// Joints that turn: a whole turn more is the same place.
+    turning: Vec<bool>,
     seen: Vec<[f64; 2]>,
     beyond: Vec<u64>,
     rows: u64,
@@ -29,7 +33,9 @@ impl Places {
             Some([low - room, high + room])
         });
         let limits: Vec<Option<[f64; 2]>> = limits.collect();
+        let turns = |j: usize| machine.robot.joint_kind(j) == JointKind::Revolute;
         Self {
+            turning: (0..limits.len()).map(turns).collect(),
             seen: vec![[f64::INFINITY, f64::NEG_INFINITY]; limits.len()],
             beyond: vec![0; limits.len()],
             rows: 0,
@@ -45,7 +51,12 @@ impl Places {
             };
             let seen = &mut self.seen[j];
             *seen = [seen[0].min(*q), seen[1].max(*q)];
-            self.beyond[j] += u64::from(*q < low || *q > high);
+            let turns = match self.turning[j] {
+                true => ((q - 0.5 * (low + high)) / TAU).round(),
+                false => 0.0,
+            };
+            let q = q - turns * TAU;
+            self.beyond[j] += u64::from(q < low || q > high);
         }
     }
 

@@ -144,12 +144,15 @@ impl<'a> Declared<'a> {
 
     /// The unit that a position is in, where a factor is that of units.
     fn other_unit(&self, j: usize, factor: f64) -> Option<PositionUnit> {
-        use PositionUnit::{Degree, Metre, Millimetre, Radian, Turn};
         let length = self.kind(j) == JointKind::Prismatic;
         let all = if length {
-            &[Metre, Millimetre][..]
+            &[PositionUnit::METRE, PositionUnit::MILLIMETRE][..]
         } else {
-            &[Radian, Degree, Turn]
+            &[
+                PositionUnit::RADIAN,
+                PositionUnit::DEGREE,
+                PositionUnit::TURN,
+            ]
         };
         let mut table = self.table(&self.names()[j]);
         let now = table

@@ -58,6 +58,8 @@ pub(crate) struct ClockFacts {
     pub(crate) gaps: Vec<[f64; 2]>,
     pub(crate) least: f64,
     pub(crate) largest: f64,
+    /// Step that one in fifty exceeds [s]: long where rows come in bursts, and not for a gap here and there.
+    pub(crate) long: f64,
 }
 
 impl LogClock {
@@ -139,6 +141,7 @@ impl LogClock {
             gaps: gaps.copied().collect(),
             least: self.steps.quantile(0.0),
             largest: self.steps.quantile(1.0),
+            long: self.steps.quantile(0.98),
         }
     }
 }

@@ -10,6 +10,7 @@ pub(super) mod histogram;
 pub(super) mod repeats;
 pub(super) mod replays;
 mod ring;
+pub(super) mod sampling;
 pub(super) mod spike;
 pub(super) mod step;
 pub(super) mod turn;

@@ -49,6 +49,12 @@ impl FieldPath {
         }
     }
 
+    /// A path of these steps.
+    pub(crate) fn of_steps(steps: Vec<PathStep>) -> Self {
+        let text = String::new();
+        Self { steps, text }
+    }
+
     pub(crate) fn text(&self) -> &str {
         &self.text
     }

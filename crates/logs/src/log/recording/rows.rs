@@ -188,6 +188,10 @@ impl LogRows for MessageRows {
         Ok(())
     }
 
+    fn takes_delay(&self) -> bool {
+        self.pairing.is_some()
+    }
+
     fn has_velocities(&self) -> bool {
         self.reading.choice.velocities
     }
@@ -354,7 +358,7 @@ impl SampleReader {
             for index in range {
                 // nothing is fitted to velocities; of the others one that is no number was not measured
                 let read = values[index].number();
-                let measured = |x: &f64| x.is_finite() || fields.velocities.contains(&index);
+                let measured = |x: &f64| is_usable(*x) || fields.velocities.contains(&index);
                 let Some(number) = read.filter(measured) else {
                     self.incomplete.add(|| {
                         let path = fields.paths[index].last();

@@ -207,7 +207,7 @@ impl FoundTopic {
         }
         self.looked_at += 1;
         for (filled, value) in self.arrays.iter_mut().zip(&values) {
-            *filled |= *value != Value::Absent;
+            *filled |= value.number().is_some_and(|x| !x.is_nan());
         }
         self.stamped |= stamp.is_some();
         let names = self.probe.names(data);

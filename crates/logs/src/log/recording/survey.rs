@@ -99,7 +99,15 @@ impl TopicCandidate {
         self.parts.join(fields, head, values);
         // A robot without positions (or torques) to read finds them everywhere.
         let all = |range| RobotFields::all(values, range) || range.is_empty();
-        let (q, tau) = (all(&fields.positions), all(&fields.torques));
+        // NaN is what a driver without that sensor publishes
+        let measured = |range: &std::ops::Range<usize>| {
+            let mut own = values[range.clone()].iter();
+            own.all(|value| value.number().is_some_and(f64::is_finite))
+        };
+        let (q, tau) = (
+            all(&fields.positions) && measured(&fields.positions),
+            all(&fields.torques) && measured(&fields.torques),
+        );
         if q {
             // one that is NaN is no measurement, as a driver without velocities publishes them
             let own = &values[fields.velocities.clone()];

@@ -1,9 +1,12 @@
-//! Tables that are no lines of fields: arrays of numpy, Parquet files, JSON objects. Their rows are handed on as lines of CSV, so that
-//! whatever holds of text logs holds of them.
+//! Tables that are no lines of fields: arrays of numpy and MATLAB, Parquet files, JSON objects. Their rows are handed on
+//! as lines of CSV, so that whatever holds of text logs holds of them. A new format is a file of its own and its lines
+//! here: its module, and its place in the list.
 
+mod columns;
 mod json;
 mod lines;
 mod literal;
+mod mat;
 mod npy;
 mod numpy;
 #[cfg(feature = "parquet")]
@@ -18,16 +21,52 @@ use super::held_files::OpenFile;
 use super::source::{file_name, shown};
 pub(super) use lines::TableText;
 
-pub(super) fn is_table(head: &[u8]) -> bool {
-    [&b"\x93NUMPY"[..], b"PK\x03\x04"]
-        .iter()
-        .any(|magic| head.starts_with(magic))
-        || (cfg!(feature = "parquet") && is_parquet(head))
-        || json::is_json(head)
+/// A file that is opened: its path, its bytes, and the files that go on with it.
+type TableOpening<'o> = (&'o Path, &'o OpenFile, &'o [PathBuf]);
+
+struct TableFormat {
+    /// Whether a file is of it, by its first bytes.
+    is: fn(&[u8]) -> bool,
+    open: fn(TableOpening<'_>) -> io::Result<TableText>,
 }
 
-fn is_parquet(head: &[u8]) -> bool {
-    head.starts_with(b"PAR1")
+const FORMATS: &[TableFormat] = &[
+    TableFormat {
+        is: |head| head.starts_with(b"\x93NUMPY"),
+        open: |(_, file, _)| numpy::table(vec![npy::Array::of_file(file)?]),
+    },
+    TableFormat {
+        is: |head| head.starts_with(b"PK\x03\x04"),
+        open: |(_, file, _)| archive(file),
+    },
+    TableFormat {
+        is: mat::is_mat,
+        open: |(_, file, _)| mat::open(file),
+    },
+    #[cfg(feature = "parquet")]
+    TableFormat {
+        is: |head| head.starts_with(b"PAR1"),
+        open: |(path, _, more)| parquet::open(path, more),
+    },
+    TableFormat {
+        is: json::is_json,
+        open: |(_, file, _)| json::open(file),
+    },
+];
+
+pub(super) fn is_table(head: &[u8]) -> bool {
+    FORMATS.iter().any(|format| (format.is)(head))
+}
+
+/// Arrays of numpy in an archive.
+fn archive(file: &OpenFile) -> io::Result<TableText> {
+    let arrays = npy::Array::of_members(file, zip::members(file)?)?;
+    match arrays.is_empty() {
+        true => Err(lines::unusable(
+            "it is an archive without arrays of numpy (Excel's .xlsx, or a .zip): save the sheet as CSV, `python -c \"import pandas; pandas.read_excel('IN').to_csv('OUT.csv', index=False)\"`, or unpack the archive".to_owned(),
+        )),
+        false => numpy::table(arrays),
+    }
 }
 
 /// Whether a file that can be read is one that others may go on with.
@@ -46,28 +85,10 @@ pub(super) fn open(
         file: shown(path),
         problem: problem.to_string(),
     };
-    if is_parquet(head) {
-        #[cfg(feature = "parquet")]
-        return parquet::open(path, more).map_err(refuse);
-    }
-    let _ = more;
-    if json::is_json(head) {
-        return json::open(file).map_err(refuse);
-    }
-    let arrays = match head.starts_with(b"PK") {
-        false => npy::Array::of_file(file).map(|array| vec![array]),
-        true => zip::members(file).and_then(|members| npy::Array::of_members(file, members)),
-    };
-    if head.starts_with(b"PK") && arrays.as_ref().is_ok_and(Vec::is_empty) {
-        return Err(LogError::Format {
-            file: shown(path),
-            kind: "an archive without arrays of numpy (Excel's .xlsx, or a .zip)",
-            remedy: "save the sheet as CSV: `python -c \"import pandas; pandas.read_excel('IN').to_csv('OUT.csv', index=False)\"`\nor unpack the archive",
-        });
-    }
-    let arrays = arrays.and_then(numpy::ArrayTable::new);
-    let (table, notes) = arrays.map_err(refuse)?;
-    Ok(TableText::new(&table.names.clone(), table, notes))
+    let format = FORMATS.iter().find(|format| (format.is)(head));
+    let open = format.map(|format| (format.open)((path, file, more)));
+    open.unwrap_or_else(|| Err(io::ErrorKind::Unsupported.into()))
+        .map_err(refuse)
 }
 
 /// The Parquet files of a dataset of LeRobot, in their order; `None` for any other folder.

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::io::{self, Read};
 
-use super::lines::{COLUMNS, Table, unusable};
+use super::lines::{COLUMNS, Table, TableText, unusable};
 use super::npy::{Array, Field};
 
 /// Columns of an array whose columns lie one behind the other, each of which is read from a place of its own.
 const MAX_COLUMNS_APART: u64 = 256;
 /// Names of the column of times, by which the rows are counted.
-const TIMES: [&str; 6] = ["t", "time", "times", "timestamp", "timestamps", "stamp"];
+pub(super) const TIMES: [&str; 6] = ["t", "time", "times", "timestamp", "timestamps", "stamp"];
 
 /// Rows of some columns that lie side by side.
 struct Stream {
@@ -47,6 +47,12 @@ fn rows_of(arrays: &[Array]) -> Option<u64> {
     }
     let most = votes.into_iter().map(|(rows, votes)| (votes, rows)).max();
     most.map(|(_, rows)| rows)
+}
+
+/// The table that arrays make up.
+pub(super) fn table(arrays: Vec<Array>) -> io::Result<TableText> {
+    let (table, notes) = ArrayTable::new(arrays)?;
+    Ok(TableText::new(&table.names.clone(), table, notes))
 }
 
 impl ArrayTable {

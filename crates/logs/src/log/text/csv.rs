@@ -3,6 +3,7 @@
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use super::listed::ListedJoints;
 use super::records::{BUFFER, LONGEST_ROW, Record, Records};
 use super::table::Found;
 use super::{head, number};
@@ -25,6 +26,13 @@ pub(super) struct TextFile {
     /// Columns are parted by runs of spaces: where the fields that are not empty stand.
     runs: Option<Vec<usize>>,
     decimal_comma: bool,
+    /// Numbers have commas for points.
+    commas: bool,
+    /// Columns of text that list joints, and where the numbers of a row stand that lists them in another order.
+    listed: Option<ListedJoints>,
+    places: Option<Vec<usize>>,
+    /// Columns of times that must be alike.
+    clocks: Vec<usize>,
     /// The record is a row that was not handed out yet.
     ahead: bool,
     strictness: Strictness,
@@ -65,6 +73,10 @@ impl TextFile {
             header_line: found.header_line,
             runs: parting.runs.then(Vec::new),
             decimal_comma: parting.sign != b',',
+            commas: found.commas,
+            listed: None,
+            places: None,
+            clocks: found.clocks,
             ahead: found.headerless,
             strictness,
             malformed: 0,
@@ -74,10 +86,9 @@ impl TextFile {
             table,
             watch,
         };
-        if let Some(names) = found.header_in_comment {
-            let parts = parting.split(&names).into_iter();
-            rows.header = parts.map(str::to_owned).collect();
-            rows.add_units(&units);
+        if let Some(names) = found.names {
+            rows.header = names;
+            rows.complete(&found.first_row, &units);
             return Ok(rows);
         }
         while rows.advance()? && rows.is_blank() {}
@@ -96,8 +107,62 @@ impl TextFile {
         if found.table.second_row {
             while rows.advance()? && rows.is_blank() {}
         }
-        rows.add_units(&units);
+        rows.complete(&found.first_row, &units);
         Ok(rows)
+    }
+
+    /// Gives columns that have no name their number, those of joints that the rows list their names, and units.
+    fn complete(&mut self, first_row: &[String], units: &[String]) {
+        for (index, name) in self.header.iter_mut().enumerate() {
+            if name.is_empty() {
+                *name = format!("#{}", index + 1);
+            }
+        }
+        let row: Vec<&str> = first_row.iter().map(String::as_str).collect();
+        if let Some((listed, header)) = ListedJoints::find(&self.header, &row) {
+            let text = &self.header[listed.columns[0]];
+            self.notes.push(format!(
+                "columns are named after the joints that `{}`, .. list",
+                escape(text)
+            ));
+            self.header = header;
+            self.listed = Some(listed);
+        }
+        if self.commas {
+            self.notes.push("numbers have decimal commas".to_owned());
+        }
+        self.add_units(units);
+    }
+
+    /// Finds the joints of the current row, where the rows list them, and sees that its times are alike.
+    #[cold]
+    fn place_joints(&mut self) -> Result<(), LogError> {
+        self.places = None;
+        if let Some(listed) = &self.listed {
+            let text = |index: usize| self.field(index).map(String::from_utf8_lossy);
+            let row: Vec<_> = (0..self.fields())
+                .map(|index| text(index).unwrap_or_default())
+                .collect();
+            let row: Vec<&str> = row.iter().map(|field| &**field).collect();
+            let places = listed.places(self.header.len(), &row);
+            let Some(places) = places else {
+                return Err(LogError::OtherNames {
+                    at: self.place(),
+                    names: crate::log::list(listed.names.iter().map(String::as_str)),
+                });
+            };
+            let moved = places.iter().enumerate().any(|(at, place)| at != *place);
+            self.places = moved.then_some(places);
+        }
+        let first = self.clocks.first().and_then(|at| self.field(*at));
+        let other = self.clocks.iter().find(|at| self.field(**at) != first);
+        match other {
+            Some(other) => Err(LogError::Clocks {
+                at: self.place(),
+                column: escape(&self.header[*other]),
+            }),
+            None => Ok(()),
+        }
     }
 
     /// Puts the units of a row of their own behind the names that state none.
@@ -136,6 +201,9 @@ impl TextFile {
                 return Err(LogError::CutLine { at: self.place() });
             }
             if (self.fields() == self.header.len() && !self.is_without_values()) || self.is_row() {
+                if self.listed.is_some() || !self.clocks.is_empty() {
+                    self.place_joints()?;
+                }
                 return Ok(true);
             }
             if self.is_blank() {
@@ -252,7 +320,15 @@ impl TextFile {
     /// The number in a column of the current row, NaN and infinities included.
     #[inline]
     pub(super) fn number(&self, column: usize) -> Option<f64> {
-        self.field(column).and_then(number::parse)
+        let column = match &self.places {
+            None => column,
+            Some(places) => *places.get(column)?,
+        };
+        let field = self.field(column)?;
+        number::parse(field).or_else(|| {
+            let point = self.commas.then(|| with_point(field))?;
+            number::parse(&point)
+        })
     }
 
     /// Whether a field of the current row is no number because of its decimal comma.
@@ -260,7 +336,7 @@ impl TextFile {
     pub(super) fn has_decimal_comma(&self, column: usize) -> bool {
         let text = String::from_utf8_lossy(self.field(column).unwrap_or_default());
         let text = text.replace(',', ".");
-        self.decimal_comma && number::parse(text.as_bytes()).is_some()
+        self.decimal_comma && !self.commas && number::parse(text.as_bytes()).is_some()
     }
 
     /// Why a column of the current row holds no number that can be used.
@@ -300,12 +376,23 @@ impl TextFile {
     /// The instant in a column of the current row: a date, or a number in units of 10^`power` s.
     pub(super) fn instant(&self, column: usize, power: i32) -> Option<Instant> {
         let field = self.field(column)?;
-        Instant::parse_decimal(field, power).or_else(|| Instant::parse_iso(field))
+        let comma = || Instant::parse_decimal(&self.commas.then(|| with_point(field))?, power);
+        Instant::parse_decimal(field, power)
+            .or_else(comma)
+            .or_else(|| Instant::parse_iso(field))
     }
 
     pub(super) fn is_date(&self, column: usize) -> bool {
         self.field(column)
             .is_some_and(|field| Instant::parse_iso(field).is_some())
+    }
+
+    /// Whether a field is a time of day, without a date.
+    pub(super) fn is_time_of_day(&self, column: usize) -> bool {
+        let field = self.field(column).unwrap_or_default().trim_ascii();
+        field.len() < 24
+            && field.contains(&b':')
+            && !field.iter().any(|byte| b"-/T ".contains(byte))
     }
 
     /// Whether the current row equals the one before it, byte for byte.
@@ -347,6 +434,12 @@ impl TextFile {
     pub(super) fn line_hint(&self) -> u64 {
         self.before.1 + self.reader.begins()
     }
+}
+
+/// A number whose comma is a point.
+fn with_point(field: &[u8]) -> Vec<u8> {
+    let point = |byte: &u8| if *byte == b',' { b'.' } else { *byte };
+    field.iter().map(point).collect()
 }
 
 /// 1 + the line ends among the first `end` bytes; `\r\n` and a lone `\r` count as one each.

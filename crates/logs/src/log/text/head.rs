@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::line::{Line, lines_of};
+use super::cells;
+use super::header::HeaderLines;
+use super::line::{Line, Parting, lines_of};
+use super::listed::echo_names;
 use super::table::{self, Found};
 use crate::log::content::HEAD;
 use crate::log::layout::Layout;
@@ -11,8 +14,14 @@ use crate::log::{LogError, source};
 pub(super) struct Head {
     pub(super) comment: u8,
     pub(super) table: Found,
-    /// Column names that stand in a comment line, as numpy writes them.
-    pub(super) header_in_comment: Option<String>,
+    /// Column names that stand in a comment line, as numpy writes them, or in several lines above the numbers.
+    pub(super) names: Option<Vec<String>>,
+    /// Fields of the first row below them.
+    pub(super) first_row: Vec<String>,
+    /// Columns of times that must be alike, one for each channel.
+    pub(super) clocks: Vec<usize>,
+    /// Numbers have commas for points.
+    pub(super) commas: bool,
     pub(super) header_line: u64,
     /// The first line holds numbers, and columns are given by number.
     pub(super) headerless: bool,
@@ -23,21 +32,26 @@ pub(super) struct Head {
 /// The way out of an HDF5 file or of one of numpy's kinds: every array, by its name.
 const HDF5: &str = "write its arrays for numpy: `python -c \"import h5py, numpy; a = {}; h5py.File('IN').visititems(lambda k, v: a.update({k.replace('/', '_'): v[()]} if hasattr(v, 'shape') else {})); numpy.savez('OUT.npz', **a)\"`";
 /// Formats that are not read: how a file begins, what it is, and the way out.
-const OTHERS: [(&[&[u8]], &str, &str); 15] = [
+const OTHERS: &[(&[&[u8]], &str, &str)] = &[
     (
         &[b"\xff\xfe", b"\xfe\xff"],
         "UTF-16 text",
         "save it as UTF-8: `iconv -f UTF-16 -t UTF-8 IN > OUT`",
     ),
     (
-        &[b"#ROSBAG V"],
-        "a bag of ROS 1",
-        "convert it: `mcap convert IN.bag OUT.mcap`, or `rosbags-convert --src IN.bag --dst OUT`",
+        &[b"#ROSBAG V1"],
+        "a bag of ROS 1 before 2010",
+        "bring it up to date: `rosbag fix IN.bag OUT.bag`",
     ),
     (
         &[b"\x89HDF\r\n\x1a\n"],
         "an HDF5 file (.h5, or .mat of MATLAB 7.3)",
         HDF5,
+    ),
+    (
+        &[b"MATLAB 7.3 MAT-file"],
+        "a MAT-file of MATLAB 7.3, which is HDF5",
+        "save it as an earlier one in MATLAB: `save('OUT.mat', '-v7')`; or write its arrays for numpy: `python -c \"import h5py, numpy; a = {}; h5py.File('IN').visititems(lambda k, v: a.update({k.replace('/', '_'): numpy.transpose(v[()])} if hasattr(v, 'shape') and v.dtype.kind in 'iuf' and k[0] != '#' else {})); numpy.savez('OUT.npz', **a)\"`",
     ),
     (
         &[b"MATLAB 5.0 MAT-file"],
@@ -82,9 +96,16 @@ const OTHERS: [(&[&[u8]], &str, &str); 15] = [
     (&[b"GIF8", b"\x89PNG"], "a picture", "give the log itself"),
     (&[b"%PDF"], "a PDF document", "give the log itself"),
     (
-        &[b"BZh"],
-        "compressed with bzip2",
-        "unpack it first: `bunzip2 IN.bz2`",
+        &[
+            b"<Rob", b"<?xml", b"<root", b"<data", b"<log", b"<Log", b"<Sen",
+        ],
+        "XML",
+        "write it as a table: `python -c \"import csv, re; rows = [{e + '.' + k: v for e, a in re.findall('<(\\w+)([^<>]*)/>', line) for k, v in re.findall('(\\w+)=.([^=]*?).(?= |$|/)', a)} | dict(re.findall('<(\\w+)>([-+.0-9eE]+)</', line)) for line in open('IN') if '<' in line]; w = csv.DictWriter(open('OUT.csv', 'w'), max(rows, key=len)); w.writeheader(); w.writerows(r for r in rows if len(r) > 1)\"`",
+    ),
+    (
+        &[b"\xed\xa1\xda\x01"],
+        "a log of LCM",
+        "write its channel as CSV with the types of your messages: `lcm-logger` logs are read by `python -c \"import lcm; print(sorted({e.channel for e in lcm.EventLog('IN')}))\"`, which lists the channels",
     ),
     (
         &[b"header:\n", b"---\nheader:\n"],
@@ -97,8 +118,21 @@ const OTHERS: [(&[&[u8]], &str, &str); 15] = [
 pub(super) fn refuse_other_formats(path: &Path, head: &[u8]) -> Result<(), LogError> {
     let begins = |begins: &&[u8]| head.starts_with(begins);
     let known = OTHERS.iter().find(|(all, ..)| all.iter().any(begins));
+    // a map or a list of few entries, then a text or a map
+    let msgpack = matches!(
+        head,
+        [
+            0x81..=0x8f | 0x92..=0x9f | 0xdc..=0xdf,
+            0xa1..=0xbf | 0x81..=0x8f | 0xd9 | 0x00,
+            ..,
+        ]
+    ) && std::str::from_utf8(&head[..head.len().min(1024)]).is_err();
     let (kind, remedy) = match known {
         Some((_, kind, remedy)) => (*kind, *remedy),
+        None if msgpack => (
+            "MessagePack",
+            "write it as JSON lines: `python -c \"import json, msgpack; [print(json.dumps(o)) for o in msgpack.Unpacker(open('IN', 'rb'))]\" > OUT.json`",
+        ),
         None if head.iter().take(4096).any(|byte| *byte == 0) => (
             "binary, and neither an MCAP recording nor a rosbag2 database",
             "give a text log with a header line, a .mcap or a .db3 file",
@@ -138,14 +172,30 @@ pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head,
         });
     };
     let comment = comment.unwrap_or(b'#');
+    let rows: Vec<usize> = (first..lines.len())
+        .filter(|k| {
+            let text = lines[*k].text.trim();
+            !text.is_empty() && !text.starts_with(char::from(comment))
+        })
+        .collect();
     let table = table::find(&lines, (first, comment), &layout.section);
+    if layout.section.header_line.is_none() {
+        let made = of_several_lines(&lines, &rows, &table, comment, layout);
+        let echoed = || of_echo(&lines, &rows, comment).filter(|_| comments.is_empty());
+        if let Some(head) = made.or_else(echoed) {
+            return Ok(head);
+        }
+    }
     let (at, parting) = (table.at, table.parting);
     let (line, number) = (&lines[at].text, lines[at].number);
     let fields = parting.split(line);
     let mut out = Head {
         comment,
         table,
-        header_in_comment: None,
+        names: None,
+        first_row: Vec::new(),
+        clocks: Vec::new(),
+        commas: has_commas(&lines, &rows, parting),
         header_line: number,
         headerless: false,
         before: match at > first || layout.section.header_line.is_some() {
@@ -164,7 +214,8 @@ pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head,
         let named = all.iter().rfind(|one| !is_units(one)).or(all.last());
         match named {
             Some((k, _)) => {
-                out.header_in_comment = Some(lines[*k].text[1..].to_owned());
+                let names = parting.split(&lines[*k].text[1..]).into_iter();
+                out.names = Some(names.map(str::to_owned).collect());
                 out.header_line = lines[*k].number;
                 let below = all.iter().find(|one| one.0 > *k && is_units(one));
                 if let Some((k, found)) = below {
@@ -180,5 +231,107 @@ pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head,
             }
         }
     }
+    let below = match out.names.is_some() {
+        true => 0,
+        false => 1 + usize::from(out.table.second_row),
+    };
+    let row = rows.iter().position(|row| *row == at);
+    let row = row.and_then(|row| rows.get(row + below));
+    let fields = row
+        .map(|row| parting.split(&lines[*row].text))
+        .unwrap_or_default();
+    if out.names.is_none() && !out.headerless {
+        let header: Vec<String> = parting
+            .split(&lines[at].text)
+            .iter()
+            .map(|name| name.trim_matches('"').to_owned())
+            .collect();
+        let below: Vec<usize> = rows.iter().copied().skip_while(|row| *row <= at).collect();
+        cells::check(&file(), &header, &lines, &below, parting)?;
+    }
+    out.first_row = fields.into_iter().map(str::to_owned).collect();
     Ok(out)
+}
+
+/// Whether numbers have commas for points, and none has a point.
+fn has_commas(lines: &[Line<'_>], rows: &[usize], parting: Parting) -> bool {
+    if parting.sign == b',' {
+        return false;
+    }
+    let mut any = false;
+    // of a few rows at both ends; a preamble may hold versions and dates
+    for row in rows.iter().rev().take(200) {
+        for field in parting.split(&lines[*row].text) {
+            if field.contains('.') && table::is_datum(field) {
+                return false;
+            }
+            let comma = field.matches(',').count() == 1;
+            any |= comma && !table::is_datum(field) && table::is_datum(&field.replace(',', "."));
+        }
+    }
+    any
+}
+
+fn owned(fields: Vec<&str>) -> Vec<String> {
+    fields.into_iter().map(str::to_owned).collect()
+}
+
+/// Names in several lines above the numbers.
+fn of_several_lines(
+    lines: &[Line<'_>],
+    rows: &[usize],
+    table: &Found,
+    comment: u8,
+    layout: &Layout,
+) -> Option<Head> {
+    let asked = layout.section.delimiter;
+    let found = HeaderLines::find(lines, rows, table.at, asked)?;
+    let parting = Parting::of(&lines[*rows.last()?].text, asked);
+    let data = &lines[found.data];
+    Some(Head {
+        comment,
+        table: Found {
+            at: found.line,
+            parting,
+            second_row: false,
+            units: found.units,
+            notes: vec![found.note],
+        },
+        first_row: owned(parting.split(&data.text)),
+        names: Some(found.names),
+        clocks: found.clocks,
+        commas: has_commas(lines, rows, parting),
+        header_line: lines[found.line].number,
+        headerless: false,
+        before: (data.begins, data.number - 1),
+    })
+}
+
+/// Lines of `ros2 topic echo --csv`, which prints no names.
+fn of_echo(lines: &[Line<'_>], rows: &[usize], comment: u8) -> Option<Head> {
+    let parting = Parting {
+        sign: b',',
+        runs: false,
+    };
+    let split = |row: &usize| parting.split(&lines[*row].text);
+    let all: Vec<Vec<&str>> = rows.iter().map(split).collect();
+    let names = echo_names(&all)?;
+    let first = &lines[rows[0]];
+    Some(Head {
+        comment,
+        table: Found {
+            at: rows[0],
+            parting,
+            second_row: false,
+            units: Vec::new(),
+            notes: vec!["the lines are those of `ros2 topic echo --csv`".to_owned()],
+        },
+        names: Some(names),
+        first_row: owned(all[0].clone()),
+        clocks: Vec::new(),
+        commas: false,
+        header_line: first.number,
+        headerless: false,
+        before: (first.begins, first.number - 1),
+    })
 }

@@ -1,9 +1,12 @@
 //! A text log as rows of channels in SI units.
 
+mod cells;
 mod csv;
 mod head;
+mod header;
 mod json_lines;
 mod line;
+mod listed;
 mod number;
 mod records;
 mod table;
@@ -12,14 +15,17 @@ use std::path::Path;
 
 use self::csv::TextFile;
 pub(super) use self::json_lines::JsonRows;
-use super::columns::{Header, ScaledColumns, choose};
+use super::columns::{Header, ScaledColumn, ScaledColumns, choose};
 use super::content::Content;
 use super::layout::Layout;
 use super::rows::{LogRows, Strictness};
-use super::time::{FAR_S, Stamped};
+use super::time::{FAR_S, Instant, Stamped};
 use super::two_clocks::rest_of;
 use super::{Block, LogError, escape};
 use cft_ident_core::number::is_usable;
+
+/// A time of day that leaps back by more than this has passed midnight [s].
+const HALF_A_DAY_S: f64 = 43_200.0;
 
 #[derive(Debug, Clone, Copy)]
 struct TimeColumn {
@@ -39,6 +45,8 @@ pub(super) struct TextRows {
     /// Rate of a log without times [Hz], and rows so far.
     even: Option<(f64, u64)>,
     strictness: Strictness,
+    /// The last time of day, and the days that have passed.
+    of_day: (Option<Instant>, u32),
 }
 
 impl TextRows {
@@ -66,6 +74,7 @@ impl TextRows {
             even: layout.section.rate_hz.map(|rate| (rate, 0)),
             strictness,
             columns,
+            of_day: (None, 0),
         };
         if let Some(time) = rows.columns.time {
             rows.set_time(time.index, time.factor);
@@ -105,7 +114,21 @@ impl TextRows {
             }
         };
         match exact {
-            Some(power) => file.instant(time.index, power).map(Stamped::Exact),
+            Some(power) => {
+                let instant = file.instant(time.index, power)?;
+                if !file.is_time_of_day(time.index) {
+                    return Some(Stamped::Exact(instant));
+                }
+                let (last, days) = &mut self.of_day;
+                // time of day begins anew at midnight
+                *days += u32::from(
+                    last.is_some_and(|last| instant.seconds() < last.seconds() - HALF_A_DAY_S),
+                );
+                *last = Some(instant);
+                Some(Stamped::Exact(
+                    instant.plus(f64::from(*days) * 2.0 * HALF_A_DAY_S),
+                ))
+            }
             None => seconds().map(Stamped::Seconds),
         }
     }
@@ -146,7 +169,7 @@ impl LogRows for TextRows {
                 let value = self.file.number(column.index);
                 match value.map(|value| value * column.factor + column.offset) {
                     Some(value) if is_usable(value) => to.push(value),
-                    _ => return Err(self.file.no_number(column.index)),
+                    _ => return Err(self.unusable(column.index)),
                 }
             }
         }
@@ -205,6 +228,35 @@ impl LogRows for TextRows {
 
     fn is_recording(&self) -> bool {
         false
+    }
+}
+
+impl TextRows {
+    /// Why a field of the current row cannot be used: nothing stands there, or all of its kind have another clock.
+    #[cold]
+    fn unusable(&self, index: usize) -> LogError {
+        let blank = |columns: &[ScaledColumn]| {
+            let number = |at: usize| self.file.number(at).is_some_and(f64::is_finite);
+            columns.iter().all(|column| !number(column.index))
+        };
+        let (positions, torques) = (&self.columns.positions, &self.columns.torques);
+        let (Some(q), Some(time)) = (positions.first(), self.time) else {
+            return self.file.no_number(index);
+        };
+        if torques.is_empty() || blank(positions) == blank(torques) {
+            return self.file.no_number(index);
+        }
+        let name = |at: usize| escape(&self.names()[at]).replace(['\'', '"', '`', '$', '\\'], "_");
+        LogError::Cells {
+            at: self.file.place(),
+            column: escape(&self.names()[index]),
+            what: "nothing: positions and torques have rows of their own, each by its clock",
+            remedy: format!(
+                "bring the torques to the times of the positions: `python -c \"import pandas; d = pandas.read_csv('IN', index_col='{}').select_dtypes('number'); k = d['{}'].notna(); d.interpolate(method='index')[k].dropna(axis=1, how='all').dropna().to_csv('OUT.csv')\"`",
+                name(time.index),
+                name(q.index)
+            ),
+        }
     }
 }
 

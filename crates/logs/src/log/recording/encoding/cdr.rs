@@ -52,6 +52,8 @@ pub struct CdrReader {
     labels: Vec<String>,
     uneven: Option<Uneven>,
     order: u64,
+    /// Fields that are messages of arrays by their names, and the names in the message that they were placed by.
+    by_name: Option<(Vec<Vec<FieldPath>>, Option<u64>)>,
 }
 
 impl CdrReader {
@@ -95,7 +97,37 @@ impl CdrReader {
             labels: fields.iter().map(|paths| label(paths)).collect(),
             uneven: None,
             order: 0,
+            by_name: fields
+                .iter()
+                .flatten()
+                .any(leaves::is_by_name)
+                .then(|| (fields.to_vec(), None)),
         }
+    }
+
+    /// Finds the messages of arrays that are asked for by name, where they stand elsewhere than in the message before.
+    fn place(&mut self, data: &[u8]) {
+        let Some((fields, known)) = &mut self.by_name else {
+            return;
+        };
+        let tree = leaves::tree(&self.messages, self.encoding, data);
+        let names = leaves::names_of(&tree);
+        if *known == Some(names) {
+            return;
+        }
+        let placed = |path: &FieldPath| match leaves::is_by_name(path) {
+            true => leaves::placed(&tree, path),
+            false => Some(path.clone()),
+        };
+        let placed: Vec<Vec<FieldPath>> = (fields.iter())
+            .map(|paths| paths.iter().filter_map(placed).collect())
+            .collect();
+        let by_name = Some((std::mem::take(fields), Some(names)));
+        let messages = std::mem::take(&mut self.messages);
+        *self = Self {
+            by_name,
+            ..Self::new(messages, self.encoding, &placed)
+        };
     }
 
     fn take(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), MalformedMessage> {
@@ -152,6 +184,7 @@ impl CdrReader {
 
 impl MessageReader for CdrReader {
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
+        self.place(data);
         self.take(data, out).map_err(|error| error.to_string())
     }
 

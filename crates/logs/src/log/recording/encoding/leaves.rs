@@ -3,6 +3,7 @@
 use super::cursor::{Cursor, Encoding, MalformedMessage};
 use super::msg::{Count, ElementType, Field};
 use crate::log::recording::message::{Leaf, MOST_LEAVES, name_elements};
+use crate::log::recording::path::{FieldPath, PathStep};
 
 /// What a message holds, as far as numbers and the texts that name them go.
 pub(super) enum Tree {
@@ -22,6 +23,57 @@ pub(super) fn of_tree(tree: &Tree) -> Vec<Leaf> {
     let mut out = Vec::new();
     collect(tree, ("", ""), &mut Vec::new(), &mut out);
     out
+}
+
+/// Whether a path takes a message of an array by a name, so that its place is known from the message alone.
+pub(super) fn is_by_name(path: &FieldPath) -> bool {
+    let pairs = path.steps.windows(2);
+    pairs
+        .into_iter()
+        .any(|pair| matches!(pair, [PathStep::Named { .. }, _]))
+}
+
+/// The path with places instead of the names of messages in arrays, as this message has them.
+pub(super) fn placed(tree: &Tree, path: &FieldPath) -> Option<FieldPath> {
+    let mut lists: Vec<(&str, &[String])> = Vec::new();
+    let (mut at, mut steps) = (tree, Vec::new());
+    let last = path.steps.len().checked_sub(1)?;
+    for (k, step) in path.steps.iter().enumerate() {
+        at = match (step, at) {
+            (PathStep::Field(name), Tree::Fields(fields)) => {
+                lists.extend(text_lists(fields));
+                steps.push(step.clone());
+                &fields.iter().find(|(own, _)| own == name)?.1
+            }
+            (PathStep::Index(index), Tree::Elements(elements)) => {
+                steps.push(step.clone());
+                elements.get(*index)?
+            }
+            (PathStep::Named { list, value }, Tree::Elements(elements)) => {
+                let beside = lists.iter().rev().find(|(name, _)| name == list);
+                let beside =
+                    beside.and_then(|(_, names)| names.iter().position(|own| own == value));
+                let own =
+                    |element: &Tree| own_name(element) == Some((list.as_str(), value.as_str()));
+                let index = beside.or_else(|| elements.iter().position(own))?;
+                steps.push(PathStep::Index(index));
+                elements.get(index)?
+            }
+            _ if k == last => {
+                steps.push(step.clone());
+                at
+            }
+            _ => return None,
+        };
+    }
+    Some(FieldPath::of_steps(steps))
+}
+
+fn text_lists(fields: &[(String, Tree)]) -> impl Iterator<Item = (&str, &[String])> {
+    fields.iter().filter_map(|(name, tree)| match tree {
+        Tree::Texts(texts) => Some((name.as_str(), texts.as_slice())),
+        _ => None,
+    })
 }
 
 /// Adds the numbers below a place, which `path` leads to and `label` names; `lists` are the lists of texts on the way.
@@ -55,21 +107,31 @@ fn collect<'t>(
             }
         }
         Tree::Elements(elements) => {
-            let names = named(lists, elements.len()).map(|(_, names)| names);
+            let (list, names) = named(lists, elements.len()).unzip();
+            let own: Vec<Option<(&str, &str)>> = elements.iter().map(own_name).collect();
+            let apart = |name: &str| {
+                own.iter()
+                    .flatten()
+                    .filter(|(_, other)| *other == name)
+                    .count()
+                    == 1
+            };
             for (index, element) in elements.iter().enumerate() {
                 let number = index.to_string();
-                let beside = || names.and_then(|names| names.get(index)).map(String::as_str);
-                let name = own_name(element).or_else(beside).unwrap_or(&number);
-                let place = (&*format!("{path}[{index}]"), &*joined(label, name));
+                let own = own[index].filter(|(_, name)| apart(name));
+                let beside = || Some((list?, names?.get(index)?.as_str()));
+                let found = own.or_else(beside).filter(|(_, name)| !name.contains(']'));
+                let (selector, name) = match found {
+                    Some((list, name)) => (format!("{list}={name}"), name),
+                    None => (number.clone(), &*number),
+                };
+                let place = (&*format!("{path}[{selector}]"), &*joined(label, name));
                 collect(element, place, lists, out);
             }
         }
         Tree::Fields(fields) => {
             let before = lists.len();
-            lists.extend(fields.iter().filter_map(|(name, tree)| match tree {
-                Tree::Texts(texts) => Some((name.as_str(), texts.as_slice())),
-                _ => None,
-            }));
+            lists.extend(text_lists(fields));
             for (name, tree) in fields {
                 if !TIMES.contains(&name.as_str()) {
                     let place = (&*joined(path, name), &*joined(label, name));
@@ -97,24 +159,54 @@ fn named<'t>(lists: &[(&'t str, &'t [String])], count: usize) -> Option<(&'t str
         .copied()
 }
 
-fn own_name(element: &Tree) -> Option<&str> {
+/// The text that a message is named by, and the field that holds it.
+fn own_name(element: &Tree) -> Option<(&str, &str)> {
     let Tree::Fields(fields) = element else {
         return None;
     };
-    fields.iter().find_map(|(_, tree)| match tree {
-        Tree::Text(name) if !name.is_empty() => Some(name.as_str()),
+    fields.iter().find_map(|(field, tree)| match tree {
+        Tree::Text(name) if !name.is_empty() => Some((field.as_str(), name.as_str())),
         _ => None,
     })
 }
 
 /// The numbers of a CDR message; those before its end where it is cut off.
 pub(super) fn leaves(messages: &[Vec<Field>], encoding: Encoding, data: &[u8]) -> Vec<Leaf> {
+    of_tree(&tree(messages, encoding, data))
+}
+
+/// What a CDR message holds.
+pub(super) fn tree(messages: &[Vec<Field>], encoding: Encoding, data: &[u8]) -> Tree {
     let mut fields = Vec::new();
     if let Ok(mut cursor) = Cursor::new(data, encoding) {
         // what was read before the message broke off stands
         let _ = message(messages, 0, &mut cursor, &mut fields);
     }
-    of_tree(&Tree::Fields(fields))
+    Tree::Fields(fields)
+}
+
+/// The texts of a message that name others in it, as one number (FNV-1a).
+pub(super) fn names_of(tree: &Tree) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325;
+    let mut add = |text: &str| {
+        for byte in text.bytes().chain([0]) {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    };
+    fn walk(tree: &Tree, add: &mut dyn FnMut(&str)) {
+        match tree {
+            Tree::Text(text) => add(text),
+            Tree::Texts(texts) => texts.iter().for_each(|text| add(text)),
+            Tree::Fields(fields) => fields
+                .iter()
+                .filter(|(name, _)| !TIMES.contains(&name.as_str()))
+                .for_each(|(_, tree)| walk(tree, add)),
+            Tree::Elements(elements) => elements.iter().for_each(|tree| walk(tree, add)),
+            Tree::Number | Tree::Numbers(_) | Tree::Nothing => {}
+        }
+    }
+    walk(tree, &mut add);
+    hash
 }
 
 fn message(

@@ -4,6 +4,7 @@
 mod bag;
 mod mcap;
 mod record;
+mod ros1;
 
 use std::path::Path;
 
@@ -20,7 +21,7 @@ pub(in crate::log) struct Format {
     pub(super) open: Open,
 }
 
-pub(in crate::log) const FORMATS: [Format; 2] = [
+pub(in crate::log) const FORMATS: [Format; 3] = [
     Format {
         magic: b"\x89MCAP",
         ending: ".mcap",
@@ -30,6 +31,11 @@ pub(in crate::log) const FORMATS: [Format; 2] = [
         magic: b"SQLite format 3\0",
         ending: ".db3",
         open: bag::open,
+    },
+    Format {
+        magic: ros1::MAGIC,
+        ending: ".bag",
+        open: ros1::open,
     },
 ];
 
