@@ -251,7 +251,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_text(path, &report.html())?;
     }
     Ok(Outcome::new(
-        report.text_for(context.detail),
+        report.text_for(context.screen),
         Document::new("drive", &provenances, &warnings, &drives)?,
     ))
 }

@@ -189,8 +189,13 @@ impl ExampleMachine {
             ExampleMachine::Ur10 => Some(["ur10.urdf", "ur10.csv"]),
             ExampleMachine::Tx40 => Some(["tx40.toml", "tx40.csv"]),
             ExampleMachine::Bldc => Some(["bldc.toml", "bldc.csv"]),
-            ExampleMachine::Cft => None,
+            ExampleMachine::Cft | ExampleMachine::Servo => None,
         }
+    }
+
+    /// Whether `identify` makes a model of it.
+    pub(super) fn is_robot(self) -> bool {
+        self == ExampleMachine::Cft || self.robot_and_log().is_some()
     }
 
     pub(super) fn machine(self) -> &'static Machine {

@@ -96,6 +96,13 @@ fn of_example(name: &Path, context: &Context) -> Result<Option<Named>, CliError>
     else {
         return Ok(None);
     };
+    if !machine.is_robot() {
+        let problem =
+            format!("the example {word} holds no robot with torques, which `identify` asks for");
+        return Err(CliError::usage(problem).hint(format!(
+            "`cft-ident example {word}` writes it, and says what to do with it"
+        )));
+    }
     let folder = PathBuf::from(word);
     example::write(machine.machine(), &folder, context)?;
     // they are read at once

@@ -1,6 +1,6 @@
-use crate::robot::standard::pseudo_inertia;
 use super::*;
 use crate::robot::cft::{Setup, Structure};
+use crate::robot::standard::pseudo_inertia;
 use crate::robot::tree::{Coordinate, Link, Tree};
 use crate::robot::{JointKind, Robot};
 use rand::{RngExt, SeedableRng};

@@ -161,11 +161,7 @@ fn words(of: &Lsq) -> Words {
     let worst = worst.max_by(|a, b| a.headline().total_cmp(&b.headline()));
     let mut over = String::new();
     if let Some(worst) = worst.filter(|_| joints.len() > 1) {
-        let value = format!(
-            "{} ({})",
-            number::percent(worst.headline()),
-            worst.joint
-        );
+        let value = format!("{} ({})", number::percent(worst.headline()), worst.joint);
         figures.push(figure("largest", value, Tone::Plain));
         over = format!(", rms over {} joints", joints.len());
     }
