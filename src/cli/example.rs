@@ -9,6 +9,8 @@ use serde::Serialize;
 use super::{CliError, Context, Outcome, campaign};
 use cft_ident_files::config;
 use cft_ident_logs::log::unpacked;
+use cft_ident_plant::simulate::held::SimulatedHolds;
+use cft_ident_plant::simulate::wrist::SimulatedTool;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 
@@ -20,8 +22,8 @@ Example:
 
 /// Write a small log of a real machine with its robot file; without NAME, list what there is.
 ///
-/// The logs are published ones, cut where they are long; their licence is written beside them. `cft`
-/// is simulated. A file that is there already and says something else stays, and is an error.
+/// The logs are published ones, cut where they are long; their licence is written beside them. `cft`,
+/// `wrist` and `holds` are simulated. A file that is there already and says something else stays, and is an error.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
@@ -44,6 +46,10 @@ pub enum ExampleMachine {
     Bldc,
     /// The built-in campaign of the CFT robot, simulated
     Cft,
+    /// A tool on a wrist force-torque sensor, 60 poses, simulated
+    Wrist,
+    /// A small arm that holds poses, sizes of currents without a sign, simulated
+    Holds,
 }
 
 /// A file that the program carries.
@@ -53,6 +59,8 @@ enum Content {
     Packed(&'static [u8]),
     /// A robot file that comes with the program.
     Config(&'static str),
+    /// Simulated.
+    Made(fn() -> String),
 }
 
 struct Machine {
@@ -142,7 +150,41 @@ static CFT: Machine = Machine {
     files: &[],
     next: "cft-ident identify {}/campaign.toml -o run\n",
 };
-/// Seed of its simulation: that of `identify`.
+/// Simulated: made as it is written.
+static WRIST: Machine = Machine {
+    name: "wrist",
+    what: "a tool on a wrist sensor whose bias drifts, simulated; 60 poses as CSV",
+    licence: None,
+    origin: "A simulated tool of 0.85 kg on a wrist force-torque sensor whose bias drifts over 60 poses.\n",
+    files: &[(
+        "wrist.csv",
+        Content::Made(|| SimulatedTool::example().log(SEED)),
+    )],
+    next: "cft-ident tool {}/wrist.csv -o tool.toml --report tool.html\n\
+        cft-ident export -m tool.toml --controller ur\n",
+};
+
+static HOLDS: Machine = Machine {
+    name: "holds",
+    what: "a small arm that holds 30 poses from both sides, simulated; CSV",
+    licence: None,
+    origin: "A simulated arm of two links whose servos log the size of the current alone: 30 poses, each held\n\
+        from below and from above. holds.toml is the robot file.\n",
+    files: &[
+        (
+            "holds.csv",
+            Content::Made(|| SimulatedHolds::example().log(SEED)),
+        ),
+        (
+            "holds.toml",
+            Content::Made(|| SimulatedHolds::ROBOT.to_owned()),
+        ),
+    ],
+    next: "cft-ident lsq --static {}/holds.csv -r {}/holds.toml -o gravity.toml\n\
+        cft-ident export -m gravity.toml --python gravity.py\n",
+};
+
+/// Seed of simulations: that of `identify`.
 const SEED: u64 = 1;
 
 impl ExampleMachine {
@@ -152,6 +194,8 @@ impl ExampleMachine {
             ExampleMachine::Tx40 => &TX40,
             ExampleMachine::Bldc => &BLDC,
             ExampleMachine::Cft => &CFT,
+            ExampleMachine::Wrist => &WRIST,
+            ExampleMachine::Holds => &HOLDS,
         }
     }
 }
@@ -257,6 +301,7 @@ fn write(machine: &Machine, folder: &Path, context: &Context) -> Result<Vec<Stri
         let bytes = match content {
             Content::Plain(bytes) => bytes.to_vec(),
             Content::Packed(bytes) => unpacked(bytes).map_err(|e| unusable(&e))?,
+            Content::Made(made) => made().into_bytes(),
             Content::Config(path) => config::embedded(Path::new(path)).unwrap_or_default().into(),
         };
         contents.push((name, bytes));

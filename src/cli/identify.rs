@@ -191,6 +191,7 @@ impl Work {
                 LoggedRobot::new(&robot.to_string_lossy(), found.file)
             }
         };
+        machine.check_moving(&logs_of(&args.logs), &context.control)?;
         let logs = held_out::parted(&args.logs);
         if logs.validation.is_empty() {
             let text =

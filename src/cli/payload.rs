@@ -10,6 +10,7 @@ use cft_ident_report::report::table::{Align, Table};
 use cft_ident_stages::identify::{
     self, Dataset, Number95, Payload, PayloadReading, PayloadVerdict,
 };
+use cft_ident_tool::tool::{CarriedBody, RobotController};
 
 const EXAMPLE: &str = "\
 Example:
@@ -45,6 +46,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let brief = sentences(&found).join("\n");
     let tables = text_of(&found, &names_of(&args.logs).join(", "));
     let mut text = format!("{brief}\n\n{tables}");
+    if found.loaded(&given.file).is_some() {
+        text += &format!("\n{}", controller_lines(&found));
+    }
     if let Some(path) = &args.output {
         let (model, how) = match found.loaded(&given.file) {
             Some(loaded) => (loaded.to_toml()?, ""),
@@ -62,7 +66,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 fn shown(x: &Number95) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
-            let [value, low, high] = [value, low, high].map(|x| number::significant(x, 4));
+            // digits as far as the interval says something
+            let half = (high - low) / 2.0;
+            let [value, low, high] = [value, low, high].map(|x| number::value_and_std(x, half).0);
             format!("{value} ({low} .. {high})")
         }
         _ => number::ABSENT.to_owned(),
@@ -87,6 +93,9 @@ fn sentences(found: &Payload) -> Vec<String> {
         PayloadVerdict::GainsContradict => format!(
             "the gains of the torque channels are not those of the model, or the log is not of this arm: {held} with them, {free} with a gain error of every joint free"
         ),
+        PayloadVerdict::NoneSeen if is_above_zero(found) => format!(
+            "no payload seen: {held} with the gains of the torque channels as the model has them, which explain the log without a body\nonly with a gain error of every joint free would it be {free}: these data do not tell such gains apart from a body"
+        ),
         PayloadVerdict::NoneSeen => format!(
             "no payload seen: {held}; with a gain error of every joint free: {free}"
         ),
@@ -94,6 +103,43 @@ fn sentences(found: &Payload) -> Vec<String> {
     };
     let worse = found.readings.iter().filter_map(made_worse);
     worse.chain(said.lines().map(str::to_owned)).collect()
+}
+
+/// Whether the mass with free gains is above zero.
+fn is_above_zero(found: &Payload) -> bool {
+    let mut free = found.readings.iter().filter(|of| of.gains_free);
+    let low = |of: &PayloadReading| of.mass.interval_95.is_some_and(|[low, _]| low > 0.0);
+    free.any(low)
+}
+
+/// The lines that controllers take, where a body was found.
+fn controller_lines(found: &Payload) -> String {
+    let Some(reading) = found.readings.first() else {
+        return String::new();
+    };
+    let centre = reading.centre.each_ref().map(|c| c.value);
+    let (Some(mass), [Some(x), Some(y), Some(z)]) = (reading.mass.value, centre) else {
+        return String::new();
+    };
+    let all = reading.inertia.each_ref().map(|of| of.value);
+    let inertia = all
+        .iter()
+        .all(Option::is_some)
+        .then(|| all.map(Option::unwrap_or_default));
+    let body = CarriedBody {
+        mass,
+        centre: [x, y, z],
+        inertia,
+    };
+    let link = escape(&found.link);
+    let mut out = format!(
+        "for the controller, in the frame of {link} (move the centre into that of the flange first):\n"
+    );
+    for controller in RobotController::ALL {
+        let lines = controller.body(&body).replace('\n', "\n          ");
+        out += &format!("  {:<7} {lines}\n", controller.name());
+    }
+    out
 }
 
 /// A warning where the body of a reading makes the error of a joint larger.

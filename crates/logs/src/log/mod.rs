@@ -48,7 +48,7 @@ pub use reader::Reader;
 pub use recording::{CdrReader, StateGroup, TopicFacts, Value};
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
-    PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
+    PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueSign, TorqueUnit,
 };
 pub use shared::shares_rows;
 pub use source::{DataRole, Provenance, begins_with, sha256};
