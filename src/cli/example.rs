@@ -9,7 +9,9 @@ use serde::Serialize;
 use super::{CliError, Context, Outcome, campaign};
 use cft_ident_files::config;
 use cft_ident_logs::log::unpacked;
+use cft_ident_plant::simulate::held::SimulatedHolds;
 use cft_ident_plant::simulate::servo::{BenchMotion, ServoPlant, ServoRig, run_servo};
+use cft_ident_plant::simulate::wrist::SimulatedTool;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 
@@ -21,8 +23,8 @@ Example:
 
 /// Write a small log of a real machine with its robot file; without NAME, list what there is.
 ///
-/// The logs are published ones, cut where they are long; their licence is written beside them. `cft`
-/// is simulated. A file that is there already and says something else stays, and is an error.
+/// The logs are published ones, cut where they are long; their licence is written beside them. `cft`,
+/// `wrist` and `holds` are simulated. A file that is there already and says something else stays, and is an error.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
@@ -47,6 +49,10 @@ pub enum ExampleMachine {
     Cft,
     /// A servo on a pendulum rig, command and position, simulated
     Servo,
+    /// A tool on a wrist force-torque sensor, 60 poses, simulated
+    Wrist,
+    /// A small arm that holds poses, sizes of currents without a sign, simulated
+    Holds,
 }
 
 /// A file that the program carries.
@@ -56,6 +62,8 @@ enum Content {
     Packed(&'static [u8]),
     /// A robot file that comes with the program.
     Config(&'static str),
+    /// Simulated.
+    Made(fn() -> String),
 }
 
 pub(super) struct Machine {
@@ -180,6 +188,41 @@ fn servo_logs() -> Vec<(String, Vec<u8>)> {
 }
 
 /// Seed of its simulation: that of `identify`.
+/// Simulated: made as it is written.
+static WRIST: Machine = Machine {
+    name: "wrist",
+    what: "a tool on a wrist sensor whose bias drifts, simulated; 60 poses as CSV",
+    licence: None,
+    origin: "A simulated tool of 0.85 kg on a wrist force-torque sensor whose bias drifts over 60 poses.\n",
+    files: &[(
+        "wrist.csv",
+        Content::Made(|| SimulatedTool::example().log(SEED)),
+    )],
+    next: "cft-ident tool {}/wrist.csv -o tool.toml --report tool.html\n\
+        cft-ident export -m tool.toml --controller ur\n",
+};
+
+static HOLDS: Machine = Machine {
+    name: "holds",
+    what: "a small arm that holds 30 poses from both sides, simulated; CSV",
+    licence: None,
+    origin: "A simulated arm of two links whose servos log the size of the current alone: 30 poses, each held\n\
+        from below and from above. holds.toml is the robot file.\n",
+    files: &[
+        (
+            "holds.csv",
+            Content::Made(|| SimulatedHolds::example().log(SEED)),
+        ),
+        (
+            "holds.toml",
+            Content::Made(|| SimulatedHolds::ROBOT.to_owned()),
+        ),
+    ],
+    next: "cft-ident lsq --static {}/holds.csv -r {}/holds.toml -o gravity.toml\n\
+        cft-ident export -m gravity.toml --python gravity.py\n",
+};
+
+/// Seed of simulations: that of `identify`.
 const SEED: u64 = 1;
 
 impl ExampleMachine {
@@ -189,7 +232,10 @@ impl ExampleMachine {
             ExampleMachine::Ur10 => Some(["ur10.urdf", "ur10.csv"]),
             ExampleMachine::Tx40 => Some(["tx40.toml", "tx40.csv"]),
             ExampleMachine::Bldc => Some(["bldc.toml", "bldc.csv"]),
-            ExampleMachine::Cft | ExampleMachine::Servo => None,
+            ExampleMachine::Cft
+            | ExampleMachine::Servo
+            | ExampleMachine::Wrist
+            | ExampleMachine::Holds => None,
         }
     }
 
@@ -205,6 +251,8 @@ impl ExampleMachine {
             ExampleMachine::Bldc => &BLDC,
             ExampleMachine::Cft => &CFT,
             ExampleMachine::Servo => &SERVO,
+            ExampleMachine::Wrist => &WRIST,
+            ExampleMachine::Holds => &HOLDS,
         }
     }
 }
@@ -318,6 +366,7 @@ pub(super) fn write(
         let bytes = match content {
             Content::Plain(bytes) => bytes.to_vec(),
             Content::Packed(bytes) => unpacked(bytes).map_err(|e| unusable(&e))?,
+            Content::Made(made) => made().into_bytes(),
             Content::Config(path) => config::embedded(Path::new(path)).unwrap_or_default().into(),
         };
         contents.push(((*name).to_owned(), bytes));

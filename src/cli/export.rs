@@ -1,6 +1,7 @@
 //! `cft-ident export`: a model for other programs, as C header, Rust module, URDF or file of a simulator.
 
 mod drives;
+mod tool;
 mod words;
 
 use cft_ident_core::explain::Explain;
@@ -28,11 +29,14 @@ use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, InMemory};
+use cft_ident_tool::held::gravity_in_python;
+use cft_ident_tool::tool::{RobotController, ToolFile};
 
 const EXAMPLE: &str = "\
 Example:
   cft-ident export -m model.toml --c feedforward.h
   cft-ident export -m model.toml --rust feedforward.rs
+  cft-ident export -m tool.toml --controller ur
   cft-ident export -m myarm-model.toml --urdf myarm-identified.urdf
   cft-ident export -m myarm-model.toml --mjcf myarm.xml unseen.csv";
 
@@ -60,6 +64,12 @@ pub struct Args {
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
+    /// Of a tool's file: the lines that a controller takes, one of ur, franka, xarm, ros2
+    #[arg(long, value_name = "CONTROLLER", group = "into", value_parser = tool::controller)]
+    pub controller: Option<RobotController>,
+    /// Python module to write: gravity(q) of the links alone
+    #[arg(hide_short_help = true, long, value_name = "FILE.py", group = "into", value_parser = tool::python())]
+    pub python: Option<PathBuf>,
     /// URDF to write, with FILE.toml beside it (serial robots and single joints)
     #[arg(long, value_name = "FILE.urdf", group = "into", value_parser = arguments::ends_in(["urdf"]))]
     pub urdf: Option<PathBuf>,
@@ -149,6 +159,8 @@ pub struct Exported {
     left_out: Vec<String>,
     /// What the files of simulators cannot say, file by file.
     beyond: Vec<Beyond>,
+    /// Lines for a controller; null where none were asked for.
+    lines: Option<Vec<String>>,
 }
 
 /// What a format cannot say.
@@ -268,6 +280,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if drives::asked(args) {
         return drives::run(args, context);
     }
+    let text = files::text(&args.model)?;
+    if ToolFile::is_one(&text) {
+        return tool::run(args, &text, context);
+    }
+    if args.controller.is_some() {
+        let text = "--controller takes a file of `cft-ident tool`";
+        return Err(CliError::usage(text)
+            .hint("`payload` prints the lines of a body found by joint torques"));
+    }
     let side = args.urdf.as_ref().map(|path| path.with_extension("toml"));
     let formats = formats(args);
     if !args.logs.is_empty() && formats.is_empty() && args.urdf.is_none() {
@@ -275,7 +296,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             "logs belong to --urdf, --mjcf, --sdf and --usd, whose files cannot say all of a model",
         ));
     }
-    let outputs = [&args.urdf, &side, &args.c, &args.rust, &args.ros2_control];
+    let outputs = [
+        &args.urdf,
+        &side,
+        &args.c,
+        &args.rust,
+        &args.python,
+        &args.ros2_control,
+    ];
     let outputs = outputs.into_iter().filter_map(|path| path.as_deref());
     let outputs = outputs.chain(formats.iter().flat_map(|f| [f.path, &f.side]));
     let inputs = paths_of(&args.logs).chain([&*args.model]);
@@ -433,6 +461,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(path) = &args.rust {
         texts.push((path, "Rust module", export::module::module(&program, &note)));
     }
+    if let Some(path) = &args.python {
+        let text = gravity_in_python(&model.robot, &model.theta, &base_lines).ok_or_else(|| {
+            CliError::input(format!(
+                "{}: links of this robot follow others or are not known",
+                given.name
+            ))
+            .hint("take gravity of --c or --rust")
+        })?;
+        texts.push((path, "Python module", text));
+    }
     if let Some(path) = &args.ros2_control {
         let of = (given.name.as_str(), &given.value.file, model);
         let text = controller::ros2_control(of, args.bandwidth, &base_lines)?;
@@ -465,6 +503,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         files: written.collect(),
         left_out,
         beyond,
+        lines: None,
     };
     let mut inputs = vec![given.provenance];
     inputs.extend(source.map(|source| source.provenance));

@@ -206,6 +206,28 @@ thread_local! {
     static CHANGED: std::cell::RefCell<[Vec<f64>; 3]> = const { std::cell::RefCell::new([const { Vec::new() }; 3]) };
 }
 
+/// Part of the time in which the joints of a log of held poses move at most.
+const MOVING_SHARE: f64 = 0.2;
+/// Reversals of all joints from which it holds many.
+const REVERSALS: u64 = 6;
+/// Rate below which rows are poses, where most of them turn a joint \[Hz\].
+const ROWS_HZ: f64 = 5.0;
+
+/// That a log holds poses, and the way for it.
+fn held_poses(name: &str, found: &Findings) -> Option<String> {
+    let moving = || found.joints.iter().filter(|joint| joint.moves);
+    let reversals = moving().map(|joint| joint.reversals).max()?;
+    let slow = moving().all(|joint| joint.moving_share < MOVING_SHARE) && reversals >= REVERSALS;
+    let rows = found.rate_hz.is_some_and(|hz| hz < ROWS_HZ) && 4 * reversals > found.rows;
+    (slow || rows).then(|| {
+        let what = match rows {
+            true => "each row is a pose",
+            false => "poses are held most of the time",
+        };
+        format!("{name}: {what}: gravity is fitted to them by `cft-ident lsq --static`")
+    })
+}
+
 /// Fields of a topic that a terminal shows.
 const SHOWN: usize = 12;
 
@@ -273,6 +295,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 Some(topic) => format!("{} {topic}", spec.name()),
             };
             let (findings, input) = inspect(spec, topic, known.as_ref(), context, &mut warnings)?;
+            warnings.extend(held_poses(&escape(&name), &findings));
             logs.push((name, findings));
             provenance.push(input);
         }

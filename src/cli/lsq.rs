@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::held::{self, HeldRun};
 use super::known_payload::KnownPayload;
 use super::{
     CliError, Context, Outcome, arguments, files, logs, names_of, outputs, paths_of, pictures,
@@ -18,7 +19,8 @@ Example:
   cft-ident lsq identification.csv -r robot.toml -m friction.toml -o m.toml
   cft-ident lsq emps_id.csv -r configs/emps.toml -o emps.toml --json -
   cft-ident lsq empty.csv -r arm.toml -o m.toml \\
-    --fit-gains loaded.csv:mass=2.8+-0.05";
+    --fit-gains loaded.csv:mass=2.8+-0.05
+  cft-ident lsq --static poses.csv -r arm.toml -o gravity.toml";
 
 /// Fit the inertial parameters by linear least squares, friction taken from a model file.
 ///
@@ -55,6 +57,10 @@ pub struct Args {
     #[arg(hide_short_help = true, long, value_name = "SECONDS", num_args = 0..=1, require_equals = true,
           value_parser = arguments::positive, conflicts_with_all = ["model", "fit_gains"])]
     pub open_loop: Option<Option<f64>>,
+    /// The logs hold poses, each reached from both sides, or a row for each pose: gravity, friction at rest and ratios
+    /// of gains are fitted to their means
+    #[arg(long = "static", conflicts_with_all = ["model", "fit_gains", "open_loop", "unconstrained"])]
+    pub held: bool,
     /// Model file to write
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
@@ -66,6 +72,15 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    if args.held {
+        let asked = HeldRun {
+            logs: &args.logs,
+            robot: &args.robot,
+            output: &args.output,
+            report: args.report.as_deref(),
+        };
+        return held::run(&asked, context);
+    }
     let payload = args.fit_gains.iter().flatten().map(|p| &*p.log.path);
     let outputs = outputs::listed(Some(&args.output), &[], args.report.as_deref());
     let outputs = outputs.chain(args.setup.fix_setup.as_deref());
@@ -77,6 +92,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     given.extend(friction.iter().map(|model| model.provenance.clone()));
     let known = friction.as_ref().map(|model| &model.value);
     let data = Dataset::new(&machine, &logs(&args.leave_out.of(&args.logs))?);
+    machine.check_moving(&data.logs, &context.control)?;
     let (data, gains, edits) = match &args.fit_gains {
         None => (data, None, Vec::new()),
         Some(payload) => {

@@ -23,6 +23,7 @@ mod export;
 mod files;
 mod friction;
 pub mod generate;
+mod held;
 mod held_out;
 mod identify;
 mod inspect;
@@ -39,6 +40,7 @@ mod removed;
 mod setup;
 mod show;
 mod simulate;
+mod tool;
 mod torque;
 mod track;
 mod typed;
@@ -201,6 +203,7 @@ commands! {
     Track: track,
     Compare: compare,
     Payload: payload,
+    Tool: tool,
     Show: show,
     Torque: torque,
     Watch: watch,

@@ -12,6 +12,7 @@ use cft_ident_report::report::{Figure, Finding, Headline, Report, Tone};
 use cft_ident_stages::identify::{
     self, Dataset, Number95, Payload, PayloadReading, PayloadVerdict,
 };
+use cft_ident_tool::tool::{CarriedBody, RobotController};
 
 const EXAMPLE: &str = "\
 Example:
@@ -49,6 +50,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let data = Dataset::new(&given.machine(), &logs_of(&args.logs));
     let found = identify::payload(&data, &given, &context.control)?;
     let mut report = report(&found, &names_of(&args.logs).join(", "));
+    if found.loaded(&given.file).is_some() {
+        for line in controller_lines(&found).lines() {
+            report.everywhere().line(line);
+        }
+    }
     if let Some(path) = &args.report {
         let page = &mut report.page();
         let of = (&given.file.robot, &context.command);
@@ -86,7 +92,9 @@ fn gain(x: &Number95) -> String {
 fn shown(x: &Number95) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
-            let [value, low, high] = [value, low, high].map(|x| number::significant(x, 4));
+            // digits as far as the interval says something
+            let half = (high - low) / 2.0;
+            let [value, low, high] = [value, low, high].map(|x| number::value_and_std(x, half).0);
             format!("{value} ({low} .. {high})")
         }
         _ => number::ABSENT.to_owned(),
@@ -131,6 +139,12 @@ fn report(found: &Payload, logs: &str) -> Report {
              holds if only the gains changed",
             Some("Next: `cft-ident validate` on a log without a load."),
         ),
+        PayloadVerdict::NoneSeen if is_above_zero(found) => (
+            "none",
+            "no payload: the gains of the model explain the log without one; with free gains a body would explain it \
+             as well, and these data do not tell the two apart",
+            None,
+        ),
         PayloadVerdict::NoneSeen => (
             "none",
             "no payload; one above the upper end of the interval would show",
@@ -157,6 +171,43 @@ fn report(found: &Payload, logs: &str) -> Report {
     all.line("");
     all.table(errors);
     report
+}
+
+/// Whether the mass with free gains is above zero.
+fn is_above_zero(found: &Payload) -> bool {
+    let mut free = found.readings.iter().filter(|of| of.gains_free);
+    let low = |of: &PayloadReading| of.mass.interval_95.is_some_and(|[low, _]| low > 0.0);
+    free.any(low)
+}
+
+/// The lines that controllers take, where a body was found.
+fn controller_lines(found: &Payload) -> String {
+    let Some(reading) = found.readings.first() else {
+        return String::new();
+    };
+    let centre = reading.centre.each_ref().map(|c| c.value);
+    let (Some(mass), [Some(x), Some(y), Some(z)]) = (reading.mass.value, centre) else {
+        return String::new();
+    };
+    let all = reading.inertia.each_ref().map(|of| of.value);
+    let inertia = all
+        .iter()
+        .all(Option::is_some)
+        .then(|| all.map(Option::unwrap_or_default));
+    let body = CarriedBody {
+        mass,
+        centre: [x, y, z],
+        inertia,
+    };
+    let link = escape(&found.link);
+    let mut out = format!(
+        "for the controller, in the frame of {link} (move the centre into that of the flange first):\n"
+    );
+    for controller in RobotController::ALL {
+        let lines = controller.body(&body).replace('\n', "\n          ");
+        out += &format!("  {:<7} {lines}\n", controller.name());
+    }
+    out
 }
 
 /// Where the body of a reading makes the error of a joint larger.

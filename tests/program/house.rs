@@ -46,6 +46,8 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     ("compare", "explain math robot config motion effect verdict"),
     ("track", ""),
+    ("tool", "explain number robot log config"),
+    ("held", "explain number verdict robot log config tool"),
     (
         "identify",
         "explain math block verdict number robot log config motion effect friction inertia judge diagnose \
@@ -58,13 +60,13 @@ const ROOMS: &[(&str, &str)] = &[
     (
         "report",
         "explain math verdict number robot log config motion effect friction inertia diagnose validate \
-         inspect setup excite compare identify band observe open_loop track replay drive",
+         inspect setup excite compare identify band observe open_loop track replay drive tool held",
     ),
     (
         "cli",
         "explain math block verdict number robot log config output motion effect friction inertia diagnose \
          validate inspect mapping setup simulate excite compare identify report export band \
-         observe open_loop track replay",
+         observe open_loop track replay drive tool held",
     ),
 ];
 

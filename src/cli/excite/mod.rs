@@ -5,6 +5,7 @@ mod aim;
 mod controllers;
 mod criterion;
 mod given;
+pub(super) mod held;
 mod judge;
 mod names;
 mod one_joint;
@@ -43,6 +44,7 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident excite -r configs/cft.toml -o excitation.toml --plot excitation.svg
   cft-ident excite -r configs/cft.toml --joint q4 -o ladder.toml
+  cft-ident excite -r arm.toml --static 24 -o poses.toml
   cft-ident excite -m refined.toml --for ripple:q5 -o next.toml
   cft-ident excite --check configs/table3.toml";
 
@@ -74,6 +76,9 @@ pub struct Args {
     /// Design the ladder of speeds of a one-joint experiment instead, for the friction of this joint
     #[arg(long, value_name = "JOINT", conflicts_with_all = ["check", "with", "trajectories"])]
     pub joint: Option<String>,
+    /// Propose so many poses to hold instead, each reached from both sides, for `lsq --static`
+    #[arg(long = "static", value_name = "N", conflicts_with_all = ["check", "joint", "with", "aim", "report", "plot"], value_parser = clap::value_parser!(u16).range(6..=1000))]
+    pub held: Option<u16>,
     /// What the motion is to make small
     #[arg(hide_short_help = true, long, value_enum, default_value_t = CriterionName::Condition)]
     pub criterion: CriterionName,
@@ -260,6 +265,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         (_, Some(Aim::Ladder { joint, .. })) => Some(joint.clone()),
         (joint, _) => joint.clone(),
     };
+    if let (Some(count), Some(path)) = (args.held, &args.output) {
+        return held::run(&bench, usize::from(count), path);
+    }
     match (&args.check, joint) {
         (Some(path), _) => check(&mut bench, path, &all[0]),
         (None, Some(joint)) => ladder(&bench, &joint, &all[0]),

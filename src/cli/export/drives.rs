@@ -86,6 +86,7 @@ pub(super) fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         files,
         left_out: warnings.clone(),
         beyond: Vec::new(),
+        lines: None,
     };
     let inputs = [Provenance::of_text(&file_name(&args.model), &text)];
     Ok(Outcome::new(

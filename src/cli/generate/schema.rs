@@ -4,7 +4,8 @@ use clap::ValueEnum;
 use serde_json::Value;
 
 use crate::cli::{
-    CliError, Outcome, convert, example, export, identify, inspect, new, reduce, show, simulate,
+    CliError, Outcome, convert, example, excite, export, identify, inspect, new, reduce, show,
+    simulate,
 };
 use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
@@ -15,6 +16,8 @@ use cft_ident_stages::identify::{
     ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, Payload,
     TorqueAlong, Tracked, Validated, Watched,
 };
+use cft_ident_tool::held::GravityFit;
+use cft_ident_tool::tool::ToolResult;
 
 /// What a schema is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -33,6 +36,8 @@ pub enum Kind {
     Friction,
     /// JSON document of `lsq`
     Lsq,
+    /// JSON document of `lsq --static`
+    LsqStatic,
     /// JSON document of `validate`
     Validate,
     /// JSON document of `reduce`
@@ -49,12 +54,16 @@ pub enum Kind {
     Identify,
     /// JSON document of `excite`
     Excite,
+    /// JSON document of `excite --static`
+    ExciteStatic,
     /// JSON document of `simulate`
     Simulate,
     /// JSON document of `inspect`
     Inspect,
     /// JSON document of `payload`
     Payload,
+    /// JSON document of `tool`
+    Tool,
     /// JSON document of `show`
     Show,
     /// JSON document of `torque`
@@ -92,6 +101,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Truth => serde_json::Value::from(schemars::schema_for!(TruthFile)),
         Kind::Friction => json::schema::<IdentifiedFriction>("friction"),
         Kind::Lsq => json::schema::<IdentifiedDynamics>("lsq"),
+        Kind::LsqStatic => json::schema::<GravityFit>("lsq-static"),
         Kind::Validate => json::schema::<Validated>("validate"),
         Kind::Reduce => json::schema::<reduce::Reduced>("reduce"),
         Kind::Track => json::schema::<Tracked>("track"),
@@ -100,9 +110,11 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Compare => json::schema::<ComparisonResult>("compare"),
         Kind::Identify => json::schema::<identify::Identified>("identify"),
         Kind::Excite => json::schema::<Judgements>("excite"),
+        Kind::ExciteStatic => json::schema::<excite::held::PosesToHold>("excite-static"),
         Kind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),
         Kind::Inspect => json::schema::<inspect::InspectionResult>("inspect"),
         Kind::Payload => json::schema::<Payload>("payload"),
+        Kind::Tool => json::schema::<ToolResult>("tool"),
         Kind::Show => json::schema::<show::ShownModel>("show"),
         Kind::Torque => json::schema::<TorqueAlong>("torque"),
         Kind::Watch => json::schema::<Watched>("watch"),

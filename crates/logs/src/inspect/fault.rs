@@ -91,6 +91,8 @@ pub enum FaultKind {
     Stall,
     /// A torque of exactly 0 while the joint moves.
     MotorOff,
+    /// A torque that is never below zero while its joint turns both ways.
+    UnsignedTorque,
     /// A temperature that leaps as no drive's does.
     TemperatureStep,
 }
@@ -128,6 +130,7 @@ impl FaultKind {
             Self::WrappedEncoder => "wrapped-encoder",
             Self::Stall => "stall",
             Self::MotorOff => "motor-off",
+            Self::UnsignedTorque => "unsigned-torque",
             Self::TemperatureStep => "temperature-step",
         }
     }

@@ -23,6 +23,7 @@ mod order;
 mod position;
 mod shape;
 mod together;
+mod unsigned;
 mod verdicts;
 pub(crate) mod words;
 

@@ -10,7 +10,7 @@ use super::fault::{Episodes, FaultKind};
 use super::findings::{ChannelFacts, Findings, Gap, RowCost, RowFate, joined};
 use super::judge::{Depth, LogJudge, Track};
 use super::words::ChannelRole;
-use super::{shape, together};
+use super::{shape, together, unsigned};
 use crate::log::round_within;
 
 /// Steps off the median by more than a tenth, as a share of all, from which a clock is irregular.
@@ -45,6 +45,7 @@ fn conclude(judge: &LogJudge) -> Findings {
         shape::faults(judge, place, &clock, &mut draft);
     }
     together::faults(judge, &clock, &mut draft);
+    unsigned::faults(judge, &mut draft);
     let costs = costs(&draft, &clock);
     let rate = (clock.dt > 0.0).then(|| 1.0 / clock.dt);
     let gap = |[from, to]: &[f64; 2]| Gap {

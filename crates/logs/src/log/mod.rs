@@ -52,7 +52,7 @@ pub use reader::Reader;
 pub use recording::{CdrReader, StateGroup, TopicFacts, Value};
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection, RowFault,
-    Stamp, TimeUnit, TorqueIs,
+    Stamp, TimeUnit, TorqueIs, TorqueSign,
 };
 pub use shared::shares_rows;
 pub use source::{DataRole, Provenance, begins_with, sha256};

@@ -222,6 +222,14 @@ pub struct ActuatorChannels {
     pub volts_scale: Option<f64>,
 }
 
+/// `[log] sign`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TorqueSign {
+    /// From the side on which a held joint hangs off its command (`reference` in `[log.joint]`).
+    Hang,
+}
+
 /// `[log]`: how the logs of this machine are written.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -269,6 +277,9 @@ pub struct LogSection {
     /// What the torque channel is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_is: Option<TorqueIs>,
+    /// Where the sign of torques or currents comes from, whose channels hold their size alone: `lsq --static` takes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sign: Option<TorqueSign>,
     /// `torque_scale` of the joints is right but for one factor that all have in common, as `lsq
     /// --fit-gains` finds it without a payload: the model stays in the unit of the channels.
     #[serde(default, skip_serializing_if = "is_default")]

@@ -19,6 +19,7 @@ pub mod foresee;
 pub mod foreseen;
 mod from_files;
 pub mod given;
+pub mod held;
 pub mod information;
 pub mod judgement;
 pub mod known;

@@ -24,6 +24,7 @@ pub mod controller;
 pub mod effects;
 mod error;
 pub mod experiment;
+pub mod held;
 pub mod integrate;
 pub mod joint_friction;
 mod log_layout;
@@ -44,6 +45,7 @@ pub mod single_joint;
 pub mod temperature;
 pub mod truth;
 pub mod volts;
+pub mod wrist;
 
 pub use cft::CftTruth;
 pub use controller::ControllerSettings;

@@ -127,9 +127,16 @@ pub enum IdentifyError {
     NothingIdentified { model: String },
     #[explain(
         "{log}: rows are poses and no motion: {rate_hz:.3} Hz, and positions leap from row to row",
-        "this tool needs a log in time: record the way from pose to pose too, at 100 Hz or more"
+        "fit gravity to the poses by `cft-ident lsq --static`",
+        "for inertia and friction record the way from pose to pose too, at 100 Hz or more"
     )]
     Poses { log: String, rate_hz: f64 },
+    #[explain(
+        format!("{log}: {} of the time the arm stands still: this is a log of held poses, which say nothing of inertia", cft_ident_core::number::percent(*share)),
+        "fit gravity to the poses by `cft-ident lsq --static`",
+        "for inertia and friction record a motion, such as `cft-ident excite` proposes"
+    )]
+    Held { log: String, share: f64 },
     #[explain(
         "{joint}: the model makes a torque of {torque:.4} {unit} at {t:.3} s of {log}, where no more than {measured:.4} {unit} was measured anywhere: it does not hold there",
         "see what its parameters were fitted to, and the clock and units of this log"
@@ -242,6 +249,7 @@ impl IdentifyError {
             | Self::Config(_)
             | Self::Fit(FitError::Math(_))
             | Self::Poses { .. }
+            | Self::Held { .. }
             | Self::Impossible { .. }
             | Self::Refused { .. }
             | Self::OtherRobotLog { .. }

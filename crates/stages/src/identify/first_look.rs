@@ -15,6 +15,8 @@ pub(super) struct FirstLook {
     pub(super) bounds: [f64; 2],
     /// Rate of a log whose rows are poses [Hz].
     pub(super) poses_hz: Option<f64>,
+    /// Part of the time at rest, of a log that holds pose after pose.
+    pub(super) held_share: Option<f64>,
     /// How many times the derivative of its position each joint's velocity column is, where it follows that.
     pub(super) velocities: Vec<Option<f64>>,
 }

@@ -157,6 +157,28 @@ impl LoggedRobot {
         Ok(look)
     }
 
+    /// Refuses logs of held poses, which say nothing of inertia: gravity is fitted to them another way.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Held`] where each log holds pose after pose, and what keeps a log from being read.
+    pub fn check_moving(&self, logs: &[Log], control: &Control) -> Result<(), IdentifyError> {
+        let mut held = None;
+        for log in logs {
+            if matches!(log, Log::Reduced(_)) {
+                return Ok(());
+            }
+            let look = self.first_look(log, &self.file.layout(), control)?;
+            let Some(share) = look.held_share else {
+                return Ok(());
+            };
+            held = Some(IdentifyError::Held {
+                log: escape(&log.name()),
+                share,
+            });
+        }
+        held.map_or(Ok(()), Err)
+    }
+
     /// Speed up to which each joint rests, by the log in which it moves most [m/s or rad/s].
     pub(super) fn rest_speeds(
         &self,
@@ -293,6 +315,7 @@ impl LoggedRobot {
             fastest: speeds.borrow().fastest(),
             bounds: speeds.borrow().bounds(),
             poses_hz: speeds.borrow().poses_hz(),
+            held_share: speeds.borrow().held_share(),
             velocities: speeds.borrow().velocities(),
         })
     }

@@ -13,6 +13,11 @@ const ROUNDING_SPEED: f64 = 1e-9;
 
 /// Steps from which on rows may be poses [s]: no machine is logged in motion so slowly.
 const POSE_S: f64 = 0.2;
+/// Speed below which a joint stands [m/s or rad/s].
+const STANDING_SPEED: f64 = 0.01;
+/// Part of the time at rest from which on a log holds poses, and how many of them.
+const HELD_SHARE: f64 = 0.8;
+const HOLDS: u64 = 6;
 /// Correlation from which on a velocity column follows the position.
 const MIN_VELOCITY_CORRELATION: f64 = 0.9;
 
@@ -71,6 +76,10 @@ pub(super) struct SpeedMeter {
     fastest: Vec<f64>,
     seconds: f64,
     bounds: Option<[f64; 2]>,
+    /// Time at which every joint stands, and how often that begins.
+    still_s: f64,
+    holds: u64,
+    stands: bool,
 }
 
 impl SpeedMeter {
@@ -87,6 +96,9 @@ impl SpeedMeter {
             fastest: Vec::new(),
             seconds: 0.0,
             bounds: None,
+            still_s: 0.0,
+            holds: 0,
+            stands: false,
         }
     }
 
@@ -134,6 +146,13 @@ impl SpeedMeter {
                     *square += (now - before).powi(2) / step;
                     *fastest = fastest.max((now - before).abs() / step);
                 }
+                let speeds = self.now.iter().zip(&self.before);
+                let stands = speeds
+                    .map(|(a, b)| (a - b).abs() / step)
+                    .all(|v| v < STANDING_SPEED);
+                self.holds += u64::from(stands && !self.stands);
+                self.still_s += if stands { step } else { 0.0 };
+                self.stands = stands;
                 self.seconds += step;
                 self.compare(step);
             }
@@ -180,6 +199,12 @@ impl SpeedMeter {
             && first.iter().zip(second).all(leaps)
             && self.rows.seconds >= POSE_S * steps;
         poses.then(|| steps / self.rows.seconds)
+    }
+
+    /// Part of the time in which every joint stands, of a log that holds pose after pose.
+    pub(super) fn held_share(&self) -> Option<f64> {
+        let share = self.still_s / self.seconds.max(f64::MIN_POSITIVE);
+        (share > HELD_SHARE && self.holds >= HOLDS).then_some(share)
     }
 
     /// First and last time [s].

@@ -162,6 +162,11 @@ impl Excitation {
         found.or_else(|| all().reduce(f64::min)).unwrap_or(0.0)
     }
 
+    /// How often the direction turned.
+    pub(crate) fn reversals(&self) -> u64 {
+        self.reversals
+    }
+
     /// Root mean square of the acceleration, or of column 1, the speed.
     pub(crate) fn rms(&self, column: usize) -> f64 {
         (self.gram[column][column] / self.points.max(1) as f64).sqrt()
