@@ -74,7 +74,7 @@ fn meshes_without_end_and_without_number_leave_links_without_capsules_and_memory
              <joint name=\"q\" type=\"continuous\"><parent link=\"base\"/><child link=\"upper\"/></joint></robot>"
         );
         bench.file("arm.urdf", urdf);
-        let ended = bench.run("new arm --urdf arm.urdf");
+        let ended = bench.run("new arm --urdf arm.urdf -v");
         assert_eq!(ended.status, Some(0), "{}", ended.stderr);
         std::fs::remove_file(bench.path("arm.toml")).unwrap();
         ended.stderr

@@ -122,7 +122,7 @@ fn one_position_column_is_a_single_joint() {
         return;
     };
     assert!(
-        text.contains("model = \"single-joint\"\njoint = \"q1\"\n"),
+        text.contains("model = \"single-joint\"\njoint = \"mine\"\n"),
         "{text}"
     );
 }

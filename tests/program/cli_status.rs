@@ -117,6 +117,8 @@ fn a_json_file_that_cannot_be_written_is_reported_before_anything_else_is_writte
         "new mine",
         "example ur10",
         "generate schema robot",
+        "drive no.csv -o d.toml",
+        "tool no.csv -o t.toml",
     ];
     assert_eq!(
         lines.len(),

@@ -317,6 +317,16 @@ impl TextFile {
         }
     }
 
+    /// Whether nothing stands in a column of the current row.
+    pub(super) fn is_blank(&self, column: usize) -> bool {
+        let column = match &self.places {
+            None => Some(column),
+            Some(places) => places.get(column).copied(),
+        };
+        let field = column.and_then(|column| self.field(column));
+        field.is_some_and(|field| field.trim_ascii().is_empty())
+    }
+
     /// The number in a column of the current row, NaN and infinities included.
     #[inline]
     pub(super) fn number(&self, column: usize) -> Option<f64> {

@@ -235,10 +235,9 @@ impl TextRows {
     /// Why a field of the current row cannot be used: nothing stands there, or all of its kind have another clock.
     #[cold]
     fn unusable(&self, index: usize) -> LogError {
-        let blank = |columns: &[ScaledColumn]| {
-            let number = |at: usize| self.file.number(at).is_some_and(f64::is_finite);
-            columns.iter().all(|column| !number(column.index))
-        };
+        // empty cells, not numbers that are none: a table of two topics has them where the other topic has its row
+        let blank =
+            |columns: &[ScaledColumn]| columns.iter().all(|c| self.file.is_blank(c.index));
         let (positions, torques) = (&self.columns.positions, &self.columns.torques);
         let (Some(q), Some(time)) = (positions.first(), self.time) else {
             return self.file.no_number(index);
