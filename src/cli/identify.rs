@@ -192,7 +192,7 @@ impl Work {
                 LoggedRobot::new(&robot.to_string_lossy(), found.file)
             }
         };
-        machine.check_moving(&logs_of(&all), &context.control)?;
+        machine.check_moving(&logs_of(all), &context.control)?;
         let logs = held_out::parted(all);
         if logs.validation.is_empty() {
             let text =

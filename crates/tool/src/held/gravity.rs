@@ -132,7 +132,7 @@ fn independent(gram: &DMatrix<f64>) -> Vec<usize> {
 
 /// Blocks of neighbouring poses.
 fn blocks(poses: usize) -> Vec<Range<usize>> {
-    let count = poses.min(24).max(1);
+    let count = poses.clamp(1, 24);
     let end = |k: usize| k * poses / count;
     (0..count).map(|k| end(k)..end(k + 1)).collect()
 }
@@ -437,7 +437,7 @@ pub fn fit_gravity(log: &HeldLog, file: &RobotFile, name: &str) -> Result<Gravit
             friction.unwrap_or(0.0) + width * std.hypot(noise),
         ])
     };
-    let checks = super::check::checks(log, &names, &|j| unit_of(j), &expected);
+    let checks = super::check::checks(log, names, &|j| unit_of(j), &expected);
     Ok(GravityFit {
         poses: log.poses.len(),
         rows_are_poses: log.rows_are_poses,

@@ -211,8 +211,8 @@ impl WrenchProblem {
                 WrenchEffect::TurnedSensor => {
                     let step = std::array::from_fn(|k| fitted.x[column + k]);
                     let turn = turn_of(&product(&at.turn, &of_turn(&step)));
-                    for k in 0..3 {
-                        fitted.x[column + k] = turn[k];
+                    for (k, x) in turn.iter().enumerate() {
+                        fitted.x[column + k] = *x;
                     }
                 }
                 _ => {}

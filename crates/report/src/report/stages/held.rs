@@ -3,6 +3,7 @@
 use crate::report::Report;
 use crate::report::table::{Align, Table};
 use cft_ident_core::number;
+use cft_ident_core::verdict::Verdict;
 use cft_ident_logs::log::escape;
 use cft_ident_tool::held::{GravityFit, GravityNumber, HoldCheck};
 
@@ -10,20 +11,26 @@ use cft_ident_tool::held::{GravityFit, GravityNumber, HoldCheck};
 pub fn held(of: &GravityFit, path: &str, logs: &str) -> Report {
     let mut report = Report::new("Gravity from held poses");
     let mut all = report.everywhere();
-    all.verdict(&verdict(of), true);
+    all.verdict(&verdict(of), is_determined(of));
     all.list(sentences(of));
     all.line("");
     all.table(parameters(of));
     all.table_apart(joints(of));
     all.line("");
     all.line("hold these poses and compare:");
-    all.list(of.checks.iter().map(|check| in_words(check)));
+    all.list(of.checks.iter().map(in_words));
     all.line(&format!(
         "fitted to {logs}; next: gravity(q) for the controller"
     ));
     all.code(&format!("cft-ident export -m {path} --c gravity.h"));
     all.code(&format!("cft-ident export -m {path} --python gravity.py"));
     report
+}
+
+/// Whether the poses determine any of gravity's parameters.
+fn is_determined(of: &GravityFit) -> bool {
+    let mut all = of.parameters.iter();
+    all.any(|p| p.verdict != Verdict::NotIdentifiable)
 }
 
 fn verdict(of: &GravityFit) -> String {
@@ -34,11 +41,17 @@ fn verdict(of: &GravityFit) -> String {
         )
     });
     let share = number::percent((left / f64::max(torque, f64::MIN_POSITIVE)).sqrt());
-    format!(
+    let text = format!(
         "Gravity from {} held poses: {} parameters, {share} of the torques left on poses that were not fitted.",
         of.poses,
         of.parameters.len()
-    )
+    );
+    match is_determined(of) {
+        true => text,
+        false => format!(
+            "{text} None of the parameters is determined: friction at rest is as large as gravity in these poses; hold more of them, in which links stand out level, each from both sides."
+        ),
+    }
 }
 
 fn sentences(of: &GravityFit) -> Vec<String> {
