@@ -8,8 +8,10 @@ import os
 import re
 import subprocess
 import sys
+import textwrap
 
 CHARACTER, LINE, MARGIN = 8.4, 19, 16
+WIDTH = 80
 COLOURS = {"31": "#d55e00", "32": "#2f9e57", "33": "#b8860b"}
 MOST_LINES = 40
 
@@ -35,7 +37,7 @@ def spans(line):
 
 def drawn(lines):
     plain = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in lines]
-    width = CHARACTER * max(80, max(map(len, plain))) + 2 * MARGIN
+    width = CHARACTER * max(WIDTH, max(map(len, plain))) + 2 * MARGIN
     height = LINE * len(lines) + 2 * MARGIN
     out = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height}" '
@@ -67,7 +69,10 @@ def main():
         text=True,
         check=True,
     )
-    lines = (run.stdout + run.stderr).rstrip().split("\n")
+    lines = run.stdout.rstrip().split("\n")
+    # a terminal breaks long lines of its own accord
+    for line in run.stderr.rstrip().split("\n"):
+        lines += textwrap.wrap(line, WIDTH, subsequent_indent="  ")
     sys.stdout.write(drawn([f"\x1b[1m$ {shown}\x1b[0m", *lines[:MOST_LINES]]))
 
 

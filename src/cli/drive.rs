@@ -7,7 +7,7 @@ use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_drive::drive::drive_file::DriveFile;
 use cft_ident_drive::drive::identify::{DriveData, identify, joined_courses};
-use cft_ident_drive::drive::law::{DriveKind, ServoFirmware};
+use cft_ident_drive::drive::law::{DriveLawKind, ServoFirmware};
 use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_drive::drive::read::bam::RigGiven;
 use cft_ident_drive::drive::read::{self, ReadRequest};
@@ -208,8 +208,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             .as_ref()
             .map(|of| (of.robot.clone(), of.theta.clone())),
         kind: match torque {
-            true => DriveKind::Torque,
-            false => DriveKind::Volts(ServoFirmware {
+            true => DriveLawKind::Torque,
+            false => DriveLawKind::Volts(ServoFirmware {
                 gain: args.firmware_gain,
                 duty_max: args.duty_max,
             }),

@@ -1,7 +1,10 @@
 //! `cft-ident export`: a model for other programs, as C header, Rust module, URDF or file of a simulator.
 
 mod drives;
+mod sources;
 mod tool;
+
+use self::sources::{not_of_others, source};
 mod words;
 
 use cft_ident_core::explain::Explain;
@@ -12,7 +15,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use self::words::{about_effects, beside_urdf, beyond_table, effects, never_driving};
-use super::files::ReadFile;
 use super::{
     CliError, Context, Outcome, arguments, controller, file_name, files, logs_of, paths_of,
 };
@@ -23,9 +25,9 @@ use cft_ident_export::export::dissipative::below_zero;
 use cft_ident_export::export::left_out::{self, Elsewhere};
 use cft_ident_export::export::{self, ExportError, Note, Program, urdf_source};
 use cft_ident_files::config::{
-    self, ModelFile, RobotFile, UrdfReplacement, replaced_in_mjcf, replaced_in_urdf,
+    self, ModelFile, UrdfReplacement, replaced_in_mjcf, replaced_in_urdf,
 };
-use cft_ident_logs::log::{LogSpec, Provenance, escape};
+use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, InMemory};
@@ -234,39 +236,6 @@ fn along(args: &Args, given: &GivenModel, context: &Context) -> Result<Option<In
     let whole = identify::read_whole(&machine, &logs, &context.control)?;
     machine.check_temperatures(&given.numbers()?, &logs, &whole.stretches)?;
     Ok(Some(whole))
-}
-
-/// A URDF that stands for the robot, and the robot that it is read as.
-fn source(path: &Path) -> Result<ReadFile<(String, RobotFile)>, CliError> {
-    let shown = escape(&path.to_string_lossy());
-    let (file, text) = (file_name(path), config::text(path)?);
-    let section = toml::Value::from(file.as_str());
-    let robot = format!("[robot]\nmodel = \"serial\"\nurdf = {section}\n");
-    let robot = RobotFile::parse_in(&shown, &robot, path.parent())?;
-    Ok(ReadFile {
-        provenance: Provenance::of_text(&file, &text),
-        value: (text, robot),
-        name: shown,
-    })
-}
-
-/// Refuses a file beside a URDF that no export has written: a robot file of the same stem, say.
-fn not_of_others(urdf: &Path, side: &Path) -> Result<(), CliError> {
-    let other = std::fs::read(side).is_ok_and(|bytes| {
-        let text = String::from_utf8_lossy(&bytes);
-        !text
-            .lines()
-            .any(|line| line.starts_with(export::urdf::SIDE))
-    });
-    if !other {
-        return Ok(());
-    }
-    let [urdf, side] = [urdf, side].map(|path| path.display());
-    let text =
-        format!("{side} is there already, and it is no file that belongs to an exported URDF");
-    Err(CliError::output(text).hint(format!(
-        "the export writes it beside {urdf}: give the URDF another name, or move {side}"
-    )))
 }
 
 /// What the controller calls joints that the model calls otherwise.

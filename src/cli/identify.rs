@@ -42,8 +42,9 @@ Example:
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// Robot (URDF, robot file, or a built-in one such as configs/ur10.toml) and its logs, LOG@0..70% for a part of one;
-    /// or a campaign file, or an example
+    /// Robot and logs, or a campaign or an example
+    ///
+    /// A robot is a URDF, a robot file, or a built-in one such as configs/ur10.toml; LOG@0..70% is a part of a log.
     #[arg(value_name = "ROBOT LOG...|CAMPAIGN.toml|EXAMPLE")]
     pub files: Vec<LogSpec>,
     /// The robot, as a URDF of any name

@@ -4,6 +4,8 @@
 mod arms;
 #[path = "../../crates/studies/examples/docs_tables/blocks.rs"]
 mod blocks;
+#[path = "../../crates/studies/examples/docs_tables/drives.rs"]
+mod drives;
 #[path = "../../crates/studies/examples/docs_tables/formulas.rs"]
 mod formulas;
 #[path = "../../crates/studies/examples/docs_tables/tables.rs"]

@@ -159,7 +159,10 @@ fn a_callback_stops_a_stage_and_hears_of_its_progress() {
         &control,
     )
     .unwrap();
-    assert_eq!(*said.lock().unwrap(), ["least squares", "held-out data"]);
+    assert_eq!(
+        *said.lock().unwrap(),
+        ["least squares", "reconstruction", "held-out data"]
+    );
     let stopped = Control::default().stopped_by(|| true);
     let error = lsq(
         &Dataset::new(&robot(), &log),

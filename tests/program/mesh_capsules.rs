@@ -211,7 +211,7 @@ fn pieces_of_a_link_are_held_and_those_that_are_not_there_are_reported() {
         + &mesh(plain, "other.STL", "scale=\"1e30 1 1\"")
         + &mesh(plain, "hand.dae", "");
     fs::write(path("arm.urdf"), arm(&upper, &(lower + &lost))).unwrap();
-    let run = command(folder.path(), "new arm --urdf arm.urdf").success();
+    let run = command(folder.path(), "new arm --urdf arm.urdf -v").success();
     run.stderr(contains(
         "collision shapes that no capsule holds: lower: package://elsewhere/hand.stl is in no folder of its package",
     ))

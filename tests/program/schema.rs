@@ -67,6 +67,7 @@ fn committed_results_have_the_schema_of_their_command() {
             Some("cft-ident/lsq/1") => Kind::Lsq,
             Some("cft-ident/validate/1") => Kind::Validate,
             Some("cft-ident/diagnose/3") => Kind::Diagnose,
+            Some("cft-ident/drive/1") => Kind::Drive,
             Some(other) => panic!("{other}"),
             None => continue,
         };

@@ -460,6 +460,12 @@ impl Judging<'_> {
         let amplitude = &verified.amplitude;
         let s = amplitude.s;
         let [torque, std] = amplitude.torque;
+        // what one would not notice is not named, whatever else speaks against it
+        let small = !verified.beside.noticeable && !self.prepared.case.keep;
+        let left = way.left.map(|left| match left {
+            NotWritten::Unsure | NotWritten::Bound if small => NotWritten::Small,
+            left => left,
+        });
         let others = way.chosen.alternatives.iter();
         let status = match way.stands() {
             true if s > numbers.confirmed && torque > 2.0 * std => StepStatus::Confirmed,
@@ -474,7 +480,7 @@ impl Judging<'_> {
             estimate: effect.clone(),
             written: None,
             status,
-            left: way.left,
+            left,
             shrinkage: s,
             deviations: amplitude.deviations(numbers),
             torque: amplitude.torque,

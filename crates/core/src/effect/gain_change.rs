@@ -75,7 +75,10 @@ pub static LAW: Law = Law {
         let of = |x: &str| format!("{} * ({torque} * -expm1(-{x} / {}))", to.x(0), to.s(0));
         match is_time(to.shape[1]) {
             true => to.step(of("state.t")),
-            false => to.added(of(&format!("fabs({torque})"))),
+            false => {
+                let plain = torque.strip_prefix('(').and_then(|x| x.strip_suffix(')'));
+                to.added(of(&format!("fabs({})", plain.unwrap_or(&torque))))
+            }
         }
     }),
     ..Law::linear(&ENTRY, &["k"], |at, _, out| {

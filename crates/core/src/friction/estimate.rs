@@ -129,8 +129,11 @@ fn judged(joint: &str, mut e: JointEstimate) -> Result<JointEstimate, FrictionEr
         return Err(FrictionError::Drives { joint });
     }
     if e.ending != Ending::Converged {
+        // a bound holds wherever the search was left: it is what the rows show of one side
         for value in &mut e.values {
-            value.verdict = Verdict::NotIdentifiable;
+            if value.verdict != Verdict::LowerBound {
+                value.verdict = Verdict::NotIdentifiable;
+            }
         }
     }
     Ok(e)

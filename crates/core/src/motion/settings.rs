@@ -227,7 +227,7 @@ impl Parallel {
         let highest = cutoffs.iter().copied().fold(0.0, f64::max);
         let position = PositionFilter::design(settings.q_order, cutoffs, rate)?;
         let thinned = match position {
-            Some(_) => thinning::factor(settings, highest, decimation, dt),
+            Some(_) => thinning::factor(settings.thin, highest, decimation, dt),
             None => 1,
         };
         let edge = edge(settings, position.as_ref(), dt)?;

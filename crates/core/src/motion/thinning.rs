@@ -10,8 +10,6 @@
 //!
 //! whose zeros lie where frequencies are folded onto zero, and whose gain differs from 1 in the fourth order alone.
 
-use super::settings::FilterSettings;
-
 /// Samples a period of the highest position cut-off that stay. Half: accelerations are off by some thousandths; twice:
 /// no log is thinned below 10 kHz.
 const SAMPLES_A_PERIOD: f64 = 10.0;
@@ -19,14 +17,14 @@ const SAMPLES_A_PERIOD: f64 = 10.0;
 /// Every how many samples of step `dt` \[s\] are enough beside position cut-offs up to `highest_hz`; a divisor of
 /// `decimation`, so that the rows stay those of the log.
 pub(super) fn factor(
-    settings: &FilterSettings,
+    thin: bool,
     highest_hz: f64,
     decimation: usize,
     dt: f64,
 ) -> usize {
     let enough = |m: &usize| SAMPLES_A_PERIOD * highest_hz * dt * *m as f64 <= 1.0 + 1e-9;
     let divides = |m: &usize| decimation.is_multiple_of(*m);
-    match settings.thin {
+    match thin {
         true => (2..=decimation)
             .filter(divides)
             .filter(enough)
@@ -116,15 +114,11 @@ mod tests {
 
     #[test]
     fn a_log_is_thinned_as_far_as_its_positions_and_its_rows_allow() {
-        let settings = FilterSettings {
-            thin: true,
-            ..FilterSettings::default()
-        };
         // 5 kHz, positions up to 100 Hz, every 25th sample a row
-        assert_eq!(factor(&settings, 100.0, 25, 2e-4), 5);
-        assert_eq!(factor(&settings, 101.0, 25, 2e-4), 1);
-        assert_eq!(factor(&settings, 60.0, 24, 2e-4), 8);
-        assert_eq!(factor(&settings, 60.0, 10, 1e-3), 1);
-        assert_eq!(factor(&FilterSettings::default(), 100.0, 25, 2e-4), 1);
+        assert_eq!(factor(true, 100.0, 25, 2e-4), 5);
+        assert_eq!(factor(true, 101.0, 25, 2e-4), 1);
+        assert_eq!(factor(true, 60.0, 24, 2e-4), 8);
+        assert_eq!(factor(true, 60.0, 10, 1e-3), 1);
+        assert_eq!(factor(false, 100.0, 25, 2e-4), 1);
     }
 }

@@ -3,13 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::law::DriveKind;
-use super::unknown::{Quantity, Sizes, Unknown};
+use super::law::DriveLawKind;
+use super::unknown::{DriveQuantity, Sizes, DriveUnknown};
 
 /// A named effect of drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Effect {
+pub enum DriveEffect {
     CommandDelay,
     LoopDelay,
     SpeedLimit,
@@ -20,79 +20,79 @@ pub enum Effect {
     TorqueOffset,
 }
 
-impl Effect {
-    pub const ALL: [Effect; 8] = [
-        Effect::CommandDelay,
-        Effect::LoopDelay,
-        Effect::SpeedLimit,
-        Effect::TorqueLimit,
-        Effect::LoadFriction,
-        Effect::Stribeck,
-        Effect::EncoderBias,
-        Effect::TorqueOffset,
+impl DriveEffect {
+    pub const ALL: [DriveEffect; 8] = [
+        DriveEffect::CommandDelay,
+        DriveEffect::LoopDelay,
+        DriveEffect::SpeedLimit,
+        DriveEffect::TorqueLimit,
+        DriveEffect::LoadFriction,
+        DriveEffect::Stribeck,
+        DriveEffect::EncoderBias,
+        DriveEffect::TorqueOffset,
     ];
 
     pub fn name(self) -> &'static str {
         match self {
-            Effect::CommandDelay => "command-delay",
-            Effect::LoopDelay => "loop-delay",
-            Effect::SpeedLimit => "speed-limit",
-            Effect::TorqueLimit => "torque-limit",
-            Effect::LoadFriction => "load-friction",
-            Effect::Stribeck => "stribeck",
-            Effect::EncoderBias => "encoder-bias",
-            Effect::TorqueOffset => "torque-offset",
+            DriveEffect::CommandDelay => "command-delay",
+            DriveEffect::LoopDelay => "loop-delay",
+            DriveEffect::SpeedLimit => "speed-limit",
+            DriveEffect::TorqueLimit => "torque-limit",
+            DriveEffect::LoadFriction => "load-friction",
+            DriveEffect::Stribeck => "stribeck",
+            DriveEffect::EncoderBias => "encoder-bias",
+            DriveEffect::TorqueOffset => "torque-offset",
         }
     }
 
     /// What it is, as a sentence about a machine.
     pub fn words(self) -> &'static str {
         match self {
-            Effect::CommandDelay => "the command reaches the controller late",
-            Effect::LoopDelay => "the controller acts on old positions",
-            Effect::SpeedLimit => "the firmware limits the speed of the set point",
-            Effect::TorqueLimit => "the torque of the drive is limited",
-            Effect::LoadFriction => "dry friction grows with the torque of the drive",
-            Effect::Stribeck => "dry friction is larger near rest",
-            Effect::EncoderBias => "the zero of the encoder is off",
-            Effect::TorqueOffset => "a constant torque acts",
+            DriveEffect::CommandDelay => "the command reaches the controller late",
+            DriveEffect::LoopDelay => "the controller acts on old positions",
+            DriveEffect::SpeedLimit => "the firmware limits the speed of the set point",
+            DriveEffect::TorqueLimit => "the torque of the drive is limited",
+            DriveEffect::LoadFriction => "dry friction grows with the torque of the drive",
+            DriveEffect::Stribeck => "dry friction is larger near rest",
+            DriveEffect::EncoderBias => "the zero of the encoder is off",
+            DriveEffect::TorqueOffset => "a constant torque acts",
         }
     }
 
-    pub fn quantity(self) -> Quantity {
+    pub fn quantity(self) -> DriveQuantity {
         match self {
-            Effect::CommandDelay => Quantity::CommandDelay,
-            Effect::LoopDelay => Quantity::LoopDelay,
-            Effect::SpeedLimit => Quantity::Slowness,
-            Effect::TorqueLimit => Quantity::TorqueLimit,
-            Effect::LoadFriction => Quantity::LoadFriction,
-            Effect::Stribeck => Quantity::Stribeck,
-            Effect::EncoderBias => Quantity::Bias,
-            Effect::TorqueOffset => Quantity::Offset,
+            DriveEffect::CommandDelay => DriveQuantity::CommandDelay,
+            DriveEffect::LoopDelay => DriveQuantity::LoopDelay,
+            DriveEffect::SpeedLimit => DriveQuantity::Slowness,
+            DriveEffect::TorqueLimit => DriveQuantity::TorqueLimit,
+            DriveEffect::LoadFriction => DriveQuantity::LoadFriction,
+            DriveEffect::Stribeck => DriveQuantity::Stribeck,
+            DriveEffect::EncoderBias => DriveQuantity::Bias,
+            DriveEffect::TorqueOffset => DriveQuantity::Offset,
         }
     }
 
     /// Of a quantity that is a named effect.
-    pub fn of(quantity: Quantity) -> Option<Effect> {
-        Effect::ALL.into_iter().find(|e| e.quantity() == quantity)
+    pub fn of(quantity: DriveQuantity) -> Option<DriveEffect> {
+        DriveEffect::ALL.into_iter().find(|e| e.quantity() == quantity)
     }
 
     /// Whether a person can measure it: it is written as estimated or not at all; what is a shape of friction is shrunk.
     pub fn measurable(self) -> bool {
-        !matches!(self, Effect::LoadFriction | Effect::Stribeck)
+        !matches!(self, DriveEffect::LoadFriction | DriveEffect::Stribeck)
     }
 
     /// Whether it is one number of the whole machine.
     pub fn common(self) -> bool {
-        matches!(self, Effect::CommandDelay | Effect::LoopDelay)
+        matches!(self, DriveEffect::CommandDelay | DriveEffect::LoopDelay)
     }
 
     /// Its unknowns.
-    pub fn unknowns(self, joints: usize) -> Vec<Unknown> {
+    pub fn unknowns(self, joints: usize) -> Vec<DriveUnknown> {
         match self.common() {
-            true => vec![Unknown::common(self.quantity())],
+            true => vec![DriveUnknown::common(self.quantity())],
             false => (0..joints)
-                .map(|j| Unknown::of(self.quantity(), j))
+                .map(|j| DriveUnknown::of(self.quantity(), j))
                 .collect(),
         }
     }
@@ -104,28 +104,28 @@ impl Effect {
             parts.iter().map(one).collect()
         };
         match self {
-            Effect::CommandDelay => vec![vec![0.005], vec![0.03], vec![0.08]],
-            Effect::LoopDelay => vec![vec![0.002], vec![0.01], vec![0.03]],
-            Effect::SpeedLimit => all(&[1.2, 0.9, 0.6], &|s, part| 1.0 / (part * s.speed)),
-            Effect::TorqueLimit => all(&[0.9, 0.6, 0.3], &|s, part| {
+            DriveEffect::CommandDelay => vec![vec![0.005], vec![0.03], vec![0.08]],
+            DriveEffect::LoopDelay => vec![vec![0.002], vec![0.01], vec![0.03]],
+            DriveEffect::SpeedLimit => all(&[1.2, 0.9, 0.6], &|s, part| 1.0 / (part * s.speed)),
+            DriveEffect::TorqueLimit => all(&[0.9, 0.6, 0.3], &|s, part| {
                 1.0 / (part * s.torque * s.farthest / s.error)
             }),
-            Effect::LoadFriction => all(&[0.05], &|_, part| part),
-            Effect::Stribeck => all(&[0.1], &|s, part| part * s.torque),
-            Effect::EncoderBias | Effect::TorqueOffset => all(&[0.0], &|_, _| 0.0),
+            DriveEffect::LoadFriction => all(&[0.05], &|_, part| part),
+            DriveEffect::Stribeck => all(&[0.1], &|s, part| part * s.torque),
+            DriveEffect::EncoderBias | DriveEffect::TorqueOffset => all(&[0.0], &|_, _| 0.0),
         }
     }
 
     /// Effects that a machine may have; a limit of a volts drive is no effect: its duty always has one.
-    pub fn possible(kind: DriveKind, gravity: bool, links: bool) -> Vec<Effect> {
-        let may = |effect: &Effect| match effect {
+    pub fn possible(kind: DriveLawKind, gravity: bool, links: bool) -> Vec<DriveEffect> {
+        let may = |effect: &DriveEffect| match effect {
             // of a volts drive it is declared, or fitted with its gain
-            Effect::TorqueLimit => kind == DriveKind::Torque,
-            Effect::EncoderBias => gravity,
+            DriveEffect::TorqueLimit => kind == DriveLawKind::Torque,
+            DriveEffect::EncoderBias => gravity,
             // declared where no links are known
-            Effect::TorqueOffset => links,
+            DriveEffect::TorqueOffset => links,
             _ => true,
         };
-        Effect::ALL.into_iter().filter(may).collect()
+        DriveEffect::ALL.into_iter().filter(may).collect()
     }
 }

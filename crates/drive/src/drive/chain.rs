@@ -8,8 +8,8 @@ use std::collections::HashMap;
 
 use cft_ident_core::robot::Robot;
 
-use super::law::{DriveKind, MachineLaw};
-use super::roll_out::{Drive, PastStates, first_speed, steps};
+use super::law::{DriveLawKind, MachineLaw};
+use super::roll_out::{RolledDrive, PastStates, first_speed, steps};
 use super::set_point::{CommandIntegral, Follower};
 use super::track::DriveLog;
 
@@ -74,7 +74,7 @@ impl RobotChains {
         let n = self.robot.joints();
         let of = |j: usize| {
             let all = self.inertia.values().flat_map(|log| log.chunks(n * n));
-            super::fit::median(all.map(|m| m[j * n + j]).collect())
+            super::track::median(all.map(|m| m[j * n + j]).collect())
         };
         (0..n).map(of).collect()
     }
@@ -89,7 +89,7 @@ impl RobotChains {
     }
 
     /// Positions of all joints along a log, as the encoders would read them.
-    pub fn roll(&self, log: &DriveLog, kind: DriveKind, law: &MachineLaw) -> Vec<Vec<f64>> {
+    pub fn roll(&self, log: &DriveLog, kind: DriveLawKind, law: &MachineLaw) -> Vec<Vec<f64>> {
         let n = self.robot.joints();
         let mut out = vec![vec![0.0; log.t.len()]; n];
         let Some(inertia) = self.inertia.get(&part_of(log)) else {
@@ -136,7 +136,7 @@ impl RobotChains {
                         _ => 1.0,
                     };
                     let seen = side.past.seen(begin, h, q[j], v[j]);
-                    let drive = Drive::new(kind, of, [track.kp, track.kd], supply);
+                    let drive = RolledDrive::new(kind, of, [track.kp, track.kd], supply);
                     let (tau, slope) = match on {
                         true => drive.torque(set - (seen.q - of.bias), seen.v),
                         false => (0.0, 0.0),

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::chain::RobotChains;
 use super::roll_out::roll_axis;
-use super::track::{DriveLoad, DriveLog};
-use super::unknown::{Frame, Sizes, Unknown};
+use super::track::{DriveLoad, DriveLog, median};
+use super::unknown::{UnknownFrame, Sizes, DriveUnknown};
 
 /// The numbers that decide in a fit.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +34,7 @@ pub const NUMBERS: FitNumbers = FitNumbers {
 
 /// A part of a log, and the block of the jackknife that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Piece {
+pub struct LogPiece {
     pub log: usize,
     pub from: usize,
     pub to: usize,
@@ -43,11 +43,11 @@ pub struct Piece {
 
 /// Logs, the frame of the machine, and how the logs are cut.
 #[derive(Debug, Clone)]
-pub struct Problem<'a> {
+pub struct DriveProblem<'a> {
     pub logs: &'a [&'a DriveLog],
-    pub frame: Frame,
+    pub frame: UnknownFrame,
     pub sizes: Vec<Sizes>,
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<LogPiece>,
     pub blocks: usize,
     pub chains: Option<&'a RobotChains>,
 }
@@ -86,8 +86,8 @@ pub type ResidualScales = Vec<Vec<f64>>;
 
 /// Where a fit ended.
 #[derive(Debug, Clone)]
-pub struct Fitted {
-    pub unknowns: Vec<Unknown>,
+pub struct FittedDrive {
+    pub unknowns: Vec<DriveUnknown>,
     pub values: Vec<f64>,
     pub loss: f64,
     pub converged: bool,
@@ -101,9 +101,9 @@ fn robust(u: f64) -> (f64, f64) {
     (2.0 * c * c * (root - 1.0), 1.0 / root)
 }
 
-impl Problem<'_> {
+impl DriveProblem<'_> {
     /// Predicted positions of a log, joint after joint.
-    pub fn positions(&self, log: &DriveLog, unknowns: &[Unknown], values: &[f64]) -> Vec<Vec<f64>> {
+    pub fn positions(&self, log: &DriveLog, unknowns: &[DriveUnknown], values: &[f64]) -> Vec<Vec<f64>> {
         let law = self.frame.law(unknowns, values);
         if let (DriveLoad::Robot, Some(chains)) = (log.load, self.chains) {
             return chains.roll(log, self.frame.kind, &law);
@@ -119,7 +119,7 @@ impl Problem<'_> {
     }
 
     /// Predicted less measured, log after log.
-    pub fn residuals(&self, unknowns: &[Unknown], values: &[f64]) -> Vec<Vec<Vec<f64>>> {
+    pub fn residuals(&self, unknowns: &[DriveUnknown], values: &[f64]) -> Vec<Vec<Vec<f64>>> {
         let of = |log: &&DriveLog| {
             let mut out = self.positions(log, unknowns, values);
             subtract(&mut out, log);
@@ -129,7 +129,7 @@ impl Problem<'_> {
     }
 
     /// Scales of residuals: the middle of their size, no smaller than that of all logs together would make it.
-    pub fn scales(&self, unknowns: &[Unknown], values: &[f64]) -> ResidualScales {
+    pub fn scales(&self, unknowns: &[DriveUnknown], values: &[f64]) -> ResidualScales {
         let residuals = self.residuals(unknowns, values);
         let own: ResidualScales = residuals
             .iter()
@@ -147,7 +147,7 @@ impl Problem<'_> {
     }
 
     /// The loss at values.
-    pub fn loss(&self, unknowns: &[Unknown], values: &[f64], scales: &ResidualScales) -> f64 {
+    pub fn loss(&self, unknowns: &[DriveUnknown], values: &[f64], scales: &ResidualScales) -> f64 {
         let losses: Vec<f64> = (self.logs.par_iter().zip(scales))
             .map(|(log, scales)| {
                 let mut r = self.positions(log, unknowns, values);
@@ -162,7 +162,7 @@ impl Problem<'_> {
     }
 
     /// Mean size of the residual of each joint, for starts that are far off.
-    pub fn losses_by_joint(&self, unknowns: &[Unknown], values: &[f64]) -> Vec<f64> {
+    pub fn losses_by_joint(&self, unknowns: &[DriveUnknown], values: &[f64]) -> Vec<f64> {
         let all = self.residuals(unknowns, values);
         let of = |j: usize| {
             let sizes = all
@@ -174,7 +174,7 @@ impl Problem<'_> {
     }
 
     /// Step of the difference by each unknown.
-    fn differences(&self, unknowns: &[Unknown], values: &[f64]) -> Vec<f64> {
+    fn differences(&self, unknowns: &[DriveUnknown], values: &[f64]) -> Vec<f64> {
         let of = unknowns.iter().zip(values);
         of.map(|(unknown, value)| {
             let sizes = &self.sizes[unknown.joint.unwrap_or(0)];
@@ -186,7 +186,7 @@ impl Problem<'_> {
     /// Sums of every piece at values, in the order of the pieces.
     pub fn linearised(
         &self,
-        unknowns: &[Unknown],
+        unknowns: &[DriveUnknown],
         values: &[f64],
         scales: &ResidualScales,
     ) -> Vec<Sums> {
@@ -221,7 +221,7 @@ impl Problem<'_> {
     }
 
     /// Joints that an unknown moves.
-    fn reach(&self, unknown: Unknown) -> Vec<usize> {
+    fn reach(&self, unknown: DriveUnknown) -> Vec<usize> {
         match (unknown.joint, self.chains) {
             (None, _) => (0..self.frame.joints).collect(),
             (Some(j), None) => vec![j],
@@ -230,7 +230,7 @@ impl Problem<'_> {
     }
 
     /// Unknowns in batches that move no joint in common: one roll-out shows all of a batch.
-    fn together(&self, unknowns: &[Unknown]) -> Vec<Vec<usize>> {
+    fn together(&self, unknowns: &[DriveUnknown]) -> Vec<Vec<usize>> {
         let mut out: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
         for (i, unknown) in unknowns.iter().enumerate() {
             let reach = self.reach(*unknown);
@@ -260,12 +260,12 @@ impl Problem<'_> {
     /// Fits from a start, at most so many steps.
     pub fn fit(
         &self,
-        unknowns: &[Unknown],
+        unknowns: &[DriveUnknown],
         start: &[f64],
         scales: &ResidualScales,
         most: usize,
-    ) -> Fitted {
-        let bounds: Vec<[f64; 2]> = unknowns.iter().map(Unknown::bounds).collect();
+    ) -> FittedDrive {
+        let bounds: Vec<[f64; 2]> = unknowns.iter().map(DriveUnknown::bounds).collect();
         let mut values = start.to_vec();
         let mut loss = self.loss(unknowns, &values, scales);
         let (mut damping, mut converged) = (1e-3, false);
@@ -296,7 +296,7 @@ impl Problem<'_> {
                 break;
             }
         }
-        Fitted {
+        FittedDrive {
             unknowns: unknowns.to_vec(),
             values,
             loss,
@@ -329,7 +329,7 @@ struct Column {
     slope: Vec<f64>,
 }
 
-fn sums(p: usize, piece: &Piece, r: &[Vec<f64>], columns: &[Vec<Column>], scales: &[f64]) -> Sums {
+fn sums(p: usize, piece: &LogPiece, r: &[Vec<f64>], columns: &[Vec<Column>], scales: &[f64]) -> Sums {
     let mut out = Sums::zero(p);
     for ((r, scale), columns) in r.iter().zip(scales).zip(columns) {
         for k in piece.from..piece.to {
@@ -410,15 +410,6 @@ pub fn solve_free(all: &Sums, free: &[usize], damping: f64) -> Option<DVector<f6
 
 /// Added to a unit diagonal: directions that the data determine less are left where they are.
 const RIDGE: f64 = 1e-9;
-
-/// The middle of numbers.
-pub fn median(mut x: Vec<f64>) -> f64 {
-    if x.is_empty() {
-        return 0.0;
-    }
-    let mid = x.len() / 2;
-    *x.select_nth_unstable_by(mid, f64::total_cmp).1
-}
 
 fn median_size(x: &[f64]) -> f64 {
     median(x.iter().map(|x| x.abs()).collect())

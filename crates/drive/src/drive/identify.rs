@@ -4,16 +4,17 @@ use std::collections::BTreeSet;
 
 use cft_ident_core::robot::Robot;
 
-use super::candidate::Effect;
+use super::candidate::DriveEffect;
 use super::chain::RobotChains;
 use super::error::DriveError;
-use super::fit::{Piece, Problem, median};
+use super::fit::{DriveProblem, LogPiece};
+use super::track::median;
 use super::judge::NUMBERS;
-use super::law::DriveKind;
-use super::search::{self, Found, LawEstimate, StepCertainty};
+use super::law::DriveLawKind;
+use super::search::{self, FoundDrive, LawEstimate, StepCertainty};
 use super::start;
 use super::track::{DriveLoad, DriveLog};
-use super::unknown::{Frame, Quantity, Unknown};
+use super::unknown::{UnknownFrame, DriveQuantity, DriveUnknown};
 
 /// Logs by what they are for.
 #[derive(Debug, Clone)]
@@ -22,7 +23,7 @@ pub struct DriveData {
     pub held_out: Vec<DriveLog>,
     /// The robot whose links the drives move, with its base parameters.
     pub links: Option<(Robot, Vec<f64>)>,
-    pub kind: DriveKind,
+    pub kind: DriveLawKind,
 }
 
 /// What the jackknife leaves out.
@@ -38,12 +39,12 @@ const TIME_BLOCKS: usize = 24;
 
 /// Errors of predicted positions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PositionErrors {
+pub struct DrivePositionErrors {
     /// Log by log, joint by joint: mean size and mean square [rad, rad^2].
     pub logs: Vec<(String, usize, Vec<[f64; 2]>)>,
 }
 
-impl PositionErrors {
+impl DrivePositionErrors {
     fn mean(&self, of: impl Fn(&[f64; 2]) -> f64, joint: Option<usize>) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (_, rows, joints) in &self.logs {
@@ -69,34 +70,34 @@ impl PositionErrors {
 
 /// Errors of a model on logs by their use.
 #[derive(Debug, Clone)]
-pub struct ErrorsByUse {
-    pub train: PositionErrors,
-    pub holdout: Option<PositionErrors>,
+pub struct DriveErrorsByUse {
+    pub train: DrivePositionErrors,
+    pub holdout: Option<DrivePositionErrors>,
     /// Held-out logs, each by a fit without the logs of its motion.
-    pub unseen: Option<PositionErrors>,
+    pub unseen: Option<DrivePositionErrors>,
 }
 
 /// What was identified.
 #[derive(Debug, Clone)]
-pub struct Identified {
-    pub found: Found,
-    pub frame: Frame,
+pub struct IdentifiedDrives {
+    pub found: FoundDrive,
+    pub frame: UnknownFrame,
     pub joints: Vec<String>,
     pub blocks_are: BlocksAre,
     pub blocks: usize,
     /// Whether every torque is a ratio to the inertia.
     pub ratios: bool,
-    pub before: ErrorsByUse,
-    pub after: ErrorsByUse,
+    pub before: DriveErrorsByUse,
+    pub after: DriveErrorsByUse,
     /// Armatures [kg m^2] with the other delay in the place of the one that is written, where data do not part them.
-    pub other_delay: Option<(Effect, Vec<f64>)>,
+    pub other_delay: Option<(DriveEffect, Vec<f64>)>,
     /// Positions of some logs, held-out ones first.
-    pub courses: Vec<Course>,
+    pub courses: Vec<PositionCourse>,
 }
 
 /// Positions along a log, joint after joint [rad].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct PositionCourse {
     pub log: String,
     pub held_out: bool,
     pub t: Vec<f64>,
@@ -112,7 +113,7 @@ pub struct Course {
 const COURSES: usize = 24;
 
 /// Identifies the drives of a dataset.
-pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, DriveError> {
+pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDrives, DriveError> {
     let fitted: Vec<&DriveLog> = data.fitted.iter().collect();
     let all: Vec<&DriveLog> = data.fitted.iter().chain(&data.held_out).collect();
     same_joints(&all)?;
@@ -128,13 +129,13 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, Dr
         .flat_map(|log| log.joints[0].supply.clone())
         .collect();
     let supply = (!volts.is_empty()).then(|| median(volts));
-    let mut problem = Problem {
+    let mut problem = DriveProblem {
         logs: &fitted,
-        frame: Frame {
+        frame: UnknownFrame {
             kind,
             supply: match kind {
-                DriveKind::Volts(_) => supply,
-                DriveKind::Torque => None,
+                DriveLawKind::Volts(_) => supply,
+                DriveLawKind::Torque => None,
             },
             joints: first.joints.len(),
             stribeck_speed: sizes.iter().map(|s| STRIBECK_SPEED * s.speed).collect(),
@@ -155,13 +156,13 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, Dr
     doing("gain, damping, friction");
     let unknowns = start::declared(&fitted, kind);
     let given = search::declared(&problem, &unknowns);
-    let possible = Effect::possible(kind, gravity, first.load != DriveLoad::Unknown);
+    let possible = DriveEffect::possible(kind, gravity, first.load != DriveLoad::Unknown);
     let mut found = search::search(&problem, given, &possible, doing);
     let held_out: Vec<&DriveLog> = data.held_out.iter().collect();
     confirm_held_out(&problem, &mut found, &held_out);
     shrink(&mut problem, &mut found);
-    let bare = Problem {
-        frame: Frame {
+    let bare = DriveProblem {
+        frame: UnknownFrame {
             held: Vec::new(),
             ..problem.frame.clone()
         },
@@ -176,7 +177,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, Dr
         .chain(fitted.iter().map(|log| (false, *log)))
         .take(COURSES);
     let courses = drawn
-        .map(|(held_out, log)| Course {
+        .map(|(held_out, log)| PositionCourse {
             log: log.name.clone(),
             held_out,
             t: log.t.clone(),
@@ -186,7 +187,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<Identified, Dr
             refined: problem.positions(log, &found.refined.unknowns, &found.refined.values),
         })
         .collect();
-    Ok(Identified {
+    Ok(IdentifiedDrives {
         joints: first.joints.iter().map(|j| j.joint.clone()).collect(),
         ratios: first.load == DriveLoad::Unknown,
         frame: problem.frame.clone(),
@@ -228,7 +229,7 @@ impl DriveData {
 }
 
 /// Positions of joints that were identified one by one, log by log.
-pub fn joined_courses(each: &[Identified]) -> Vec<Course> {
+pub fn joined_courses(each: &[IdentifiedDrives]) -> Vec<PositionCourse> {
     let Some((first, rest)) = each.split_first() else {
         return Vec::new();
     };
@@ -271,11 +272,11 @@ fn same_joints(logs: &[&DriveLog]) -> Result<(), DriveError> {
 }
 
 /// How logs are cut into blocks.
-fn pieces(logs: &[&DriveLog]) -> (Vec<Piece>, usize, BlocksAre) {
+fn pieces(logs: &[&DriveLog]) -> (Vec<LogPiece>, usize, BlocksAre) {
     let names: Vec<_> = logs.iter().map(|log| log.block()).collect();
     let each: BTreeSet<_> = names.iter().cloned().collect();
     if each.len() >= NUMBERS.blocks {
-        let whole = logs.iter().enumerate().map(|(l, log)| Piece {
+        let whole = logs.iter().enumerate().map(|(l, log)| LogPiece {
             log: l,
             from: 0,
             to: log.t.len(),
@@ -290,7 +291,7 @@ fn pieces(logs: &[&DriveLog]) -> (Vec<Piece>, usize, BlocksAre) {
         let mut from = 0;
         while from < log.t.len() {
             let to = (from + room).min(log.t.len());
-            out.push(Piece {
+            out.push(LogPiece {
                 log: l,
                 from,
                 to,
@@ -308,8 +309,8 @@ fn pieces(logs: &[&DriveLog]) -> (Vec<Piece>, usize, BlocksAre) {
 }
 
 /// Errors of a solution on logs.
-pub fn errors_on(problem: &Problem, at: &LawEstimate, logs: &[&DriveLog]) -> PositionErrors {
-    let on = Problem {
+pub fn errors_on(problem: &DriveProblem, at: &LawEstimate, logs: &[&DriveLog]) -> DrivePositionErrors {
+    let on = DriveProblem {
         logs,
         pieces: Vec::new(),
         blocks: 0,
@@ -324,13 +325,13 @@ pub fn errors_on(problem: &Problem, at: &LawEstimate, logs: &[&DriveLog]) -> Pos
         });
         (log.name.clone(), rows, sums.collect())
     };
-    PositionErrors {
+    DrivePositionErrors {
         logs: logs.iter().zip(residuals).map(of).collect(),
     }
 }
 
-fn errors(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> ErrorsByUse {
-    ErrorsByUse {
+fn errors(problem: &DriveProblem, at: &LawEstimate, held_out: &[&DriveLog]) -> DriveErrorsByUse {
+    DriveErrorsByUse {
         train: errors_on(problem, at, problem.logs),
         holdout: (!held_out.is_empty()).then(|| errors_on(problem, at, held_out)),
         unseen: unseen(problem, at, held_out),
@@ -338,7 +339,7 @@ fn errors(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> Errors
 }
 
 /// Errors on held-out logs, each by a fit without its motion; none where no motion was fitted.
-fn unseen(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> Option<PositionErrors> {
+fn unseen(problem: &DriveProblem, at: &LawEstimate, held_out: &[&DriveLog]) -> Option<DrivePositionErrors> {
     let motions: BTreeSet<&str> = held_out.iter().map(|log| log.motion.as_str()).collect();
     let mut logs = Vec::new();
     for motion in motions {
@@ -350,7 +351,7 @@ fn unseen(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> Option
         }
         let rest: Vec<&DriveLog> = kept.iter().map(|l| problem.logs[*l]).collect();
         let (pieces, blocks, _) = pieces(&rest);
-        let without = Problem {
+        let without = DriveProblem {
             logs: &rest,
             pieces,
             blocks,
@@ -374,14 +375,14 @@ fn unseen(problem: &Problem, at: &LawEstimate, held_out: &[&DriveLog]) -> Option
             .collect();
         logs.extend(errors_on(problem, &fitted, &of).logs);
     }
-    (!logs.is_empty()).then_some(PositionErrors { logs })
+    (!logs.is_empty()).then_some(DrivePositionErrors { logs })
 }
 
 /// Steps of a fit without a motion, from the fit with it.
 const UNSEEN_STEPS: usize = 8;
 
 /// Steps that make held-out logs worse leave.
-fn confirm_held_out(problem: &Problem, found: &mut Found, held_out: &[&DriveLog]) {
+fn confirm_held_out(problem: &DriveProblem, found: &mut FoundDrive, held_out: &[&DriveLog]) {
     if held_out.is_empty() {
         return;
     }
@@ -399,14 +400,14 @@ fn confirm_held_out(problem: &Problem, found: &mut Found, held_out: &[&DriveLog]
 }
 
 /// Shapes of friction that are not confirmed are held at s times their estimate, everything else fitted around them.
-fn shrink(problem: &mut Problem, found: &mut Found) {
+fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
     let steps = found.steps.iter().filter(|step| step.written());
     let indicated = steps.filter(|step| step.status == StepCertainty::Indicated);
     let smaller: Vec<_> = indicated
         .map(|step| {
             let s = step.judged.shrinkage;
             let held = step.unknowns.iter().zip(&step.values);
-            let held: Vec<(Unknown, f64)> = held.map(|(u, x)| (*u, s * x)).collect();
+            let held: Vec<(DriveUnknown, f64)> = held.map(|(u, x)| (*u, s * x)).collect();
             (step.effect, held)
         })
         .collect();
@@ -417,8 +418,8 @@ fn shrink(problem: &mut Problem, found: &mut Found) {
 }
 
 /// The armature with the other delay, where data do not part the two.
-fn other_delay(problem: &Problem, found: &Found) -> Option<(Effect, Vec<f64>)> {
-    let delays = [Effect::CommandDelay, Effect::LoopDelay];
+fn other_delay(problem: &DriveProblem, found: &FoundDrive) -> Option<(DriveEffect, Vec<f64>)> {
+    let delays = [DriveEffect::CommandDelay, DriveEffect::LoopDelay];
     let step = found
         .steps
         .iter()
@@ -426,7 +427,7 @@ fn other_delay(problem: &Problem, found: &Found) -> Option<(Effect, Vec<f64>)> {
     let other = step.alternatives.iter().find(|e| delays.contains(e))?;
     let rest = search::without(problem, &found.refined, step.effect);
     let with = search::with(problem, &rest, *other);
-    let of = |j| with.value(Unknown::of(Quantity::Armature, j));
+    let of = |j| with.value(DriveUnknown::of(DriveQuantity::Armature, j));
     let armatures: Option<Vec<f64>> = (0..problem.frame.joints).map(of).collect();
     Some((*other, armatures?))
 }

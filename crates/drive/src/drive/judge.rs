@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::fit::{Sums, solve_free};
-use super::unknown::Unknown;
+use super::unknown::DriveUnknown;
 
 /// The numbers that decide.
 #[derive(Debug, Clone, Copy)]
@@ -52,7 +52,7 @@ pub fn floor(k: usize, n: f64) -> f64 {
 /// Changes of the unknowns by each block left out.
 #[derive(Debug, Clone)]
 pub struct BlockJackknife {
-    /// Unknown by unknown, block by block.
+    /// DriveUnknown by unknown, block by block.
     pub changes: Vec<DVector<f64>>,
     pub covariance: DMatrix<f64>,
     /// What is free: the others stand at a bound, or are not seen.
@@ -61,13 +61,13 @@ pub struct BlockJackknife {
 
 impl BlockJackknife {
     /// At a fitted point.
-    pub fn new(unknowns: &[Unknown], values: &[f64], blocks: &[Sums]) -> Self {
+    pub fn new(unknowns: &[DriveUnknown], values: &[f64], blocks: &[Sums]) -> Self {
         let p = unknowns.len();
         let mut total = Sums::zero(p);
         for block in blocks {
             total.add(block);
         }
-        let bounds: Vec<[f64; 2]> = unknowns.iter().map(Unknown::bounds).collect();
+        let bounds: Vec<[f64; 2]> = unknowns.iter().map(DriveUnknown::bounds).collect();
         let free: Vec<bool> = (0..p)
             .map(|i| total.h[(i, i)] > 0.0 && values[i] > bounds[i][0] && values[i] < bounds[i][1])
             .collect();
@@ -117,7 +117,7 @@ impl BlockJackknife {
 
 /// What the judge says of the numbers of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Judged {
+pub struct JudgedDriveEffect {
     /// sqrt F: amplitude over its deviation, where it is one number.
     pub deviations: f64,
     /// c: the square of what would do.
@@ -126,7 +126,7 @@ pub struct Judged {
     pub shrinkage: f64,
 }
 
-impl Judged {
+impl JudgedDriveEffect {
     /// Of amplitudes with covariance V in so many blocks: F = a' V^-1 a / k.
     pub fn new(amplitude: &DVector<f64>, v: DMatrix<f64>, blocks: usize) -> Self {
         let k = amplitude.len();
@@ -141,7 +141,7 @@ impl Judged {
             Some(root) => scaled.dot(&root.solve(&scaled)) / k.max(1) as f64,
             None => 0.0,
         };
-        Judged {
+        JudgedDriveEffect {
             deviations: f.sqrt(),
             floor,
             shrinkage: if f > 0.0 {

@@ -9,19 +9,19 @@
 
 /// How the firmware makes torque of an error of position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum DriveKind {
+pub enum DriveLawKind {
     /// A voltage behind a resistance.
     Volts(ServoFirmware),
     /// A torque in N m: the log's gains are N m/rad and N m s/rad.
     Torque,
 }
 
-impl DriveKind {
+impl DriveLawKind {
     /// Whether the largest torque follows from what is declared.
     pub fn limit_is_declared(self) -> bool {
         match self {
-            DriveKind::Volts(firmware) => firmware.gain.is_some() && firmware.duty_max.is_some(),
-            DriveKind::Torque => false,
+            DriveLawKind::Volts(firmware) => firmware.gain.is_some() && firmware.duty_max.is_some(),
+            DriveLawKind::Torque => false,
         }
     }
 }

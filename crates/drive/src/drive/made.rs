@@ -3,22 +3,22 @@
 use cft_ident_core::number::{plus_minus, significant};
 use cft_ident_core::verdict::Verdict;
 
-use super::candidate::Effect;
-use super::identify::{self, BlocksAre, ErrorsByUse, Identified};
-use super::law::DriveKind;
+use super::candidate::DriveEffect;
+use super::identify::{self, BlocksAre, DriveErrorsByUse, IdentifiedDrives};
+use super::law::DriveLawKind;
 use super::numbers::{given, parameter, part, step};
 use super::outcome::{
     DeclaredDrive, DriveParameter, DriveResult, DriveStep, DriveVerdict, JointPositionError,
-    LogPositionError, PositionError, PositionErrorsByUse, StepAmplitude, TriedEffect, VerdictKind,
+    LogPositionError, DrivePositionError, PositionErrorsByUse, StepAmplitude, TriedEffect, VerdictKind,
 };
 
 impl DriveResult {
     /// Of what was identified.
-    pub fn new(of: &Identified) -> Self {
-        let volts = matches!(of.frame.kind, DriveKind::Volts(_));
+    pub fn new(of: &IdentifiedDrives) -> Self {
+        let volts = matches!(of.frame.kind, DriveLawKind::Volts(_));
         let firmware = match of.frame.kind {
-            DriveKind::Volts(firmware) => firmware,
-            DriveKind::Torque => Default::default(),
+            DriveLawKind::Volts(firmware) => firmware,
+            DriveLawKind::Torque => Default::default(),
         };
         let drive = DeclaredDrive {
             kind: if volts { "volts" } else { "torque" }.to_owned(),
@@ -76,7 +76,7 @@ impl DriveResult {
     }
 
     /// Of joints that were identified one by one: what concerns a joint alone has its name.
-    pub fn joined(each: &[Identified]) -> Option<Self> {
+    pub fn joined(each: &[IdentifiedDrives]) -> Option<Self> {
         let all: Vec<DriveResult> = each.iter().map(DriveResult::new).collect();
         let (first, rest) = all.split_first()?;
         if rest.is_empty() {
@@ -110,8 +110,8 @@ impl DriveResult {
         Some(out)
     }
 }
-fn by_use(of: &Identified, errors: &ErrorsByUse) -> PositionErrorsByUse {
-    let one = |errors: &identify::PositionErrors| PositionError {
+fn by_use(of: &IdentifiedDrives, errors: &DriveErrorsByUse) -> PositionErrorsByUse {
+    let one = |errors: &identify::DrivePositionErrors| DrivePositionError {
         mae: errors.mae(None),
         rmse: errors.rmse(None),
         score: errors.rmse(None).powi(2) * of.joints.len() as f64,
@@ -139,7 +139,7 @@ fn by_use(of: &Identified, errors: &ErrorsByUse) -> PositionErrorsByUse {
 
 /// Errors of joints that were identified one by one.
 fn joined_errors(each: Vec<&PositionErrorsByUse>) -> PositionErrorsByUse {
-    let joined = |of: Vec<&PositionError>| {
+    let joined = |of: Vec<&DrivePositionError>| {
         let first = (*of.first()?).clone();
         let n = of.len() as f64;
         let logs = first
@@ -155,7 +155,7 @@ fn joined_errors(each: Vec<&PositionErrorsByUse>) -> PositionErrorsByUse {
                     .sum::<f64>()
                     / n,
             });
-        Some(PositionError {
+        Some(DrivePositionError {
             mae: of.iter().map(|e| e.mae).sum::<f64>() / n,
             rmse: (of.iter().map(|e| e.rmse * e.rmse).sum::<f64>() / n).sqrt(),
             score: of.iter().map(|e| e.score).sum(),
@@ -164,7 +164,7 @@ fn joined_errors(each: Vec<&PositionErrorsByUse>) -> PositionErrorsByUse {
             unit: first.unit.clone(),
         })
     };
-    let some = |of: fn(&PositionErrorsByUse) -> Option<&PositionError>| {
+    let some = |of: fn(&PositionErrorsByUse) -> Option<&DrivePositionError>| {
         joined(each.iter().filter_map(|e| of(e)).collect())
     };
     let train = joined(each.iter().map(|e| &e.train).collect());
@@ -222,10 +222,10 @@ fn verdict(
 }
 
 /// An amplitude in the unit that people use.
-fn worded(effect: Effect, amplitude: &StepAmplitude) -> String {
+fn worded(effect: DriveEffect, amplitude: &StepAmplitude) -> String {
     let (factor, unit) = match effect {
-        Effect::CommandDelay | Effect::LoopDelay => (1e3, "ms"),
-        Effect::EncoderBias => (1e3, "mrad"),
+        DriveEffect::CommandDelay | DriveEffect::LoopDelay => (1e3, "ms"),
+        DriveEffect::EncoderBias => (1e3, "mrad"),
         _ => (1.0, amplitude.unit.as_str()),
     };
     let shown = match amplitude.std {

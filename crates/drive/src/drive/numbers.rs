@@ -2,12 +2,12 @@
 
 use cft_ident_core::verdict::{Verdict, verdict_of};
 
-use super::identify::Identified;
+use super::identify::IdentifiedDrives;
 use super::outcome::{
-    DeclaredDrive, DriveParameter, DriveStep, GainSe, GivenParameter, StepAmplitude, StepStatus,
+    DeclaredDrive, DriveParameter, DriveStep, GainSe, GivenParameter, StepAmplitude, DriveStepStatus,
 };
 use super::search::{Step, StepCertainty};
-use super::unknown::{Quantity, Unknown};
+use super::unknown::{DriveQuantity, DriveUnknown};
 
 /// Name, unit and meaning of a quantity, and the value that is shown of it with its slope.
 struct Shown {
@@ -17,58 +17,58 @@ struct Shown {
     meaning: &'static str,
 }
 
-fn shown(quantity: Quantity, volts: bool) -> Shown {
+fn shown(quantity: DriveQuantity, volts: bool) -> Shown {
     let (name, unit, over_inertia, meaning) = match quantity {
-        Quantity::Stiffness => (
+        DriveQuantity::Stiffness => (
             "stiffness",
             "N m/rad",
             "1/s^2",
             "torque per radian and unit of kp at the supply, kt V k/R",
         ),
-        Quantity::Damping if volts => (
+        DriveQuantity::Damping if volts => (
             "damping",
             "N m s/rad",
             "1/s",
             "back-EMF and viscous friction, kt^2/R + Fv",
         ),
-        Quantity::Damping => ("viscous", "N m s/rad", "1/s", "viscous friction, Fv"),
-        Quantity::BackEmf => ("back_emf", "N m s/rad", "1/s", "back-EMF, kt^2/R"),
-        Quantity::Viscous => ("viscous", "N m s/rad", "1/s", "viscous friction, Fv"),
-        Quantity::Coulomb => ("coulomb", "N m", "rad/s^2", "dry friction, Fc"),
-        Quantity::Armature => ("armature", "kg m^2", "1", "inertia of the drive, Ja"),
-        Quantity::CommandDelay => ("command_delay", "s", "s", "the command comes so late, Td"),
-        Quantity::LoopDelay => (
+        DriveQuantity::Damping => ("viscous", "N m s/rad", "1/s", "viscous friction, Fv"),
+        DriveQuantity::BackEmf => ("back_emf", "N m s/rad", "1/s", "back-EMF, kt^2/R"),
+        DriveQuantity::Viscous => ("viscous", "N m s/rad", "1/s", "viscous friction, Fv"),
+        DriveQuantity::Coulomb => ("coulomb", "N m", "rad/s^2", "dry friction, Fc"),
+        DriveQuantity::Armature => ("armature", "kg m^2", "1", "inertia of the drive, Ja"),
+        DriveQuantity::CommandDelay => ("command_delay", "s", "s", "the command comes so late, Td"),
+        DriveQuantity::LoopDelay => (
             "loop_delay",
             "s",
             "s",
             "the controller acts on positions so old",
         ),
-        Quantity::Slowness => (
+        DriveQuantity::Slowness => (
             "speed_limit",
             "rad/s",
             "rad/s",
             "largest speed of the set point",
         ),
-        Quantity::TorqueLimit => (
+        DriveQuantity::TorqueLimit => (
             "torque_limit",
             "N m",
             "rad/s^2",
             "largest torque of the drive",
         ),
-        Quantity::LoadFriction => (
+        DriveQuantity::LoadFriction => (
             "load_friction",
             "1",
             "1",
             "dry friction per torque of the drive",
         ),
-        Quantity::Stribeck => ("stribeck", "N m", "rad/s^2", "dry friction more near rest"),
-        Quantity::Bias => (
+        DriveQuantity::Stribeck => ("stribeck", "N m", "rad/s^2", "dry friction more near rest"),
+        DriveQuantity::Bias => (
             "encoder_bias",
             "rad",
             "rad",
             "the encoder reads the angle less this",
         ),
-        Quantity::Offset => ("torque_offset", "N m", "rad/s^2", "constant torque"),
+        DriveQuantity::Offset => ("torque_offset", "N m", "rad/s^2", "constant torque"),
     };
     Shown {
         name,
@@ -79,8 +79,8 @@ fn shown(quantity: Quantity, volts: bool) -> Shown {
 }
 
 /// Whether a quantity is kept as one over what is shown.
-fn inverse(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Slowness | Quantity::TorqueLimit)
+fn inverse(quantity: DriveQuantity) -> bool {
+    matches!(quantity, DriveQuantity::Slowness | DriveQuantity::TorqueLimit)
 }
 /// ln(before / after) as the part that goes.
 pub(super) fn part([gain, se]: [f64; 2]) -> GainSe {
@@ -91,9 +91,9 @@ pub(super) fn part([gain, se]: [f64; 2]) -> GainSe {
 }
 
 pub(super) fn parameter(
-    of: &Identified,
+    of: &IdentifiedDrives,
     volts: bool,
-    unknown: Unknown,
+    unknown: DriveUnknown,
     value: f64,
     std: Option<f64>,
     reach: f64,
@@ -204,7 +204,7 @@ pub(super) fn given(drive: &DeclaredDrive, parameters: &[DriveParameter]) -> Vec
     out
 }
 
-pub(super) fn step(of: &Identified, volts: bool, step: &Step) -> DriveStep {
+pub(super) fn step(of: &IdentifiedDrives, volts: bool, step: &Step) -> DriveStep {
     let shown = shown(step.effect.quantity(), volts);
     let unit = if of.ratios {
         shown.over_inertia
@@ -247,9 +247,9 @@ pub(super) fn step(of: &Identified, volts: bool, step: &Step) -> DriveStep {
         },
         parameters: parameters.collect(),
         status: match step.status {
-            StepCertainty::Confirmed => StepStatus::Confirmed,
-            StepCertainty::Indicated => StepStatus::Indicated,
-            StepCertainty::Seen | StepCertainty::HeldOutWorse => StepStatus::Seen,
+            StepCertainty::Confirmed => DriveStepStatus::Confirmed,
+            StepCertainty::Indicated => DriveStepStatus::Indicated,
+            StepCertainty::Seen | StepCertainty::HeldOutWorse => DriveStepStatus::Seen,
         },
         written,
         reason,

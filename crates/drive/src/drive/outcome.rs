@@ -6,7 +6,7 @@ use cft_ident_core::verdict::Verdict;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::candidate::Effect;
+use super::candidate::DriveEffect;
 
 /// A number of a drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -55,7 +55,7 @@ pub struct GainSe {
 /// How sure a step is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum StepStatus {
+pub enum DriveStepStatus {
     Confirmed,
     Indicated,
     Seen,
@@ -64,12 +64,12 @@ pub enum StepStatus {
 /// An effect that was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DriveStep {
-    pub effect: Effect,
+    pub effect: DriveEffect,
     /// Null where it concerns all joints.
     pub joint: Option<String>,
     /// Amplitudes as estimated, by joint where there are several.
     pub parameters: BTreeMap<String, StepAmplitude>,
-    pub status: StepStatus,
+    pub status: DriveStepStatus,
     /// Whether it stands in the model.
     pub written: bool,
     /// Why not.
@@ -83,13 +83,13 @@ pub struct DriveStep {
     /// Part of the robust squared error of blocks left out that it takes.
     pub gain: GainSe,
     /// Effects that these data do not separate from it.
-    pub alternatives: Vec<Effect>,
+    pub alternatives: Vec<DriveEffect>,
 }
 
 /// An effect that was tried and brought nothing to blocks left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TriedEffect {
-    pub effect: Effect,
+    pub effect: DriveEffect,
     pub gain: GainSe,
 }
 
@@ -113,7 +113,7 @@ pub struct LogPositionError {
 
 /// Errors of rolled-out positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PositionError {
+pub struct DrivePositionError {
     /// Mean size over all samples.
     pub mae: f64,
     /// Root of the mean square over all samples.
@@ -128,11 +128,11 @@ pub struct PositionError {
 /// Errors by what logs were used for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PositionErrorsByUse {
-    pub train: PositionError,
+    pub train: DrivePositionError,
     /// Held-out logs; null without.
-    pub holdout: Option<PositionError>,
+    pub holdout: Option<DrivePositionError>,
     /// Held-out logs, each by a fit without the logs of its motion; null without.
-    pub holdout_motion_unseen: Option<PositionError>,
+    pub holdout_motion_unseen: Option<DrivePositionError>,
 }
 
 /// A sentence about the result.

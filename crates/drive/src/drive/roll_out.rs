@@ -4,7 +4,7 @@
 //! the speed goes in by the trapezoidal rule, so the error falls with h^2; dry friction is an impulse of at most Fc h
 //! against the motion (Moreau 1988): a joint that rests stays at rest, and the motion is continuous in every number.
 
-use super::law::{DriveKind, JointLaw, MachineLaw};
+use super::law::{DriveLawKind, JointLaw, MachineLaw};
 use super::set_point::{CommandIntegral, Follower};
 use super::track::{DriveLoad, DriveLog};
 
@@ -38,25 +38,25 @@ const FIRST: usize = 4;
 
 /// What a torque of the drive is made of, at one moment.
 #[derive(Debug, Clone, Copy)]
-pub struct Drive {
+pub struct RolledDrive {
     kp: f64,
     kd: f64,
     most: f64,
 }
 
-impl Drive {
+impl RolledDrive {
     /// Of a joint at a supply; nothing where it is off.
-    pub fn new(kind: DriveKind, law: &JointLaw, gains: [f64; 2], supply: f64) -> Self {
+    pub fn new(kind: DriveLawKind, law: &JointLaw, gains: [f64; 2], supply: f64) -> Self {
         let [kp, kd] = gains;
         let ratio = match kind {
-            DriveKind::Volts(_) => law.stiffness * supply,
-            DriveKind::Torque => 1.0,
+            DriveLawKind::Volts(_) => law.stiffness * supply,
+            DriveLawKind::Torque => 1.0,
         };
-        Drive {
+        RolledDrive {
             kp: ratio * kp,
             kd: ratio * kd,
             most: law.torque_max
-                * if matches!(kind, DriveKind::Volts(_)) {
+                * if matches!(kind, DriveLawKind::Volts(_)) {
                     supply
                 } else {
                     1.0
@@ -77,7 +77,7 @@ impl Drive {
 }
 
 /// Positions of one axis along a log, as its encoder would read them.
-pub fn roll_axis(log: &DriveLog, kind: DriveKind, law: &MachineLaw, joint: usize, out: &mut [f64]) {
+pub fn roll_axis(log: &DriveLog, kind: DriveLawKind, law: &MachineLaw, joint: usize, out: &mut [f64]) {
     let (track, of) = (&log.joints[joint], &law.joints[joint]);
     let (inertia, gravity) = match log.load {
         DriveLoad::PendulumRig(rig) => (rig.inertia() + of.armature, rig.gravity()),
@@ -100,7 +100,7 @@ pub fn roll_axis(log: &DriveLog, kind: DriveKind, law: &MachineLaw, joint: usize
             _ => 1.0,
         };
         let on = track.on.get(k - 1).copied().unwrap_or(true);
-        let drive = Drive::new(kind, of, [track.kp, track.kd], supply);
+        let drive = RolledDrive::new(kind, of, [track.kp, track.kd], supply);
         let damping = if on { of.damping } else { of.viscous };
         for i in 0..count {
             let begin = t[k - 1] + i as f64 * h;
@@ -133,7 +133,7 @@ pub fn roll_axis(log: &DriveLog, kind: DriveKind, law: &MachineLaw, joint: usize
 
 /// What a late controller sees.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen {
+pub struct SeenLimits {
     pub q: f64,
     pub v: f64,
     /// Part of the step's own change of speed in `v`, doubled: 1 where the controller is in time.
@@ -171,16 +171,16 @@ impl PastStates {
 
     /// What is seen in the middle of a step that begins with speed `v` and is at `half` in its middle.
     #[inline]
-    pub fn seen(&mut self, begin: f64, h: f64, half: f64, v: f64) -> Seen {
+    pub fn seen(&mut self, begin: f64, h: f64, half: f64, v: f64) -> SeenLimits {
         if self.late <= 0.0 {
-            return Seen {
+            return SeenLimits {
                 q: half,
                 v,
                 own: 1.0,
             };
         }
         if self.late < 0.5 * h {
-            return Seen {
+            return SeenLimits {
                 q: half - self.late * v,
                 v,
                 own: 1.0 - 2.0 * self.late / h,
@@ -198,6 +198,6 @@ impl PastStates {
             }
             _ => (q0, v0),
         };
-        Seen { q, v, own: 0.0 }
+        SeenLimits { q, v, own: 0.0 }
     }
 }

@@ -8,16 +8,16 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::candidate::Effect;
-use super::fit::{NUMBERS as FIT, Problem, ResidualScales, Sums};
-use super::judge::{self, BlockJackknife, Judged, NUMBERS};
+use super::candidate::DriveEffect;
+use super::fit::{NUMBERS as FIT, DriveProblem, ResidualScales, Sums};
+use super::judge::{self, BlockJackknife, JudgedDriveEffect, NUMBERS};
 use super::start;
-use super::unknown::{Quantity, Unknown};
+use super::unknown::{DriveQuantity, DriveUnknown};
 
 /// A fitted law with its deviations.
 #[derive(Debug, Clone)]
 pub struct LawEstimate {
-    pub unknowns: Vec<Unknown>,
+    pub unknowns: Vec<DriveUnknown>,
     pub values: Vec<f64>,
     pub converged: bool,
     pub scales: ResidualScales,
@@ -28,8 +28,8 @@ pub struct LawEstimate {
 impl LawEstimate {
     /// Of values that a fit ended at.
     fn at(
-        problem: &Problem,
-        unknowns: &[Unknown],
+        problem: &DriveProblem,
+        unknowns: &[DriveUnknown],
         values: Vec<f64>,
         scales: &ResidualScales,
     ) -> Self {
@@ -53,7 +53,7 @@ impl LawEstimate {
         self.jackknife.left_out(&self.blocks)
     }
 
-    pub fn value(&self, unknown: Unknown) -> Option<f64> {
+    pub fn value(&self, unknown: DriveUnknown) -> Option<f64> {
         let at = self.unknowns.iter().position(|u| *u == unknown)?;
         Some(self.values[at])
     }
@@ -73,17 +73,17 @@ pub enum StepCertainty {
 /// An effect that helps the blocks left out.
 #[derive(Debug, Clone)]
 pub struct Step {
-    pub effect: Effect,
-    pub unknowns: Vec<Unknown>,
+    pub effect: DriveEffect,
+    pub unknowns: Vec<DriveUnknown>,
     /// As estimated in the joint fit, with deviations.
     pub values: Vec<f64>,
     pub stds: Vec<Option<f64>>,
-    pub judged: Judged,
+    pub judged: JudgedDriveEffect,
     pub status: StepCertainty,
     /// Mean ln(before / after) of the loss of blocks left out, and its standard error.
     pub gain: [f64; 2],
     /// Effects that do nearly as well in its place.
-    pub alternatives: Vec<Effect>,
+    pub alternatives: Vec<DriveEffect>,
 }
 
 impl Step {
@@ -99,13 +99,13 @@ impl Step {
 /// An effect that was tried.
 #[derive(Debug, Clone)]
 pub struct TriedStep {
-    pub effect: Effect,
+    pub effect: DriveEffect,
     pub gain: [f64; 2],
 }
 
 /// What a search found.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct FoundDrive {
     /// Without any effect.
     pub given: LawEstimate,
     /// With all that are written.
@@ -120,8 +120,8 @@ const SHORT: usize = 5;
 
 /// Fits with scales that follow the residual.
 pub fn fit(
-    problem: &Problem,
-    unknowns: &[Unknown],
+    problem: &DriveProblem,
+    unknowns: &[DriveUnknown],
     start: &[f64],
     scales: Option<&ResidualScales>,
 ) -> LawEstimate {
@@ -142,7 +142,7 @@ pub fn fit(
     // a limit that is never reached is none
     for (i, unknown) in unknowns.iter().enumerate() {
         let seen = solution.blocks.iter().any(|block| block.h[(i, i)] > 0.0);
-        if unknown.quantity == Quantity::TorqueLimit && !seen {
+        if unknown.quantity == DriveQuantity::TorqueLimit && !seen {
             solution.values[i] = 0.0;
         }
     }
@@ -154,7 +154,7 @@ pub fn fit(
 const ROUNDS: usize = 3;
 
 /// The declared drive, from several starts.
-pub fn declared(problem: &Problem, unknowns: &[Unknown]) -> LawEstimate {
+pub fn declared(problem: &DriveProblem, unknowns: &[DriveUnknown]) -> LawEstimate {
     let mut best: Option<(f64, LawEstimate)> = None;
     for start in start::starts(problem, unknowns) {
         let scales = problem.scales(unknowns, &start);
@@ -171,7 +171,7 @@ pub fn declared(problem: &Problem, unknowns: &[Unknown]) -> LawEstimate {
 }
 
 /// The best of the starts of an effect, fitted beside a solution with its scales.
-pub fn with(problem: &Problem, beside: &LawEstimate, effect: Effect) -> LawEstimate {
+pub fn with(problem: &DriveProblem, beside: &LawEstimate, effect: DriveEffect) -> LawEstimate {
     let mut unknowns = beside.unknowns.clone();
     unknowns.extend(effect.unknowns(problem.frame.joints));
     let mut best: Option<(f64, Vec<f64>)> = None;
@@ -195,13 +195,13 @@ pub fn with(problem: &Problem, beside: &LawEstimate, effect: Effect) -> LawEstim
 
 /// The search, from the declared drive on.
 pub fn search(
-    problem: &Problem,
+    problem: &DriveProblem,
     given: LawEstimate,
-    possible: &[Effect],
+    possible: &[DriveEffect],
     doing: &dyn Fn(&str),
-) -> Found {
+) -> FoundDrive {
     let mut at = given.clone();
-    let mut joined: Vec<(Effect, [f64; 2], Vec<Effect>)> = Vec::new();
+    let mut joined: Vec<(DriveEffect, [f64; 2], Vec<DriveEffect>)> = Vec::new();
     let mut tried = Vec::new();
     while joined.len() < NUMBERS.steps && problem.blocks > 1 {
         let before = at.left_out();
@@ -229,7 +229,7 @@ pub fn search(
         let Some((effect, gain, se, with, after)) = fitted.first() else {
             break;
         };
-        let near = |other: &&(Effect, f64, f64, LawEstimate, Vec<f64>)| {
+        let near = |other: &&(DriveEffect, f64, f64, LawEstimate, Vec<f64>)| {
             let [less, se] = judge::gain(&other.4, after);
             less < NUMBERS.screen * se
         };
@@ -248,11 +248,11 @@ pub fn search(
 
 /// Lets what is not sure leave, the least sure first, until all that stand pass.
 fn settle(
-    problem: &Problem,
+    problem: &DriveProblem,
     given: LawEstimate,
     mut at: LawEstimate,
-    joined: Vec<(Effect, [f64; 2], Vec<Effect>)>,
-) -> Found {
+    joined: Vec<(DriveEffect, [f64; 2], Vec<DriveEffect>)>,
+) -> FoundDrive {
     let mut steps: BTreeMap<usize, Step> = BTreeMap::new();
     let mut standing: Vec<usize> = (0..joined.len()).collect();
     loop {
@@ -274,7 +274,7 @@ fn settle(
         standing.retain(|place| *place != least);
         at = without(problem, &at, joined[least].0);
     }
-    Found {
+    FoundDrive {
         given,
         refined: at,
         steps: steps.into_values().collect(),
@@ -283,23 +283,23 @@ fn settle(
 }
 
 /// A solution fitted anew without an effect.
-pub fn without(problem: &Problem, at: &LawEstimate, effect: Effect) -> LawEstimate {
+pub fn without(problem: &DriveProblem, at: &LawEstimate, effect: DriveEffect) -> LawEstimate {
     let gone = effect.unknowns(problem.frame.joints);
     let pairs = at.unknowns.iter().zip(&at.values);
     let kept = pairs.filter(|(unknown, _)| !gone.contains(unknown));
-    let (unknowns, values): (Vec<Unknown>, Vec<f64>) = kept.map(|(u, x)| (*u, *x)).unzip();
+    let (unknowns, values): (Vec<DriveUnknown>, Vec<f64>) = kept.map(|(u, x)| (*u, *x)).unzip();
     fit(problem, &unknowns, &values, Some(&at.scales))
 }
 
 fn judged(
-    problem: &Problem,
+    problem: &DriveProblem,
     at: &LawEstimate,
-    effect: Effect,
+    effect: DriveEffect,
     gain: [f64; 2],
-    alternatives: &[Effect],
+    alternatives: &[DriveEffect],
 ) -> Step {
     let unknowns = effect.unknowns(problem.frame.joints);
-    let place = |unknown: &Unknown| at.unknowns.iter().position(|u| u == unknown);
+    let place = |unknown: &DriveUnknown| at.unknowns.iter().position(|u| u == unknown);
     let places: Vec<usize> = unknowns.iter().filter_map(place).collect();
     let free: Vec<usize> = places
         .iter()
@@ -310,7 +310,7 @@ fn judged(
     let v = DMatrix::from_fn(free.len(), free.len(), |a, b| {
         at.jackknife.covariance[(free[a], free[b])]
     });
-    let judged = Judged::new(&amplitude, v, problem.blocks);
+    let judged = JudgedDriveEffect::new(&amplitude, v, problem.blocks);
     let status = match judged.shrinkage {
         s if s > NUMBERS.confirmed => StepCertainty::Confirmed,
         s if s > 0.0 => StepCertainty::Indicated,

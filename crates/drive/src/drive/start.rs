@@ -1,10 +1,11 @@
 //! Sizes of a machine's numbers, and values from which a fit begins.
 
 use super::chain::RobotChains;
-use super::fit::{Problem, median};
-use super::law::DriveKind;
+use super::fit::DriveProblem;
+use super::track::median;
+use super::law::DriveLawKind;
 use super::track::{DriveLoad, DriveLog, Track};
-use super::unknown::{Quantity, Sizes, Unknown};
+use super::unknown::{DriveQuantity, Sizes, DriveUnknown};
 
 /// Starts that are fitted, best first.
 const TRIED: usize = 3;
@@ -31,7 +32,7 @@ fn speeds(t: &[f64], q: &[f64]) -> Vec<f64> {
 }
 
 /// Sizes of every joint over logs.
-pub fn sizes(logs: &[&DriveLog], kind: DriveKind, chains: Option<&RobotChains>) -> Vec<Sizes> {
+pub fn sizes(logs: &[&DriveLog], kind: DriveLawKind, chains: Option<&RobotChains>) -> Vec<Sizes> {
     let joints = logs.first().map_or(0, |log| log.joints.len());
     let links = chains.map(RobotChains::usual_inertia);
     (0..joints)
@@ -65,7 +66,7 @@ pub fn sizes(logs: &[&DriveLog], kind: DriveKind, chains: Option<&RobotChains>) 
                 DriveLoad::Robot => (links.as_ref().map_or(1.0, |links| links[j]), 0.0),
             };
             let torque = match (kind, logs[0].load) {
-                (DriveKind::Torque, DriveLoad::Robot) => kp * error,
+                (DriveLawKind::Torque, DriveLoad::Robot) => kp * error,
                 _ => gravity.max(inertia * speed * speed / error),
             };
             Sizes {
@@ -80,42 +81,42 @@ pub fn sizes(logs: &[&DriveLog], kind: DriveKind, chains: Option<&RobotChains>) 
 }
 
 /// The unknowns that every drive has.
-pub fn declared(logs: &[&DriveLog], kind: DriveKind) -> Vec<Unknown> {
+pub fn declared(logs: &[&DriveLog], kind: DriveLawKind) -> Vec<DriveUnknown> {
     let joints = logs.first().map_or(0, |log| log.joints.len());
     let mut out = Vec::new();
     for j in 0..joints {
-        let volts = matches!(kind, DriveKind::Volts(_));
+        let volts = matches!(kind, DriveLawKind::Volts(_));
         let off = logs.iter().any(|log| log.joints[j].on.iter().any(|on| !on));
-        let mut add = |quantity| out.push(Unknown::of(quantity, j));
+        let mut add = |quantity| out.push(DriveUnknown::of(quantity, j));
         if volts {
-            add(Quantity::Stiffness);
+            add(DriveQuantity::Stiffness);
         }
         match volts && off {
             true => {
-                add(Quantity::BackEmf);
-                add(Quantity::Viscous);
+                add(DriveQuantity::BackEmf);
+                add(DriveQuantity::Viscous);
             }
-            false => add(Quantity::Damping),
+            false => add(DriveQuantity::Damping),
         }
-        add(Quantity::Coulomb);
+        add(DriveQuantity::Coulomb);
         if volts && !kind.limit_is_declared() {
-            add(Quantity::TorqueLimit);
+            add(DriveQuantity::TorqueLimit);
         }
         match logs[0].load {
             // gravity of links that nobody knows is a constant at best
-            DriveLoad::Unknown => add(Quantity::Offset),
-            DriveLoad::PendulumRig(_) | DriveLoad::Robot => add(Quantity::Armature),
+            DriveLoad::Unknown => add(DriveQuantity::Offset),
+            DriveLoad::PendulumRig(_) | DriveLoad::Robot => add(DriveQuantity::Armature),
         }
     }
     out
 }
 
 /// Values of the declared unknowns from which fits begin, the likeliest first.
-pub fn starts(problem: &Problem, unknowns: &[Unknown]) -> Vec<Vec<f64>> {
+pub fn starts(problem: &DriveProblem, unknowns: &[DriveUnknown]) -> Vec<Vec<f64>> {
     let logs = problem.logs;
     let stride = logs.len().div_ceil(LOGS);
     let some: Vec<&DriveLog> = logs.iter().step_by(stride).copied().collect();
-    let few = Problem {
+    let few = DriveProblem {
         logs: &some,
         frame: problem.frame.clone(),
         sizes: problem.sizes.clone(),
@@ -124,7 +125,7 @@ pub fn starts(problem: &Problem, unknowns: &[Unknown]) -> Vec<Vec<f64>> {
         chains: problem.chains,
     };
     let mut tried = Vec::new();
-    let volts = matches!(problem.frame.kind, DriveKind::Volts(_));
+    let volts = matches!(problem.frame.kind, DriveLawKind::Volts(_));
     let rates: &[f64] = if volts {
         &[3.0, 6.0, 12.0, 25.0, 50.0, 100.0]
     } else {
@@ -134,10 +135,10 @@ pub fn starts(problem: &Problem, unknowns: &[Unknown]) -> Vec<Vec<f64>> {
         for damped in [0.3, 1.0, 3.0] {
             for dry in [0.02, 0.15] {
                 for (armature, limited) in [(0.3, 0.2), (0.3, 0.7), (2.0, 0.2), (2.0, 0.7)] {
-                    let value = |unknown: &Unknown| {
+                    let value = |unknown: &DriveUnknown| {
                         let j = unknown.joint.unwrap_or(0);
                         let sizes = &problem.sizes[j];
-                        let own = unknowns.contains(&Unknown::of(Quantity::Armature, j));
+                        let own = unknowns.contains(&DriveUnknown::of(DriveQuantity::Armature, j));
                         let inertia = sizes.inertia * (1.0 + if own { armature } else { 0.0 });
                         let kp = median(logs.iter().map(|log| log.joints[j].kp).collect());
                         let damping = match volts {
@@ -145,13 +146,13 @@ pub fn starts(problem: &Problem, unknowns: &[Unknown]) -> Vec<Vec<f64>> {
                             false => 0.1 * damped * sizes.torque / sizes.speed,
                         };
                         match unknown.quantity {
-                            Quantity::Stiffness => rate * rate * inertia / kp,
-                            Quantity::Damping | Quantity::BackEmf => damping,
-                            Quantity::Viscous => 0.1 * damping,
-                            Quantity::Coulomb => dry * sizes.torque,
-                            Quantity::Armature => armature * sizes.inertia,
+                            DriveQuantity::Stiffness => rate * rate * inertia / kp,
+                            DriveQuantity::Damping | DriveQuantity::BackEmf => damping,
+                            DriveQuantity::Viscous => 0.1 * damping,
+                            DriveQuantity::Coulomb => dry * sizes.torque,
+                            DriveQuantity::Armature => armature * sizes.inertia,
                             // where it acts, or its slope is zero
-                            Quantity::TorqueLimit => {
+                            DriveQuantity::TorqueLimit => {
                                 let most = rate * rate * inertia * sizes.farthest;
                                 1.0 / (limited * most)
                             }

@@ -100,3 +100,12 @@ impl DriveLog {
         self.t.last().unwrap_or(&0.0) - self.t.first().unwrap_or(&0.0)
     }
 }
+
+/// The middle of numbers.
+pub fn median(mut x: Vec<f64>) -> f64 {
+    if x.is_empty() {
+        return 0.0;
+    }
+    let mid = x.len() / 2;
+    *x.select_nth_unstable_by(mid, f64::total_cmp).1
+}

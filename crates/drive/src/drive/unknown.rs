@@ -1,10 +1,10 @@
 //! The unknowns of a fit and how a law is made of them.
 
-use super::law::{DriveKind, JointLaw, MachineLaw};
+use super::law::{DriveLawKind, JointLaw, MachineLaw};
 
 /// What an unknown is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Quantity {
+pub enum DriveQuantity {
     /// K, torque per radian and unit of kp.
     Stiffness,
     /// D while the drive is on, where it never is off.
@@ -29,21 +29,21 @@ pub enum Quantity {
 
 /// An unknown of a joint, or of the whole machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Unknown {
-    pub quantity: Quantity,
+pub struct DriveUnknown {
+    pub quantity: DriveQuantity,
     pub joint: Option<usize>,
 }
 
-impl Unknown {
-    pub fn of(quantity: Quantity, joint: usize) -> Self {
-        Unknown {
+impl DriveUnknown {
+    pub fn of(quantity: DriveQuantity, joint: usize) -> Self {
+        DriveUnknown {
             quantity,
             joint: Some(joint),
         }
     }
 
-    pub fn common(quantity: Quantity) -> Self {
-        Unknown {
+    pub fn common(quantity: DriveQuantity) -> Self {
+        DriveUnknown {
             quantity,
             joint: None,
         }
@@ -52,8 +52,8 @@ impl Unknown {
     /// Smallest and largest value.
     pub fn bounds(&self) -> [f64; 2] {
         match self.quantity {
-            Quantity::Bias | Quantity::Offset => [f64::NEG_INFINITY, f64::INFINITY],
-            Quantity::CommandDelay | Quantity::LoopDelay => [0.0, LATEST],
+            DriveQuantity::Bias | DriveQuantity::Offset => [f64::NEG_INFINITY, f64::INFINITY],
+            DriveQuantity::CommandDelay | DriveQuantity::LoopDelay => [0.0, LATEST],
             _ => [0.0, f64::INFINITY],
         }
     }
@@ -79,37 +79,37 @@ pub struct Sizes {
 
 impl Sizes {
     /// What one part in a thousand of is a small change of a quantity.
-    pub fn of(&self, quantity: Quantity) -> f64 {
+    pub fn of(&self, quantity: DriveQuantity) -> f64 {
         match quantity {
-            Quantity::Stiffness => self.torque / self.error,
-            Quantity::Damping | Quantity::BackEmf | Quantity::Viscous => self.torque / self.speed,
-            Quantity::Coulomb | Quantity::Stribeck | Quantity::Offset => self.torque,
-            Quantity::Armature => self.inertia,
-            Quantity::CommandDelay | Quantity::LoopDelay => self.error / self.speed,
-            Quantity::Slowness => 1.0 / self.speed,
-            Quantity::TorqueLimit => 1.0 / self.torque,
-            Quantity::LoadFriction => 1.0,
-            Quantity::Bias => self.error,
+            DriveQuantity::Stiffness => self.torque / self.error,
+            DriveQuantity::Damping | DriveQuantity::BackEmf | DriveQuantity::Viscous => self.torque / self.speed,
+            DriveQuantity::Coulomb | DriveQuantity::Stribeck | DriveQuantity::Offset => self.torque,
+            DriveQuantity::Armature => self.inertia,
+            DriveQuantity::CommandDelay | DriveQuantity::LoopDelay => self.error / self.speed,
+            DriveQuantity::Slowness => 1.0 / self.speed,
+            DriveQuantity::TorqueLimit => 1.0 / self.torque,
+            DriveQuantity::LoadFriction => 1.0,
+            DriveQuantity::Bias => self.error,
         }
     }
 }
 
 /// What a machine is beside its unknowns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    pub kind: DriveKind,
+pub struct UnknownFrame {
+    pub kind: DriveLawKind,
     /// Supply at which torques hold [V].
     pub supply: Option<f64>,
     pub joints: usize,
     /// vs of each joint [rad/s].
     pub stribeck_speed: Vec<f64>,
     /// Numbers that are held: effects that are written smaller than they were estimated.
-    pub held: Vec<(Unknown, f64)>,
+    pub held: Vec<(DriveUnknown, f64)>,
 }
 
-impl Frame {
+impl UnknownFrame {
     /// The law with these values of the unknowns; what is no unknown is absent.
-    pub fn law(&self, unknowns: &[Unknown], values: &[f64]) -> MachineLaw {
+    pub fn law(&self, unknowns: &[DriveUnknown], values: &[f64]) -> MachineLaw {
         let none = JointLaw {
             stiffness: 1.0,
             torque_max: f64::INFINITY,
@@ -128,35 +128,35 @@ impl Frame {
         for (unknown, value) in unknowns.iter().zip(values).chain(held) {
             let Some(j) = unknown.joint else {
                 match unknown.quantity {
-                    Quantity::CommandDelay => law.command_delay = *value,
-                    Quantity::LoopDelay => law.loop_delay = *value,
+                    DriveQuantity::CommandDelay => law.command_delay = *value,
+                    DriveQuantity::LoopDelay => law.loop_delay = *value,
                     _ => {}
                 }
                 continue;
             };
             let of = &mut law.joints[j];
             match unknown.quantity {
-                Quantity::Stiffness => of.stiffness = *value,
-                Quantity::Damping => (of.damping, of.viscous) = (*value, *value),
-                Quantity::BackEmf => of.damping += value,
-                Quantity::Viscous => {
+                DriveQuantity::Stiffness => of.stiffness = *value,
+                DriveQuantity::Damping => (of.damping, of.viscous) = (*value, *value),
+                DriveQuantity::BackEmf => of.damping += value,
+                DriveQuantity::Viscous => {
                     of.damping += value;
                     of.viscous = *value;
                 }
-                Quantity::Coulomb => of.coulomb = *value,
-                Quantity::Armature => of.armature = *value,
-                Quantity::Slowness => of.slowness = *value,
-                Quantity::TorqueLimit if *value > 0.0 => of.torque_max = 1.0 / value,
-                Quantity::TorqueLimit => of.torque_max = f64::INFINITY,
-                Quantity::LoadFriction => of.load_friction = *value,
-                Quantity::Stribeck => of.stribeck = *value,
-                Quantity::Bias => of.bias = *value,
-                Quantity::Offset => of.offset = *value,
-                Quantity::CommandDelay => law.command_delay = *value,
-                Quantity::LoopDelay => law.loop_delay = *value,
+                DriveQuantity::Coulomb => of.coulomb = *value,
+                DriveQuantity::Armature => of.armature = *value,
+                DriveQuantity::Slowness => of.slowness = *value,
+                DriveQuantity::TorqueLimit if *value > 0.0 => of.torque_max = 1.0 / value,
+                DriveQuantity::TorqueLimit => of.torque_max = f64::INFINITY,
+                DriveQuantity::LoadFriction => of.load_friction = *value,
+                DriveQuantity::Stribeck => of.stribeck = *value,
+                DriveQuantity::Bias => of.bias = *value,
+                DriveQuantity::Offset => of.offset = *value,
+                DriveQuantity::CommandDelay => law.command_delay = *value,
+                DriveQuantity::LoopDelay => law.loop_delay = *value,
             }
         }
-        if let DriveKind::Volts(firmware) = self.kind
+        if let DriveLawKind::Volts(firmware) = self.kind
             && let (Some(gain), Some(duty)) = (firmware.gain, firmware.duty_max)
         {
             for of in &mut law.joints {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use cft_ident_drive::drive::candidate::Effect;
+use cft_ident_drive::drive::candidate::DriveEffect;
 use cft_ident_drive::drive::identify::{DriveData, identify};
-use cft_ident_drive::drive::law::{DriveKind, ServoFirmware};
+use cft_ident_drive::drive::law::{DriveLawKind, ServoFirmware};
 use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_drive::drive::read::bam::RigGiven;
 use cft_ident_drive::drive::read::{ReadRequest, read};
@@ -35,10 +35,10 @@ fn a_measured_servo_has_a_late_command_and_a_speed_limit_at_a_gain_that_nobody_f
         fitted,
         held_out,
         links: None,
-        kind: DriveKind::Volts(ServoFirmware::default()),
+        kind: DriveLawKind::Volts(ServoFirmware::default()),
     };
     let drives = DriveResult::new(&identify(&data, &|_| {}).unwrap());
-    for effect in [Effect::CommandDelay, Effect::SpeedLimit] {
+    for effect in [DriveEffect::CommandDelay, DriveEffect::SpeedLimit] {
         assert!(
             drives.steps.iter().any(|s| s.effect == effect && s.written),
             "{effect:?}"

@@ -1,8 +1,8 @@
 //! Servos that the simulator moves: what was planted is found, and nothing else.
 
-use cft_ident_drive::drive::candidate::Effect;
-use cft_ident_drive::drive::identify::{DriveData, Identified, identify};
-use cft_ident_drive::drive::law::{DriveKind, JointLaw, MachineLaw, ServoFirmware};
+use cft_ident_drive::drive::candidate::DriveEffect;
+use cft_ident_drive::drive::identify::{DriveData, IdentifiedDrives, identify};
+use cft_ident_drive::drive::law::{DriveLawKind, JointLaw, MachineLaw, ServoFirmware};
 use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_drive::drive::read::bam::{RigGiven, read};
 use cft_ident_drive::drive::roll_out::roll_axis;
@@ -27,12 +27,12 @@ fn logs(servo: &ServoPlant, gains: &[f64], seed: u64) -> Vec<DriveLog> {
     runs.collect()
 }
 
-fn identified(servo: &ServoPlant, seed: u64) -> Identified {
+fn identified(servo: &ServoPlant, seed: u64) -> IdentifiedDrives {
     let data = DriveData {
         fitted: logs(servo, &[8.0, 32.0], seed),
         held_out: logs(servo, &[16.0], seed),
         links: None,
-        kind: DriveKind::Volts(ServoFirmware::default()),
+        kind: DriveLawKind::Volts(ServoFirmware::default()),
     };
     identify(&data, &|_| {}).unwrap()
 }
@@ -76,7 +76,7 @@ fn roll_outs_by_the_numbers_of_the_simulator_lie_within_two_steps_of_its_encoder
     for servo in [ServoPlant::HOBBY, LIMITED, late] {
         for log in logs(&servo, &[8.0, 32.0], 3) {
             let mut out = vec![0.0; log.t.len()];
-            let kind = DriveKind::Volts(ServoFirmware::default());
+            let kind = DriveLawKind::Volts(ServoFirmware::default());
             roll_axis(&log, kind, &truth(&servo), 0, &mut out);
             let pairs = out.iter().zip(&log.joints[0].position);
             let mean = pairs.map(|(a, b)| (a - b).abs()).sum::<f64>() / out.len() as f64;
@@ -90,14 +90,14 @@ fn roll_outs_by_the_numbers_of_the_simulator_lie_within_two_steps_of_its_encoder
 fn a_late_command_and_a_speed_limit_are_named_with_their_sizes() {
     let found = identified(&LIMITED, 5);
     let drives = DriveResult::new(&found);
-    let mut named: Vec<Effect> = drives
+    let mut named: Vec<DriveEffect> = drives
         .steps
         .iter()
         .filter(|s| s.written)
         .map(|s| s.effect)
         .collect();
     named.sort_by_key(|e| e.name());
-    assert_eq!(named, [Effect::CommandDelay, Effect::SpeedLimit]);
+    assert_eq!(named, [DriveEffect::CommandDelay, DriveEffect::SpeedLimit]);
     let delay = drives.find("command_delay", None).unwrap();
     assert!((delay - 0.032).abs() < 1e-3, "{delay}");
     let limit = drives.find("speed_limit", Some("servo")).unwrap();

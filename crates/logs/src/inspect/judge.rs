@@ -1,7 +1,7 @@
 //! Runs every detector over the rows of a log, and gathers what they know at the end.
 
 use super::channel::InspectedChannel;
-use super::detectors::clock::{LogClock, RowStep, typical_step};
+use super::detectors::clock::{LogClock, RowStep, mean_step, typical_step};
 use super::detectors::copies::Copies;
 use super::detectors::excitation::Excitation;
 use super::detectors::failed::FailedReads;
@@ -201,7 +201,7 @@ pub struct LogJudge {
     pub(super) depth: Depth,
     pub(super) clock: LogClock,
     pub(super) sampling: SamplingTimes,
-    /// Typical step of the first rows [s].
+    /// Mean step of the first rows [s].
     first_step: f64,
     pub(super) tracks: Vec<Track>,
     pub(super) failed: FailedReads,
@@ -286,7 +286,7 @@ impl LogJudge {
         }
         if self.clock.rows == 0 {
             let dt = typical_step(times);
-            self.first_step = dt;
+            self.first_step = mean_step(times);
             for &index in &self.positions {
                 let track = &mut self.tracks[index];
                 track.excitation = Some(Excitation::new(dt, track.channel.speed));

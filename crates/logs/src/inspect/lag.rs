@@ -15,6 +15,9 @@ pub(super) const MIN_DELAY_ROWS: f64 = 2.0;
 const MIN_DELAY_S: f64 = 0.01;
 /// Share of a delay within which another estimate is the same.
 const SAME_DELAY_SHARE: f64 = 0.2;
+/// The same for one that is not known better than that: so many of its own standard deviations off, up to this share.
+const SAME_DELAY_DEVIATIONS: f64 = 2.0;
+const MAX_SAME_DELAY_SHARE: f64 = 1.0 / 3.0;
 /// Deviations from 0 at which a delay is believed.
 const MIN_DEVIATIONS: f64 = 6.0;
 
@@ -56,8 +59,10 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
 /// ripple make others of each.
 fn is_borne_out(judge: &LogJudge, pairs: &[(usize, usize)], delay_s: f64, dt: f64) -> bool {
     let same = |found: DelayEstimate| {
-        let within = (MIN_DELAY_ROWS * dt).max(SAME_DELAY_SHARE * delay_s.abs());
-        (found.delay_s - delay_s).abs() < within
+        let of_delay = |share: f64| share * delay_s.abs();
+        let unsure = (SAME_DELAY_DEVIATIONS * found.std_s).min(of_delay(MAX_SAME_DELAY_SHARE));
+        let within = (MIN_DELAY_ROWS * dt).max(of_delay(SAME_DELAY_SHARE));
+        (found.delay_s - delay_s).abs() < within.max(unsure)
     };
     let halves = [0, 1].map(|half| delay(judge, pairs, |k| k % 2 == half));
     let joints = pairs

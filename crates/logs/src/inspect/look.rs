@@ -86,6 +86,10 @@ pub fn look_again(
     found.wraps.clone_from(&first.wraps);
     found.held = first.held;
     found.even = found.even.or(first.even);
+    if first.even.is_some() {
+        // that of the stamps, and not of the clock that they were put on
+        found.jitter = first.jitter;
+    }
     found.sort();
     Ok(Some(found))
 }

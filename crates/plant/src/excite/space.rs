@@ -198,15 +198,18 @@ impl DesignSpace {
             (false, true) => "box",
             (false, false) => "",
         };
-        parts.push(match walls {
-            "" => "collisions with what stands around it".to_owned(),
-            walls => format!(
+        match walls {
+            "" if self.pairs.is_empty() && !self.bare.is_empty() => {
+                parts = vec!["collisions of the robot with itself or around it".to_owned()];
+            }
+            "" => parts.push("collisions with what stands around it".to_owned()),
+            walls => parts.push(format!(
                 "what stands around the robot, but for {walls} at {}",
                 names.join(", ")
-            ),
-        });
+            )),
+        }
         if !way {
-            parts.push("the way to the first point".to_owned());
+            parts.push("the way there".to_owned());
         }
         format!("NOT CHECKED: {}.", parts.join("; "))
     }
@@ -299,8 +302,7 @@ mod tests {
         let bare = ARM.split("[limits]").next().unwrap_or_default();
         assert_eq!(
             shown(bare, false),
-            "NOT CHECKED: collisions of the robot with itself; collisions with what stands around it; \
-             the way to the first point."
+            "NOT CHECKED: collisions of the robot with itself or around it; the way there."
         );
     }
 }

@@ -6,6 +6,7 @@
 
 mod arms;
 mod blocks;
+mod drives;
 mod figures;
 mod formulas;
 mod tables;

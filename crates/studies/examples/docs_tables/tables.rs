@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{arms, formulas};
+use super::{arms, drives, formulas};
 use cft_ident::number::{percent, significant, value_and_std};
 use cft_ident::report::usual::{Measured, Over, PUBLISHED, Published};
 use serde_json::Value;
@@ -25,6 +25,8 @@ pub fn render(words: &[&str]) -> Rendered {
         ["arm-friction", names @ ..] => arms::friction(names),
         ["arm-parameters", names @ ..] => arms::named(names),
         ["formulas", names @ ..] => formulas::found(names),
+        ["drive-parameters", names @ ..] => drives::parameters(names),
+        ["drive-errors", names @ ..] => drives::errors(names),
         ["usual"] => Ok(usual()),
         ["left-out", result] => Ok(left_out(&json(result)?)),
         ["replay", result] => Ok(replay(&json(result)?)),

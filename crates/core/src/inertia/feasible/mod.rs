@@ -37,15 +37,15 @@ pub const PLAIN: Body = Body {
 const PLAIN_DRIVE: f64 = 0.1;
 /// Factor by which the weight of the prior falls from stage to stage.
 const FALL: f64 = 10.0;
-/// Most of Newton's steps under each weight.
-const MAX_STEPS: usize = 100;
+/// Most of Newton's steps under each weight. A tenth: heavy arms whose rows leave whole links open end on their way.
+const MAX_STEPS: usize = 1000;
 /// Squares of Newton's decrement, in units of the barrier: below the first a whole step is safe (Nesterov and
 /// Nemirovskii 1994) and near enough for the next weight; below the second the optimum is reached to the last digits.
 const NEAR: f64 = 0.06;
 const AT_END: f64 = 1e-14;
 /// Least part of the decrease that a step promises.
 const SUFFICIENT: f64 = 0.1;
-/// Shortest part of a step.
+/// Shortest part of a step, where not even the safe one stays inside.
 const SHORTEST: f64 = 1e-9;
 
 /// What the search is given.
@@ -235,10 +235,14 @@ impl Stage<'_> {
             }
             let (cost, promised) = (self.cost(&at), self.weight * decrement);
             let mut part = at.longest(&step);
+            // a step that short lowers the cost for certain (Nesterov and Nemirovskii 1994), whatever rounding makes of it
+            let safe = 1.0 / (1.0 + decrement.sqrt());
             loop {
                 let next = at.after(&step, part);
                 let lower = |next: &Inside| {
-                    decrement < NEAR || self.cost(next) <= cost - SUFFICIENT * part * promised
+                    decrement < NEAR
+                        || part <= safe
+                        || self.cost(next) <= cost - SUFFICIENT * part * promised
                 };
                 if let Some(next) = next.filter(lower) {
                     at = next;

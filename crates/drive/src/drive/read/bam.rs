@@ -125,7 +125,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
     let by_rows = volts.len() == rig.entries.len() && volts.iter().all(|v| *v > 0.0);
     let mut supply = Vec::new();
     if by_rows {
-        let usual = super::super::fit::median(volts.clone());
+        let usual = super::super::track::median(volts.clone());
         if let Some(vin) = rig.vin.filter(|vin| (vin / usual - 1.0).abs() > OFF) {
             findings.push(format!(
                 "the head's vin says {vin} V, the rows {usual:.2} V: the rows are taken"

@@ -7,6 +7,8 @@ use crate::inspect::fault::Episodes;
 pub(crate) const GAP: f64 = 2.5;
 /// A step within this share of the median is even.
 const EVEN_STEP_TOLERANCE: f64 = 0.10;
+/// Rounds in which the mean step and what is near it are found.
+const MEAN_ROUNDS: usize = 3;
 /// Long steps that are kept until the median is known.
 const MAX_LONG_STEPS: usize = 1 << 16;
 
@@ -154,6 +156,23 @@ pub(crate) fn typical_step(times: &[f64]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// Mean of the steps between some times that are neither lost rows nor repeats \[s\]: jitter puts the median off, and
+/// leaves the mean.
+pub(crate) fn mean_step(times: &[f64]) -> f64 {
+    let mut mean = typical_step(times);
+    for _ in 0..MEAN_ROUNDS {
+        let near = 0.25 * mean..=1.75 * mean;
+        let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
+        let steps = steps.filter(|step| *step > 0.0 && near.contains(step));
+        let [sum, count] = steps.fold([0.0; 2], |[sum, count], step| [sum + step, count + 1.0]);
+        if count == 0.0 {
+            break;
+        }
+        mean = sum / count;
+    }
+    mean
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,6 +196,17 @@ mod tests {
         // from 0.15 back up to 0.201, and over the rows that are gone
         assert_eq!(facts.gaps, [[0.15, 0.201], [0.499, 0.55]]);
         assert!(facts.jitter < 0.01, "{facts:?}");
+    }
+
+    #[test]
+    fn the_mean_step_of_stamps_that_jitter_is_that_of_the_rows() {
+        let off = [0.0, 0.2e-3, -0.1e-3, 0.3e-3, -0.2e-3];
+        let mut times: Vec<f64> = (0..2000_u32)
+            .map(|k| 1e-3 * f64::from(k) + off[k as usize * 7 % 5])
+            .collect();
+        times.drain(700..750);
+        assert!((typical_step(&times) - 1e-3).abs() > 0.05e-3);
+        assert!((mean_step(&times) - 1e-3).abs() < 0.005e-3);
     }
 
     #[test]

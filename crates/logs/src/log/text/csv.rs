@@ -318,7 +318,7 @@ impl TextFile {
     }
 
     /// Whether nothing stands in a column of the current row.
-    pub(super) fn is_blank(&self, column: usize) -> bool {
+    pub(super) fn is_empty_cell(&self, column: usize) -> bool {
         let column = match &self.places {
             None => Some(column),
             Some(places) => places.get(column).copied(),

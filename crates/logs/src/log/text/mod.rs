@@ -237,7 +237,7 @@ impl TextRows {
     fn unusable(&self, index: usize) -> LogError {
         // empty cells, not numbers that are none: a table of two topics has them where the other topic has its row
         let blank =
-            |columns: &[ScaledColumn]| columns.iter().all(|c| self.file.is_blank(c.index));
+            |columns: &[ScaledColumn]| columns.iter().all(|c| self.file.is_empty_cell(c.index));
         let (positions, torques) = (&self.columns.positions, &self.columns.torques);
         let (Some(q), Some(time)) = (positions.first(), self.time) else {
             return self.file.no_number(index);

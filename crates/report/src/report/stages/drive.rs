@@ -6,8 +6,8 @@ use crate::report::table::{Columns, Table};
 use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
 use crate::report::words::listed;
 use cft_ident_core::number;
-use cft_ident_drive::drive::identify::Course;
-use cft_ident_drive::drive::outcome::{DriveParameter, DriveResult, DriveStep, PositionError};
+use cft_ident_drive::drive::identify::PositionCourse;
+use cft_ident_drive::drive::outcome::{DriveParameter, DriveResult, DriveStep, DrivePositionError};
 
 /// Verdict, errors before and after, steps and numbers.
 pub fn drive(found: &DriveResult, name: &str) -> Report {
@@ -42,7 +42,7 @@ pub fn drive(found: &DriveResult, name: &str) -> Report {
 }
 
 /// Further parts of the page: measured, given and refined positions over each other.
-pub fn courses(report: &mut Report, joints: &[String], courses: &[Course]) {
+pub fn courses(report: &mut Report, joints: &[String], courses: &[PositionCourse]) {
     let Some(first) = courses.first() else {
         return;
     };
@@ -52,7 +52,7 @@ pub fn courses(report: &mut Report, joints: &[String], courses: &[Course]) {
 }
 
 /// The still picture of a log.
-pub fn picture(joints: &[String], course: &Course) -> String {
+pub fn picture(joints: &[String], course: &PositionCourse) -> String {
     let panel = |(j, joint): (usize, &String)| PositionPanel {
         joint: joint.clone(),
         t: course.t.clone(),
@@ -68,13 +68,13 @@ pub fn picture(joints: &[String], course: &Course) -> String {
     figure.svg()
 }
 
-fn traces(joints: &[String], courses: &[Course]) -> Traces {
+fn traces(joints: &[String], courses: &[PositionCourse]) -> Traces {
     let line = |name: &str, style, values: &[f64]| TraceLine {
         name: name.to_owned(),
         style,
         values: values.to_vec(),
     };
-    let trace = |course: &Course| {
+    let trace = |course: &PositionCourse| {
         let panel = |(j, joint): (usize, &String)| TracePanel {
             name: joint.clone(),
             quantity: "position".to_owned(),
@@ -103,7 +103,7 @@ fn traces(joints: &[String], courses: &[Course]) -> Traces {
 }
 
 /// A row of the table of errors: which logs, without effects and with them.
-type ErrorRow<'a> = (&'static str, &'a PositionError, &'a PositionError);
+type ErrorRow<'a> = (&'static str, &'a DrivePositionError, &'a DrivePositionError);
 
 fn errors(found: &DriveResult) -> Table {
     let (before, after) = (&found.before, &found.after);

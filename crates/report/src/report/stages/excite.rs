@@ -21,12 +21,19 @@ const PARTS: usize = 4;
 pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
-    verdict(judged, &name).write(&mut report.everywhere());
     let first = judged.first_words().into_iter();
     // numbers of the robot file are a caution, and no verdict
     let (urgent, others): (Vec<&str>, Vec<&str>) = first
         .filter(|words| !words.is_empty())
         .partition(|words| judged.torques_first || *words == judged.not_checked);
+    // what nobody foresees comes before any figure of it
+    let (unforeseen, urgent): (Vec<&str>, Vec<&str>) = urgent
+        .into_iter()
+        .partition(|words| *words != judged.not_checked);
+    for described in unforeseen {
+        report.everywhere().verdict(described, false);
+    }
+    verdict(judged, &name).write(&mut report.everywhere());
     for described in urgent {
         report.everywhere().verdict(described, false);
     }

@@ -142,7 +142,7 @@ pub(super) fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
         terminal.line(&format!("drive inertias: {drives}"));
     }
     terminal.line(&format!(
-        "physically consistent fit: duality gap {} of the sum of squares, after {} steps",
+        "physically consistent fit: duality gap {} of the squares, {} steps",
         number::percent(found.duality_gap),
         found.iterations
     ));

@@ -71,11 +71,10 @@ pub(super) fn seen(machine: &LoggedRobot, step: &FoundEffect) -> Option<String> 
     let option = accept_option(&step.estimate, &machine.robot);
     (step.status == StepStatus::Seen && !step.accepted_by_user).then(|| {
         format!(
-            "seen, not written: {}, torque {} (rms, 95 % CI); would take {} off the squared error of blocks left out; {}; `{option}` writes it",
+            "seen: {} {}, {} of the squared error; `{option}`",
             step.estimate.title(&machine.robot),
             torque(machine, step),
             number::percent(step.share.max(0.0)),
-            certainty(step)
         )
     })
 }
