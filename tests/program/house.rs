@@ -47,10 +47,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("compare", "explain math robot config motion effect verdict"),
     ("track", ""),
     ("tool", "explain number robot log config"),
-    (
-        "held",
-        "explain number verdict robot block log config tool",
-    ),
+    ("held", "explain number verdict robot block log config tool"),
     (
         "identify",
         "explain math block verdict number robot log config motion effect friction inertia judge diagnose \
@@ -227,8 +224,8 @@ fn no_code_asks_for_an_effect_by_its_name() {
         let found = quoted.iter().find(|name| text.contains(*name));
         // the faults of a log, some of which the simulator makes
         // those of drives have a list of their own
-        let own = matches!(source.room(), Some("effect" | "drive"))
-            || source.file == "inspect/fault.rs";
+        let own =
+            matches!(source.room(), Some("effect" | "drive")) || source.file == "inspect/fault.rs";
         assert!(own || found.is_none(), "{}: {found:?}", source.file);
     }
 }

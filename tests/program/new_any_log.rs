@@ -336,11 +336,17 @@ fn names_in_fifteen_styles_from_0_and_from_1_are_mapped_and_read() {
             );
             assert_eq!(columns(&found, "torque"), wanted(patterns[1].0), "{place}");
             let states = patterns[0].0.contains("deg");
-            let asked = match states {
-                true => serde_json::json!([TORQUE_CHECK]),
-                false => serde_json::json!([ANGLE_CHECK, TORQUE_CHECK]),
+            // two families that may be the torques
+            let either = match patterns[1].0 {
+                "actual_torque_{}" => Some("torques: actual_torque_# or actual_current_#?"),
+                "J{}_trq [Nm]" => Some("torques: j#trq or j#cur?"),
+                "act_torque_abs_nm_{}" => Some("torques: act_torque_abs# or act_torque_rel#?"),
+                _ => None,
             };
-            assert_eq!(found["checks"], asked, "{place}");
+            let mut asked = Vec::from_iter(either);
+            asked.extend((!states).then_some(ANGLE_CHECK));
+            asked.push(TORQUE_CHECK);
+            assert_eq!(found["checks"], serde_json::json!(asked), "{place}");
             // a fit of each style once
             if base == style % 2 {
                 is_read(folder.path(), "log.csv");

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::cli::{CliError, file_name};
 use crate::cli::files::ReadFile;
+use crate::cli::{CliError, file_name};
 use cft_ident_export::export;
 use cft_ident_files::config::{self, RobotFile};
 use cft_ident_logs::log::{Provenance, escape};

@@ -184,8 +184,8 @@ pub fn no_finding(
         ));
     }
     let seen = seen(model, cover, case, effect.place);
-    // an amplitude beyond its usual size is told as large, and is there
-    let told = |rule: &Rule| matches!(rule.of, Number::Amplitude(..));
+    // an amplitude beyond its usual size is told as large, and is there; bounds of single numbers are those of the fit
+    let told = |rule: &Rule| matches!(rule.of, Number::Amplitude(..) | Number::Key(_));
     effect.broken(&seen, &told).map(|(_, why)| why)
 }
 

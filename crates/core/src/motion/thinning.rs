@@ -16,12 +16,7 @@ const SAMPLES_A_PERIOD: f64 = 10.0;
 
 /// Every how many samples of step `dt` \[s\] are enough beside position cut-offs up to `highest_hz`; a divisor of
 /// `decimation`, so that the rows stay those of the log.
-pub(super) fn factor(
-    thin: bool,
-    highest_hz: f64,
-    decimation: usize,
-    dt: f64,
-) -> usize {
+pub(super) fn factor(thin: bool, highest_hz: f64, decimation: usize, dt: f64) -> usize {
     let enough = |m: &usize| SAMPLES_A_PERIOD * highest_hz * dt * *m as f64 <= 1.0 + 1e-9;
     let divides = |m: &usize| decimation.is_multiple_of(*m);
     match thin {

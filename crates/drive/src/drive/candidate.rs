@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::law::DriveLawKind;
-use super::unknown::{DriveQuantity, Sizes, DriveUnknown};
+use super::unknown::{DriveQuantity, DriveUnknown, Sizes};
 
 /// A named effect of drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -74,7 +74,9 @@ impl DriveEffect {
 
     /// Of a quantity that is a named effect.
     pub fn of(quantity: DriveQuantity) -> Option<DriveEffect> {
-        DriveEffect::ALL.into_iter().find(|e| e.quantity() == quantity)
+        DriveEffect::ALL
+            .into_iter()
+            .find(|e| e.quantity() == quantity)
     }
 
     /// Whether a person can measure it: it is written as estimated or not at all; what is a shape of friction is shrunk.

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use cft_ident_core::robot::Robot;
 
 use super::law::{DriveLawKind, MachineLaw};
-use super::roll_out::{RolledDrive, PastStates, first_speed, steps};
+use super::roll_out::{PastStates, RolledDrive, first_speed, steps};
 use super::set_point::{CommandIntegral, Follower};
 use super::track::DriveLog;
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::chain::RobotChains;
 use super::roll_out::roll_axis;
 use super::track::{DriveLoad, DriveLog, median};
-use super::unknown::{UnknownFrame, Sizes, DriveUnknown};
+use super::unknown::{DriveUnknown, Sizes, UnknownFrame};
 
 /// The numbers that decide in a fit.
 #[derive(Debug, Clone, Copy)]
@@ -103,7 +103,12 @@ fn robust(u: f64) -> (f64, f64) {
 
 impl DriveProblem<'_> {
     /// Predicted positions of a log, joint after joint.
-    pub fn positions(&self, log: &DriveLog, unknowns: &[DriveUnknown], values: &[f64]) -> Vec<Vec<f64>> {
+    pub fn positions(
+        &self,
+        log: &DriveLog,
+        unknowns: &[DriveUnknown],
+        values: &[f64],
+    ) -> Vec<Vec<f64>> {
         let law = self.frame.law(unknowns, values);
         if let (DriveLoad::Robot, Some(chains)) = (log.load, self.chains) {
             return chains.roll(log, self.frame.kind, &law);
@@ -329,7 +334,13 @@ struct Column {
     slope: Vec<f64>,
 }
 
-fn sums(p: usize, piece: &LogPiece, r: &[Vec<f64>], columns: &[Vec<Column>], scales: &[f64]) -> Sums {
+fn sums(
+    p: usize,
+    piece: &LogPiece,
+    r: &[Vec<f64>],
+    columns: &[Vec<Column>],
+    scales: &[f64],
+) -> Sums {
     let mut out = Sums::zero(p);
     for ((r, scale), columns) in r.iter().zip(scales).zip(columns) {
         for k in piece.from..piece.to {

@@ -8,13 +8,13 @@ use super::candidate::DriveEffect;
 use super::chain::RobotChains;
 use super::error::DriveError;
 use super::fit::{DriveProblem, LogPiece};
-use super::track::median;
 use super::judge::NUMBERS;
 use super::law::DriveLawKind;
 use super::search::{self, FoundDrive, LawEstimate, StepCertainty};
 use super::start;
+use super::track::median;
 use super::track::{DriveLoad, DriveLog};
-use super::unknown::{UnknownFrame, DriveQuantity, DriveUnknown};
+use super::unknown::{DriveQuantity, DriveUnknown, UnknownFrame};
 
 /// Logs by what they are for.
 #[derive(Debug, Clone)]
@@ -309,7 +309,11 @@ fn pieces(logs: &[&DriveLog]) -> (Vec<LogPiece>, usize, BlocksAre) {
 }
 
 /// Errors of a solution on logs.
-pub fn errors_on(problem: &DriveProblem, at: &LawEstimate, logs: &[&DriveLog]) -> DrivePositionErrors {
+pub fn errors_on(
+    problem: &DriveProblem,
+    at: &LawEstimate,
+    logs: &[&DriveLog],
+) -> DrivePositionErrors {
     let on = DriveProblem {
         logs,
         pieces: Vec::new(),
@@ -339,7 +343,11 @@ fn errors(problem: &DriveProblem, at: &LawEstimate, held_out: &[&DriveLog]) -> D
 }
 
 /// Errors on held-out logs, each by a fit without its motion; none where no motion was fitted.
-fn unseen(problem: &DriveProblem, at: &LawEstimate, held_out: &[&DriveLog]) -> Option<DrivePositionErrors> {
+fn unseen(
+    problem: &DriveProblem,
+    at: &LawEstimate,
+    held_out: &[&DriveLog],
+) -> Option<DrivePositionErrors> {
     let motions: BTreeSet<&str> = held_out.iter().map(|log| log.motion.as_str()).collect();
     let mut logs = Vec::new();
     for motion in motions {

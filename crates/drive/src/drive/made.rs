@@ -8,8 +8,9 @@ use super::identify::{self, BlocksAre, DriveErrorsByUse, IdentifiedDrives};
 use super::law::DriveLawKind;
 use super::numbers::{given, parameter, part, step};
 use super::outcome::{
-    DeclaredDrive, DriveParameter, DriveResult, DriveStep, DriveVerdict, JointPositionError,
-    LogPositionError, DrivePositionError, PositionErrorsByUse, StepAmplitude, TriedEffect, VerdictKind,
+    DeclaredDrive, DriveParameter, DrivePositionError, DriveResult, DriveStep, DriveVerdict,
+    JointPositionError, LogPositionError, PositionErrorsByUse, StepAmplitude, TriedEffect,
+    VerdictKind,
 };
 
 impl DriveResult {

@@ -4,7 +4,8 @@ use cft_ident_core::verdict::{Verdict, verdict_of};
 
 use super::identify::IdentifiedDrives;
 use super::outcome::{
-    DeclaredDrive, DriveParameter, DriveStep, GainSe, GivenParameter, StepAmplitude, DriveStepStatus,
+    DeclaredDrive, DriveParameter, DriveStep, DriveStepStatus, GainSe, GivenParameter,
+    StepAmplitude,
 };
 use super::search::{Step, StepCertainty};
 use super::unknown::{DriveQuantity, DriveUnknown};
@@ -80,7 +81,10 @@ fn shown(quantity: DriveQuantity, volts: bool) -> Shown {
 
 /// Whether a quantity is kept as one over what is shown.
 fn inverse(quantity: DriveQuantity) -> bool {
-    matches!(quantity, DriveQuantity::Slowness | DriveQuantity::TorqueLimit)
+    matches!(
+        quantity,
+        DriveQuantity::Slowness | DriveQuantity::TorqueLimit
+    )
 }
 /// ln(before / after) as the part that goes.
 pub(super) fn part([gain, se]: [f64; 2]) -> GainSe {

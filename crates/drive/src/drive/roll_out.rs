@@ -77,7 +77,13 @@ impl RolledDrive {
 }
 
 /// Positions of one axis along a log, as its encoder would read them.
-pub fn roll_axis(log: &DriveLog, kind: DriveLawKind, law: &MachineLaw, joint: usize, out: &mut [f64]) {
+pub fn roll_axis(
+    log: &DriveLog,
+    kind: DriveLawKind,
+    law: &MachineLaw,
+    joint: usize,
+    out: &mut [f64],
+) {
     let (track, of) = (&log.joints[joint], &law.joints[joint]);
     let (inertia, gravity) = match log.load {
         DriveLoad::PendulumRig(rig) => (rig.inertia() + of.armature, rig.gravity()),

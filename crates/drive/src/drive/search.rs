@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::candidate::DriveEffect;
-use super::fit::{NUMBERS as FIT, DriveProblem, ResidualScales, Sums};
+use super::fit::{DriveProblem, NUMBERS as FIT, ResidualScales, Sums};
 use super::judge::{self, BlockJackknife, JudgedDriveEffect, NUMBERS};
 use super::start;
 use super::unknown::{DriveQuantity, DriveUnknown};

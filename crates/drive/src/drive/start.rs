@@ -2,10 +2,10 @@
 
 use super::chain::RobotChains;
 use super::fit::DriveProblem;
-use super::track::median;
 use super::law::DriveLawKind;
+use super::track::median;
 use super::track::{DriveLoad, DriveLog, Track};
-use super::unknown::{DriveQuantity, Sizes, DriveUnknown};
+use super::unknown::{DriveQuantity, DriveUnknown, Sizes};
 
 /// Starts that are fitted, best first.
 const TRIED: usize = 3;

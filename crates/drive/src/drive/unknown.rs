@@ -82,7 +82,9 @@ impl Sizes {
     pub fn of(&self, quantity: DriveQuantity) -> f64 {
         match quantity {
             DriveQuantity::Stiffness => self.torque / self.error,
-            DriveQuantity::Damping | DriveQuantity::BackEmf | DriveQuantity::Viscous => self.torque / self.speed,
+            DriveQuantity::Damping | DriveQuantity::BackEmf | DriveQuantity::Viscous => {
+                self.torque / self.speed
+            }
             DriveQuantity::Coulomb | DriveQuantity::Stribeck | DriveQuantity::Offset => self.torque,
             DriveQuantity::Armature => self.inertia,
             DriveQuantity::CommandDelay | DriveQuantity::LoopDelay => self.error / self.speed,

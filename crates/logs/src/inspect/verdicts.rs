@@ -19,6 +19,8 @@ const UNEVEN_STEPS_SHARE: f64 = 0.05;
 const JITTER_SHARE: f64 = 0.02;
 /// Jitter up to which a lost row can be told from a late one [steps, rms].
 const MAX_JITTER_STEPS: f64 = 0.2;
+/// The same where no stamp is so late that a row may be lost before it.
+const MAX_WHOLE_JITTER_STEPS: f64 = 0.3;
 
 impl LogJudge {
     /// What there is to say about the log.
@@ -244,7 +246,11 @@ fn jitter(judge: &LogJudge, clock: &ClockFacts, rows: EvenRows, draft: &mut Faul
     let EvenRows { even, off_s, .. } = rows;
     let mean = seen.duration() / seen.rows.saturating_sub(1).max(1) as f64;
     let in_bursts = clock.long > GAP * clock.dt;
-    if !in_bursts && off_s < MAX_JITTER_STEPS * even.step_s {
+    let most = match rows.whole {
+        true => MAX_WHOLE_JITTER_STEPS,
+        false => MAX_JITTER_STEPS,
+    };
+    if !in_bursts && off_s < most * even.step_s {
         gap_faults(clock, draft);
         let effect = format!(
             "stamps are off by {} rms, and the positions show that rows were sampled evenly, every {}: they are put on an even clock",

@@ -89,6 +89,11 @@ impl EvenFit {
         }
     }
 
+    /// Whether no stamp is so late that a row may be lost before it.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.place + 1.0 == self.rows
+    }
+
     /// The clock, and the root mean square by which stamps are off it \[s\].
     pub(crate) fn clock(&self) -> Option<(EvenSpacing, f64)> {
         let n = self.rows;

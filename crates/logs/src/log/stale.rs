@@ -17,6 +17,9 @@ const KNOWN: u64 = 10;
 const MIN_MOTION_STEPS: u64 = 50;
 /// Speeds before and after are the same motion where neither is more than this many times the other.
 const MAX_SPEED_RATIO: f64 = 3.0;
+/// Share by which rounded times may bring a ratio off: rounded positions and times lie just on the bound here and there,
+/// and another zero of the clock must not decide.
+const ROUNDING: f64 = 1e-6;
 
 /// The motion right before the current row.
 #[derive(Debug, Default)]
@@ -113,7 +116,8 @@ impl Stale {
                 return false;
             }
             let ratio = (after / duration) / (before / self.duration);
-            (1.0 / MAX_SPEED_RATIO..=MAX_SPEED_RATIO).contains(&ratio)
+            let most = MAX_SPEED_RATIO * (1.0 + ROUNDING);
+            (1.0 / most..=most).contains(&ratio)
         })
     }
 

@@ -16,7 +16,7 @@ pub fn parameters(names: &[&str]) -> Rendered {
                 _ => "-".to_owned(),
             };
             lines.push(vec![
-                text(&parameter["joint"]).to_owned(),
+                parameter["joint"].as_str().unwrap_or("all").to_owned(),
                 format!("`{}`", text(&parameter["name"])),
                 shown(&parameter["value"]),
                 interval,

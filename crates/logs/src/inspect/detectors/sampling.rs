@@ -42,6 +42,8 @@ pub(crate) struct EvenRows {
     /// Root mean square by which stamps are off their places \[s\].
     pub(crate) off_s: f64,
     pub(crate) rows: f64,
+    /// No stamp is so late that a row may be lost before it.
+    pub(crate) whole: bool,
 }
 
 /// What a cubic through the other four makes of the middle number, by its times.
@@ -108,8 +110,14 @@ impl SamplingTimes {
         };
         let evidently = known.clone().filter(evident).count();
         let (even, off_s) = self.fit.clock()?;
-        let rows = self.fit.rows;
-        (evidently > 0 && 2 * evidently > known.count()).then_some(EvenRows { even, off_s, rows })
+        let (rows, whole) = (self.fit.rows, self.fit.is_whole());
+        let found = EvenRows {
+            even,
+            off_s,
+            rows,
+            whole,
+        };
+        (evidently > 0 && 2 * evidently > known.count()).then_some(found)
     }
 }
 

@@ -7,7 +7,7 @@ use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
 use crate::report::words::listed;
 use cft_ident_core::number;
 use cft_ident_drive::drive::identify::PositionCourse;
-use cft_ident_drive::drive::outcome::{DriveParameter, DriveResult, DriveStep, DrivePositionError};
+use cft_ident_drive::drive::outcome::{DriveParameter, DrivePositionError, DriveResult, DriveStep};
 
 /// Verdict, errors before and after, steps and numbers.
 pub fn drive(found: &DriveResult, name: &str) -> Report {
