@@ -45,7 +45,7 @@ pub struct Args {
     /// Robot and logs, or a campaign or an example
     ///
     /// A robot is a URDF, a robot file, or a built-in one such as configs/ur10.toml; LOG@0..70% is a part of a log.
-    #[arg(value_name = "ROBOT LOG...|CAMPAIGN.toml|EXAMPLE")]
+    #[arg(value_name = "ROBOT|LOG|NAME")]
     pub files: Vec<LogSpec>,
     /// The robot, as a URDF of any name
     #[arg(long, value_name = "FILE")]

@@ -8,7 +8,7 @@ use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_report::report::{Figure, Finding, Headline, Report, Tone};
+use cft_ident_report::report::{Figure, FoundLine, Headline, Report, Tone};
 use cft_ident_stages::identify::{
     self, Dataset, Number95, Payload, PayloadReading, PayloadVerdict,
 };
@@ -156,7 +156,7 @@ fn report(found: &Payload, logs: &str) -> Report {
             Some("Next: log a motion that lifts the last link against gravity, or moves it fast."),
         ),
     };
-    let mut findings = vec![Finding {
+    let mut findings = vec![FoundLine {
         grade,
         text: text.to_owned(),
     }];
@@ -211,7 +211,7 @@ fn controller_lines(found: &Payload) -> String {
 }
 
 /// Where the body of a reading makes the error of a joint larger.
-fn made_worse(reading: &PayloadReading) -> Option<Finding> {
+fn made_worse(reading: &PayloadReading) -> Option<FoundLine> {
     let worse: Vec<String> = reading
         .worse()
         .map(|of| {
@@ -223,7 +223,7 @@ fn made_worse(reading: &PayloadReading) -> Option<Finding> {
         false => "",
         true => " with free gains",
     };
-    (!worse.is_empty()).then(|| Finding {
+    (!worse.is_empty()).then(|| FoundLine {
         grade: "worse",
         text: format!(
             "the body{how} makes errors larger: {}. The model is not that of this arm without a load, or its gains \

@@ -210,13 +210,18 @@ fn pieces_of_a_link_are_held_and_those_that_are_not_there_are_reported() {
     let lost = mesh(plain, "package://elsewhere/hand.stl", "")
         + &mesh(plain, "other.STL", "scale=\"1e30 1 1\"")
         + &mesh(plain, "hand.dae", "");
-    fs::write(path("arm.urdf"), arm(&upper, &(lower + &lost))).unwrap();
+    fs::write(path("arm.urdf"), arm(&upper, &(lower.clone() + &lost))).unwrap();
     let run = command(folder.path(), "new arm --urdf arm.urdf -v").success();
     run.stderr(contains(
         "collision shapes that no capsule holds: lower: package://elsewhere/hand.stl is in no folder of its package",
     ))
-    .stderr(contains("other.STL: vertices beyond 1e30 m; and 1 more of the kind; put the files"))
-    .stderr(contains("hand.dae: is no STL file; convert it to STL"));
+    .stderr(contains("other.STL: vertices beyond 1e30 m; and 1 more of the kind; put the files"));
+    // a file of another kind says so, with what to do
+    let strange = mesh(plain, "hand.dae", "");
+    fs::write(path("dae.urdf"), arm(&upper, &(lower.clone() + &strange))).unwrap();
+    command(folder.path(), "new dae --urdf dae.urdf -v")
+        .success()
+        .stderr(contains("hand.dae: is no STL file; convert it to STL"));
     let text = fs::read_to_string(path("arm.toml")).unwrap();
     assert!(
         text.contains("# CHECK IT: not all collision shapes of lower could be read"),

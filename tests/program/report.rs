@@ -260,13 +260,13 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     ] {
         assert!(headings.contains(&heading), "{headings:?}");
     }
-    // bars, and the intervals of the parameters; cards of each effect, of the sketch, of friction, of the joints with something left, and of the residual
+    // bars, and the intervals of the parameters; cards of each effect, of the sketch, of friction, of the joints with something left, of the correlations, and of the residual
     // joint by joint
     assert_eq!(page.matches("<figure>").count(), 2);
     let cards = page.matches("<figure class=\"card").count();
     let left = page.matches("<figcaption>What is left of").count();
     assert!(left > 0);
-    assert_eq!(cards, remedies + 2 + left + 4);
+    assert_eq!(cards, remedies + 2 + left + 5);
 }
 
 #[cfg(unix)]

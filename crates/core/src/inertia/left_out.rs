@@ -14,7 +14,7 @@ const FEWEST: usize = 4;
 
 /// What both leave of a joint's torque on blocks left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeftOut {
+pub struct TrialLeftOut {
     /// Residual over torque, fractions.
     pub plain: f64,
     pub consistent: f64,
@@ -25,7 +25,7 @@ pub struct LeftOut {
 /// What both leave on blocks of these logs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitsOnLeftOut {
-    pub joints: Vec<LeftOut>,
+    pub joints: Vec<TrialLeftOut>,
     /// Whether the plain fit leaves less of all joints, each in units of its noise, by more than chance.
     pub plain_wins: bool,
     /// The same where whole logs are left out, each of another motion; none of a single log.
@@ -147,7 +147,7 @@ pub fn left_out(
         let torque = factors.moving[j].torque_square.max(f64::MIN_POSITIVE);
         let left = |which: usize| squares[which].iter().map(|part| part[j]).sum::<f64>();
         let [value, se] = of_blocks.joints[j];
-        LeftOut {
+        TrialLeftOut {
             plain: (left(0) / torque).sqrt(),
             consistent: (left(1) / torque).sqrt(),
             costs: value > NUMBERS.screen * se,

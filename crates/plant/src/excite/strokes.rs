@@ -2,6 +2,7 @@
 //! before it slips makes a loop that shrinks with the amplitude, and friction over speed knows neither. How far a motion
 //! tells them apart is the torque of the one that the others cannot take over, in standard errors.
 
+use cft_ident_core::effect::smooth_coulomb;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -294,7 +295,7 @@ fn separation(path: &Strokes, task: &StrokesTask, noise: f64) -> (&'static str, 
             Memory::Bristle => ("backlash", Torque::Gap(part * task.width)),
         };
         let slow = Torque::OverSpeed(part / 8.0 * fastest);
-        [memory, ("smooth-coulomb", slow)]
+        [memory, (smooth_coulomb::ENTRY.name, slow)]
     });
     let left = likes.map(|(name, like)| {
         let basis = known.iter().cloned().chain([along(like)]);

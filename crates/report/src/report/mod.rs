@@ -18,4 +18,4 @@ pub mod usual;
 mod value;
 mod words;
 
-pub use value::{Detail, Figure, Finding, Headline, Report, Screen, Tone, Writer};
+pub use value::{Detail, Figure, FoundLine, Headline, Report, Screen, Tone, Writer};

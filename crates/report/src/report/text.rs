@@ -1,7 +1,7 @@
 //! A report as a terminal shows it: tables and paragraphs as wide as the window, without colour.
 
 use super::table::{hanging_in, joined};
-use super::value::{Detail, Finding, Headline, Part, Report, Screen, Shown, Tone};
+use super::value::{Detail, FoundLine, Headline, Part, Report, Screen, Shown, Tone};
 
 impl Report {
     /// All that a terminal can show of the report, ending in a line end.
@@ -40,7 +40,7 @@ fn shown(part: &Part, width: usize) -> String {
             let margin = grades.max().unwrap_or(0) + GAP;
             // beside a narrow column of words a window of a phone has no room
             let beside = width >= NARROW;
-            let line = |f: &Finding| match beside {
+            let line = |f: &FoundLine| match beside {
                 true => hanging(&format!("  {:<margin$}", f.grade), &f.text, margin + 2),
                 false => hanging("", &format!("{}: {}", f.grade, f.text), 2),
             };
@@ -191,7 +191,7 @@ mod tests {
         });
         let text = "play in the gear of q1".to_owned();
         let grade = "indicated";
-        all.found(vec![Finding { grade, text }]);
+        all.found(vec![FoundLine { grade, text }]);
         all.next("Next: log more.", None);
         let narrow = |width| {
             report.text_for(Screen {

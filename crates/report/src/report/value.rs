@@ -71,7 +71,7 @@ pub struct Headline {
 
 /// One thing that was found, with a word for how firm it is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Finding {
+pub struct FoundLine {
     pub grade: &'static str,
     pub text: String,
 }
@@ -97,7 +97,7 @@ pub(super) enum Part {
     /// The figures of the verdict.
     Headline(Headline),
     /// What was found.
-    Found(Vec<Finding>),
+    Found(Vec<FoundLine>),
     /// The next step, and the command for it.
     Next {
         text: String,
@@ -234,7 +234,7 @@ impl Writer<'_> {
     }
 
     /// What was found; nothing where there is none.
-    pub fn found(&mut self, findings: Vec<Finding>) {
+    pub fn found(&mut self, findings: Vec<FoundLine>) {
         if !findings.is_empty() {
             self.push(Part::Found(findings));
         }

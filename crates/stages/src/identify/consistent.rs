@@ -12,7 +12,7 @@ use cft_ident_core::inertia::columns::{Own, RegressorColumns};
 use cft_ident_core::inertia::feasible::{
     ConsistencyProblem, Feasible, FrictionColumns, PRIOR_WEIGHT, feasible,
 };
-use cft_ident_core::inertia::left_out::{FitsOnLeftOut, LeftOut, left_out};
+use cft_ident_core::inertia::left_out::{FitsOnLeftOut, TrialLeftOut, left_out};
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
 use cft_ident_core::math::covariance::information_rows;
 use cft_ident_core::math::descent::Ending;
@@ -199,7 +199,7 @@ pub(super) fn consistent(
     let squares: f64 = growth.iter().map(|g| g * g * fit.effective_rows).sum();
     let (links, drives) = links_and_drives(&machine.robot, &map, &found);
     let names = machine.robot.joint_names().iter();
-    let residual = |(joint, of): (&String, &LeftOut)| LeftOutResidual {
+    let residual = |(joint, of): (&String, &TrialLeftOut)| LeftOutResidual {
         joint: joint.clone(),
         consistent: of.consistent,
         unconstrained: of.plain,

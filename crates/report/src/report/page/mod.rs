@@ -8,7 +8,7 @@
 use super::encode;
 use super::figure::Cells;
 use super::table::Table;
-use super::value::{Figure, Finding, Headline, Part, Report, Shown, Tone};
+use super::value::{Figure, FoundLine, Headline, Part, Report, Shown, Tone};
 use cft_ident_logs::log::{Provenance, is_hidden};
 
 const STYLE: &str = include_str!("style.css");
@@ -60,7 +60,7 @@ fn shown(part: &Part) -> String {
     match part {
         Part::Headline(headline) => headline_of(headline),
         Part::Found(findings) => {
-            let item = |f: &Finding| {
+            let item = |f: &FoundLine| {
                 let class = f.grade.split(' ').next().unwrap_or_default();
                 format!(
                     "<li><b class=\"grade {}\">{}</b> {}</li>\n",

@@ -4,7 +4,7 @@
 use super::step_words::titled;
 use crate::report::usual;
 use crate::report::words::listed;
-use crate::report::{Figure, Finding, Headline, Tone, Writer};
+use crate::report::{Figure, FoundLine, Headline, Tone, Writer};
 use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
@@ -16,7 +16,7 @@ const NAMED: usize = 3;
 /// The verdict on a diagnosis: its figures and what was found.
 pub(super) struct Words {
     pub headline: Headline,
-    pub found: Vec<Finding>,
+    pub found: Vec<FoundLine>,
 }
 
 impl Words {
@@ -31,7 +31,7 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> Words {
     let d = &found.diagnosis;
     let lacking = found.verdict();
     let mut all = added(machine, d);
-    let said = |grade, text: String| Finding { grade, text };
+    let said = |grade, text: String| FoundLine { grade, text };
     match lacking {
         DiagnosisVerdict::EffectsFound => {}
         _ if !d.determined => {
@@ -129,18 +129,18 @@ pub(super) fn is_exact(d: &Diagnosis) -> bool {
 }
 
 /// The effects, by how firm they are, and what of them is written.
-fn added(machine: &LoggedRobot, d: &Diagnosis) -> Vec<Finding> {
+fn added(machine: &LoggedRobot, d: &Diagnosis) -> Vec<FoundLine> {
     let graded = |grade: &'static str, what: &str, steps: Vec<&FoundEffect>| {
-        let mut all: Vec<Finding> = steps
+        let mut all: Vec<FoundLine> = steps
             .iter()
             .take(NAMED)
-            .map(|s| Finding {
+            .map(|s| FoundLine {
                 grade,
                 text: titled(machine, &s.estimate) + what,
             })
             .collect();
         if steps.len() > NAMED {
-            all.push(Finding {
+            all.push(FoundLine {
                 grade,
                 text: format!("{} more", steps.len() - NAMED),
             });
@@ -169,7 +169,7 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
 }
 
 /// The effects that held-out data took out of the model.
-fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> Option<Finding> {
+fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> Option<FoundLine> {
     d.selected.as_ref()?;
     let vetoed = d.steps.iter().filter(|s| s.vetoed());
     let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
@@ -178,7 +178,7 @@ fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> Option<Finding> {
         None => format!(" ({})", error(&d.after)),
         Some(_) => String::new(),
     };
-    Some(Finding {
+    Some(FoundLine {
         grade: "not written",
         text: format!("{}: the held-out error rises with it{of}", names.join("; ")),
     })

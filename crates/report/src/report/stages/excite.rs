@@ -5,7 +5,7 @@ use crate::report::figure::{MotionFigure, MotionPanel};
 use crate::report::table::{Columns, Table, unbroken};
 use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
 use crate::report::words::{self, condition, listed};
-use crate::report::{Figure, Finding, Headline, Report, Tone, Writer};
+use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer};
 use cft_ident_core::number;
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::foresee::Expected;
@@ -126,7 +126,7 @@ fn verdict(judged: &Judgement, name: &str) -> Words {
     }
     let seconds = format!("{} s", number::significant(judged.seconds, 4));
     figures.push(figure("time", seconds, Tone::Plain));
-    let mut found = vec![Finding { grade, text }];
+    let mut found = vec![FoundLine { grade, text }];
     if let Some(of) = &judged.separates {
         let deviations = number::significant(of.deviations, 2);
         figures.insert(
@@ -137,7 +137,7 @@ fn verdict(judged: &Judgement, name: &str) -> Words {
                 Tone::Plain,
             ),
         );
-        found.push(Finding {
+        found.push(FoundLine {
             grade: "separates",
             text: format!(
                 "strokes of {} at {} amplitudes around a width of {} tell the two apart by {deviations} standard errors; \
@@ -219,7 +219,7 @@ fn apart(report: &mut Report, judged: &Judgement) {
     let words = words.map(|part| format!("{:+.2} {}", part.weight, part.parameter));
     let words = words.collect::<Vec<_>>().join(" ");
     let line = format!("least certain combination: {words}");
-    report.terminal().line(&line);
+    report.terminal().paragraph(&line);
     let large = parts.take_while(|part| part.weight.abs() > 0.1);
     let columns = Columns::new(
         "least certain combination, of columns scaled to norm 1",

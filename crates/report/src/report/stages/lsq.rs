@@ -8,7 +8,7 @@ use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::{Columns, unbroken};
 use crate::report::words::{escaped, listed};
-use crate::report::{Figure, Finding, Headline, Report, Tone, Writer, summary, usual};
+use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer, summary, usual};
 use cft_ident_core::number;
 use cft_ident_core::verdict::IDENTIFIED;
 use cft_ident_files::config::ModelFile;
@@ -168,7 +168,7 @@ fn words(of: &Lsq) -> Words {
     figures.push(figure("usual", usual::figure(torque_is), Tone::Plain));
     let resting = of.found.joints.iter().filter(|j| !j.moves());
     let mut found = super::validate::still(resting.map(|j| &*j.joint));
-    let mut say = |grade, text| found.push(Finding { grade, text });
+    let mut say = |grade, text| found.push(FoundLine { grade, text });
     if !useless.is_empty() {
         let text = format!("{useless}: no torque at all would be as close");
         say("not usable", text);

@@ -4,7 +4,7 @@ use super::diagnose_words::Words;
 use crate::report::sections::parameters;
 use crate::report::table::Columns;
 use crate::report::words::listed;
-use crate::report::{Figure, Finding, Headline, Report, Tone, Writer};
+use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
@@ -67,24 +67,24 @@ fn verdict(of: &Show) -> Words {
             if let Some((force, joint)) = forces.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 let force = number::significant(force, 2);
                 figures.push(figure("smallest force", format!("{force} N ({joint})")));
-                found.push(Finding {
+                found.push(FoundLine {
                     grade: "force",
                     text: format!("smallest detectable force at the {}", escape(point)),
                 });
             }
         }
-        None => found.push(Finding {
+        None => found.push(FoundLine {
             grade: "not known",
             text: "how far its torques are off: the file holds no [[held_out]]; fit it again"
                 .to_owned(),
         }),
     }
     let (tally, all) = parameters::tally(of.file);
-    found.push(Finding {
+    found.push(FoundLine {
         grade: if all { "known" } else { "partly known" },
         text: tally,
     });
-    found.push(Finding {
+    found.push(FoundLine {
         grade: "torques by",
         text: match of.file.is_consistent() {
             true => "physically consistent parameters",

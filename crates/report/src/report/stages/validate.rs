@@ -8,7 +8,7 @@ use crate::report::sections::{
 };
 use crate::report::table::{Columns, unbroken};
 use crate::report::words::{escaped, listed, percent as known_percent, r2};
-use crate::report::{Figure, Finding, Headline, Report, Tone, Writer, summary, usual};
+use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer, summary, usual};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
 use cft_ident_core::validate::{JointError, TorqueErrors, Validation};
@@ -45,7 +45,7 @@ pub fn validate(of: &Validate) -> Report {
     let mut said = words(judged, (of.limit, torque_is), &escaped(logs));
     if let Some(shown) = not_a_validation(judged) {
         let grade = "not a validation";
-        said.found.insert(0, Finding { grade, text: shown });
+        said.found.insert(0, FoundLine { grade, text: shown });
     }
     said.write(&mut report.everywhere());
     used_before(&mut report.everywhere(), of);
@@ -186,14 +186,14 @@ fn at_rest(of: &TorqueErrors) -> Option<String> {
 }
 
 /// The joints that stand still, which count in no error.
-pub(super) fn still<'a>(joints: impl Iterator<Item = &'a str>) -> Vec<Finding> {
+pub(super) fn still<'a>(joints: impl Iterator<Item = &'a str>) -> Vec<FoundLine> {
     let names: Vec<&str> = joints.collect();
     let text = match names.as_slice() {
         [] => return Vec::new(),
         [one] => format!("{one} stands still and is not counted"),
         all => format!("{} stand still and are not counted", all.join(", ")),
     };
-    vec![Finding {
+    vec![FoundLine {
         grade: "at rest",
         text,
     }]
@@ -235,11 +235,11 @@ pub(super) fn words(
     if let Some(limit) = limit {
         let limit = number::percent(limit);
         found.push(match beyond.is_empty() {
-            true => Finding {
+            true => FoundLine {
                 grade: "limit kept",
                 text: format!("every joint is within {limit}"),
             },
-            false => Finding {
+            false => FoundLine {
                 grade: "limit missed",
                 text: format!("{beyond} above {limit}"),
             },
