@@ -6,7 +6,7 @@ Usage: run.py TOOL RESULT.json [--label NAME] [--only TEXT] [--jobs N] [--diagno
 Every measured robot with logs enough is rotated: each log, or third of a log, is unseen in turn, and the others are
 fitted. `lsq` writes the model before, `diagnose` the model after, without held-out data; `validate` gives the errors of
 both on the unseen part, of the rows in which each joint moves. --diagnose takes another build for `diagnose` alone.
-Cases that RESULT.json holds under the label are not run again.
+Cases that RESULT.json (committed: result.json beside this file) holds under the label are not run again.
 """
 
 import argparse
