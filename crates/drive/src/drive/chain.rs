@@ -244,7 +244,7 @@ impl Work {
 fn invert(a: &mut [f64], m: usize) -> bool {
     for k in 0..m {
         let pivot = a[k * m + k];
-        if !(pivot > 0.0) {
+        if pivot.is_nan() || pivot <= 0.0 {
             return false;
         }
         let p = 1.0 / pivot;

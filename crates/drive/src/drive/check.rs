@@ -74,7 +74,7 @@ fn one(file: &str, track: &Track) -> Result<Vec<String>, DriveError> {
         return Err(DriveError::PositionAtRest { file, joint });
     }
     let ratio = asked / moved;
-    if ratio > NUMBERS.ratio || ratio < 1.0 / NUMBERS.ratio {
+    if !(1.0 / NUMBERS.ratio..=NUMBERS.ratio).contains(&ratio) {
         let ratio = format!("{ratio:.3}");
         return Err(DriveError::OtherUnit { file, joint, ratio });
     }

@@ -117,7 +117,7 @@ impl SetupCondition {
     fn text(&self, name: &str) -> String {
         let [value, limit] = [self.value, self.limit].map(percent);
         let counted = |one: &str, many: &str| match self.value {
-            x if x == 1.0 => one.to_owned(),
+            1.0 => one.to_owned(),
             x => format!("{x} {many}"),
         };
         match (self.criterion, self.holds) {

@@ -122,7 +122,7 @@ impl<'a> Machine<'a> {
     }
 
     /// Items above the last mark.
-    fn to_mark(&mut self) -> Result<Vec<Item>, String> {
+    fn take_to_mark(&mut self) -> Result<Vec<Item>, String> {
         let mark = self.stack.iter().rposition(|item| *item == Item::Mark);
         let mark = mark.ok_or("a mark is missing")?;
         let items = self.stack.split_off(mark + 1);
@@ -197,7 +197,7 @@ impl<'a> Machine<'a> {
                     self.push(Item::Int(x))?;
                 }
                 b't' => {
-                    let items = self.to_mark()?;
+                    let items = self.take_to_mark()?;
                     self.push(Item::Tuple(items))?;
                 }
                 0x85..=0x87 => {
@@ -223,7 +223,7 @@ impl<'a> Machine<'a> {
                     self.push(made(callable, arguments)?)?;
                 }
                 b'u' => {
-                    let items = self.to_mark()?;
+                    let items = self.take_to_mark()?;
                     let Some(Item::Dict(pairs)) = self.stack.last_mut() else {
                         return Err("items are set in what is no dictionary".to_owned());
                     };
