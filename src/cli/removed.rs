@@ -71,9 +71,8 @@ pub(super) fn named(answer: &clap::Error, arguments: &[OsString]) -> Option<CliE
     }
     let option = text(ContextKind::InvalidArg)?;
     let typed = |command: &&str| arguments.iter().any(|word| word == *command);
-    let of = |(commands, old, _): &&(&[&str], &str, &str)| {
-        *old == option && commands.iter().any(|command| typed(&command))
-    };
+    let of =
+        |(commands, old, _): &&(&[&str], &str, &str)| *old == option && commands.iter().any(typed);
     let (_, option, now) = OPTIONS.iter().find(of)?;
     let error = CliError::usage(format!("there is no option {option} any more"));
     Some(error.hint(*now))

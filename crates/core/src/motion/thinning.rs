@@ -21,9 +21,9 @@ pub(super) fn factor(thin: bool, highest_hz: f64, decimation: usize, dt: f64) ->
     let divides = |m: &usize| decimation.is_multiple_of(*m);
     match thin {
         true => (2..=decimation)
+            .rev()
             .filter(divides)
-            .filter(enough)
-            .last()
+            .find(enough)
             .unwrap_or(1),
         false => 1,
     }

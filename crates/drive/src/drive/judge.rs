@@ -52,7 +52,7 @@ pub fn floor(k: usize, n: f64) -> f64 {
 /// Changes of the unknowns by each block left out.
 #[derive(Debug, Clone)]
 pub struct BlockJackknife {
-    /// DriveUnknown by unknown, block by block.
+    /// Unknown by unknown, block by block.
     pub changes: Vec<DVector<f64>>,
     pub covariance: DMatrix<f64>,
     /// What is free: the others stand at a bound, or are not seen.
