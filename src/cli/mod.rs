@@ -135,7 +135,7 @@ The help of each command ends with examples; --help-all has every option. Their 
 
 /// Identification of robot dynamics from logged joint positions and torques.
 #[derive(Debug, Parser)]
-#[command(name = "cft-ident", version, max_term_width = 100, after_help = EXAMPLES, disable_help_flag = true)]
+#[command(name = "cft-ident", version, term_width = window::columns(window::Stream::Output).min(100), after_help = EXAMPLES, disable_help_flag = true)]
 pub struct Cli {
     #[command(flatten)]
     common: Common,

@@ -62,7 +62,7 @@ fn meshes_without_end_and_without_number_leave_links_without_capsules_and_memory
     huge.set_len(2 << 30).unwrap();
     // 56 MB of vertices and blanks, named again and again
     let line = format!("vertex 1 2 3{}\n", " ".repeat(115));
-    let lines = line.repeat(3 * (56 << 13) / 3);
+    let lines = line.repeat((56 << 13) / 3 * 3);
     bench.file("dense.stl", format!("solid\n{lines}endsolid\n"));
     let shown = |files: &[&str]| {
         let shape = |file| {

@@ -42,7 +42,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("simulate", "explain math number robot log config effect"),
     (
         "excite",
-        "explain math number verdict robot log config inertia simulate",
+        "effect explain math number verdict robot log config inertia simulate",
     ),
     ("compare", "explain math robot config motion effect verdict"),
     ("track", ""),

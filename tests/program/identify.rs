@@ -43,12 +43,13 @@ fn motion() -> [Vec<f64>; 3] {
     [t, q, force]
 }
 
-fn fitted(log: Log) -> Result<IdentifiedDynamics, IdentifyError> {
+fn fitted(log: Log) -> Result<IdentifiedDynamics, Box<IdentifyError>> {
     lsq(
         &Dataset::new(&robot(), &[log]),
         &LsqSettings::default(),
         &Control::default(),
     )
+    .map_err(Box::new)
 }
 
 #[test]

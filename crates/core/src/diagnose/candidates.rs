@@ -50,7 +50,7 @@ pub fn candidates(
     let laws = LAWS.iter().copied().chain(case.own.iter().copied());
     let wanted = |law: &&Law| {
         let role = law.entry.role;
-        role != Role::StandIn && (case.keep || role != Role::Kept)
+        role != Role::StandIn && (case.kept.is_some() || role != Role::Kept)
     };
     let (mut out, mut not_tried) = (Vec::new(), Vec::new());
     for law in laws.filter(wanted) {

@@ -243,7 +243,7 @@ impl Judging<'_> {
         let Self { prepared, .. } = self;
         let (about, case) = (&prepared.fitted.model, prepared.case);
         let there = no_finding(about, case, &prepared.cover, effect).is_none();
-        let keeps = case.keep;
+        let keeps = case.kept.is_some();
         match way.accepted {
             true => None,
             false if !there => Some(NotWritten::Bound),
@@ -263,7 +263,7 @@ impl Judging<'_> {
             return 0.0;
         };
         let s = verified.amplitude.s;
-        let sure = s > self.field.numbers().confirmed || self.prepared.case.keep && s > 0.0;
+        let sure = s > self.field.numbers().confirmed || self.prepared.case.kept.is_some() && s > 0.0;
         match (way.accepted, effect.law.entry.measurable) {
             (true, _) => 1.0,
             (false, false) => s,
@@ -461,7 +461,7 @@ impl Judging<'_> {
         let s = amplitude.s;
         let [torque, std] = amplitude.torque;
         // what one would not notice is not named, whatever else speaks against it
-        let small = !verified.beside.noticeable && !self.prepared.case.keep;
+        let small = !verified.beside.noticeable && !self.prepared.case.kept.is_some();
         let left = way.left.map(|left| match left {
             NotWritten::Unsure | NotWritten::Bound if small => NotWritten::Small,
             left => left,

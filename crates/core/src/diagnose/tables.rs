@@ -52,7 +52,10 @@ impl Estimates {
         let (terms, places) = with_shapes(field, effects);
         let fitted = field.prepared.blocks.list.len();
         let fit = JointFit::new(&field.summed.sums, fitted, terms, rows);
-        let fit = fit.ok_or_else(|| field.prepared.nothing_determined())?;
+        let mut fit = fit.ok_or_else(|| field.prepared.nothing_determined())?;
+        if let Some(kept) = &field.prepared.case.kept {
+            fit.widen_by_held(&field.summed.layout.held, kept);
+        }
         Ok(Estimates {
             covariance: fit.covariance(),
             fit,

@@ -35,16 +35,17 @@ pub fn without_rates(sums: &BlockFactors) -> BlockFactors {
 pub fn widen_by_delay(sums: &BlockFactors, step: f64, fit: &mut Fit) -> Option<()> {
     let columns = &sums.columns;
     let (joints, u) = (columns.joints, fit.theta.len());
-    let n = 2 * joints;
+    let both = 2 * joints;
     let softness = (std::f64::consts::TAU * SOFT_HZ * step).powi(-2);
     let correlated = fit.rows as f64 / fit.effective_rows.max(1.0);
     let weights = weights_of(sums, &fit.residual_std);
-    let mut equations = NormalEquations::of(u + n);
+    let mut equations = NormalEquations::of(u + both);
     for (j, weight) in weights.iter().enumerate() {
         let own = columns.unknowns_of(j);
-        // the rates stand behind all other unknowns
+        // the rates stand behind all other unknowns, and the bends behind them
         let place = |c: usize| match c {
-            c if c + 2 >= own => u + 2 * j + (c + 2 - own),
+            c if c + 2 == own => u + j,
+            c if c + 1 == own => u + joints + j,
             c if c < columns.shared => c,
             c => columns.unknown(j, c) - 2 * j,
         };
@@ -53,26 +54,30 @@ pub fn widen_by_delay(sums: &BlockFactors, step: f64, fit: &mut Fit) -> Option<(
     }
     let NormalEquations { normal, target } = equations;
     let inverse = inverse_scaled(&normal.view((0, 0), (u, u)).into_owned())?;
-    let cross = normal.view((0, u), (u, n)).into_owned();
-    let by_delay = &inverse * &cross;
-    let score = target.rows(u, n) - cross.tr_mul(&(&inverse * target.rows(0, u)));
-    let known = (normal.view((u, u), (n, n)) - cross.tr_mul(&by_delay)) / correlated;
-    let before = DVector::from_fn(n, |k, _| match k % 2 {
-        0 => DELAY_SAMPLES.powi(-2),
-        _ => softness.powi(-2),
-    });
-    let scatter = (known + DMatrix::from_diagonal(&before))
-        .cholesky()?
-        .inverse();
-    let mut mean = &scatter * score / correlated;
-    let mut scatter = scatter;
+    let cross = normal.view((0, u), (u, both)).into_owned();
+    let moved = &inverse * &cross;
+    let known = (normal.view((u, u), (both, both)) - cross.tr_mul(&moved)) / correlated;
+    let by_fit = cross.tr_mul(&(&inverse * target.rows(0, u)));
+    let score = (target.rows(u, both) - by_fit) / correlated;
+    // scatter of the first n of rates and bends where the others are nothing
+    let scatter = |n: usize| {
+        let before = DVector::from_fn(n, |k, _| match k < joints {
+            true => DELAY_SAMPLES.powi(-2),
+            false => softness.powi(-2),
+        });
+        let known = known.view((0, 0), (n, n)) + DMatrix::from_diagonal(&before);
+        Some(known.cholesky()?.inverse())
+    };
+    // a torque's noise bends as a soft drive does: delays are those of stiff ones, lest they make up for it
+    let by_delay = moved.columns(0, joints);
+    let of_delays = scatter(joints)?;
+    let delays = &of_delays * score.rows(0, joints);
+    fit.covariance += by_delay * (of_delays + &delays * delays.transpose()) * by_delay.transpose();
     // what a drive gives way is below zero, and of a stiff one nothing: only what the rows show of it counts
-    for k in (1..n).step_by(2) {
-        mean[k] = mean[k].min(0.0);
-        scatter.row_mut(k).fill(0.0);
-        scatter.column_mut(k).fill(0.0);
-    }
-    fit.covariance += &by_delay * (scatter + &mean * mean.transpose()) * by_delay.transpose();
+    let of_all = scatter(both)? * score;
+    let gives_way = of_all.rows(joints, joints).map(|x| x.min(0.0));
+    let change = moved.columns(joints, joints) * gives_way;
+    fit.covariance.ger(1.0, &change, &change, 1.0);
     Some(())
 }
 
@@ -84,30 +89,38 @@ mod tests {
     use super::*;
 
     const STEP: f64 = 0.01;
-    const TRUE: [f64; 2] = [0.012, 0.5];
+    /// Inertia and viscous friction of a light joint, and of a heavy one.
+    const LIGHT: [f64; 2] = [0.012, 0.5];
+    const HEAVY: [f64; 2] = [1.2, 0.5];
 
-    /// Error of a light joint's inertia in deviations, before and after; and the deviation over that of an unseen delay.
-    fn errors(late: f64) -> [f64; 3] {
+    /// Error of a joint's inertia in deviations, before and after; and the deviation over that of an unseen delay. The
+    /// torque is logged `late` samples late, and the drive gives way by `soft` samples squared.
+    fn errors(truth: [f64; 2], late: f64, soft: f64) -> [f64; 3] {
         let columns = RegressorColumns::of_one(&[Own::Viscous], None);
         let rates = columns.with_torque_rates();
-        let motion = |t: f64| {
+        // speed, and what it changes over time again and again
+        let motion = |t: f64| -> [f64; 4] {
             let waves = [(0.4, 3.0, 0.0), (0.2, 7.0, 1.0)];
-            let (mut v, mut a) = (0.0, 0.0);
+            let mut out = [0.0; 4];
             for (size, w, phase) in waves {
-                v += size * w * (w * t + phase).cos();
-                a -= size * w * w * (w * t + phase).sin();
+                let (sin, cos) = f64::sin_cos(w * t + phase);
+                for (k, wave) in [cos, -sin, -cos, sin].into_iter().enumerate() {
+                    out[k] += size * w.powi(k as i32 + 1) * wave;
+                }
             }
-            (v, a)
+            out
         };
         let torque = |k: f64| {
-            let (v, a) = motion((k - late) * STEP);
-            TRUE[0] * a + TRUE[1] * v + 0.005 * (k * k * 0.7).sin()
+            let [v, a, ..] = motion((k - late) * STEP);
+            truth[0] * a + truth[1] * v + 0.005 * (k * k * 0.7).sin()
         };
         let mut plain = Accumulator::new(columns, 0.1);
         let mut with = Accumulator::new(rates, 0.1);
         for k in 0..4000 {
             let k = f64::from(k);
-            let (v, a) = motion(k * STEP);
+            let [v, mut a, slope, bend] = motion(k * STEP);
+            // the motor stands before its link by what the inertia's torque turns the drive
+            a += soft * STEP * STEP * (bend + truth[1] / truth[0] * slope);
             let rate = (torque(k + 1.0) - torque(k - 1.0)) / 2.0;
             plain.add(0, STEP, &[a, v, torque(k), torque(k)]);
             let bend = torque(k + 1.0) - 2.0 * torque(k) + torque(k - 1.0);
@@ -117,10 +130,10 @@ mod tests {
         let mut found = fit(&plain.finish(), Weighting::Wls).unwrap();
         let same = fit(&without_rates(&with), Weighting::Wls).unwrap();
         assert!((&same.theta - &found.theta).amax() < 1e-12);
-        let error = |fit: &Fit| (fit.theta[0] - TRUE[0]) / fit.covariance[(0, 0)].sqrt();
+        let error = |fit: &Fit| (fit.theta[0] - truth[0]) / fit.covariance[(0, 0)].sqrt();
         let before = error(&found);
         widen_by_delay(&with, STEP, &mut found).unwrap();
-        let blind = TRUE[1] * DELAY_SAMPLES * STEP;
+        let blind = truth[1] * DELAY_SAMPLES * STEP;
         [
             before,
             error(&found),
@@ -131,13 +144,25 @@ mod tests {
     #[test]
     fn an_interval_holds_the_inertia_of_a_joint_whose_torque_is_logged_late() {
         for late in [0.25, -0.5, 0.8] {
-            let [before, after, _] = errors(late);
+            let [before, after, _] = errors(LIGHT, late, 0.0);
             assert!(
                 before.abs() > 10.0 && after.abs() < 2.0,
                 "{late}: {before} {after}"
             );
         }
-        let [_, after, std] = errors(0.0);
+        let [_, after, std] = errors(LIGHT, 0.0, 0.0);
         assert!(after.abs() < 2.0 && std < 0.3, "{after} {std}");
+    }
+
+    #[test]
+    fn an_interval_holds_the_inertia_behind_a_drive_that_gives_way() {
+        for hz in [10.0, 20.0, 30.0] {
+            let soft = (std::f64::consts::TAU * hz * STEP).powi(-2);
+            let [before, after, _] = errors(HEAVY, 0.0, soft);
+            assert!(
+                before.abs() > 10.0 && after.abs() < 2.0,
+                "{hz}: {before} {after}"
+            );
+        }
     }
 }

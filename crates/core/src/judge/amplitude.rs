@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Numbers;
 use super::bounded::{self, Bound};
-use super::sums::{BlockSums, Terms};
+use super::sums::{BlockSums, Term, Terms};
 
 /// Places of an effect's terms: its coefficients, and the slopes by which its shape is free.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +105,24 @@ impl JointFit {
             total,
             values,
         })
+    }
+
+    /// Adds to the covariance of the values what that of terms does which are held.
+    pub fn widen_by_held(&mut self, held: &[Term], covariance: &DMatrix<f64>) {
+        let mut across = DMatrix::zeros(self.terms.len(), held.len());
+        for ((j, sums), weight) in self.total.iter().enumerate().zip(&self.terms.weights) {
+            for (i, own) in self.terms.own(j) {
+                for (h, term) in held.iter().enumerate() {
+                    if let Some(column) = term.column(j) {
+                        across[(i, h)] += weight * sums[(own, column)];
+                    }
+                }
+            }
+        }
+        if let Some(factor) = self.terms.firm_normal(&self.total).0.cholesky() {
+            let moved = factor.solve(&across);
+            self.known += &moved * covariance * moved.transpose();
+        }
     }
 
     /// Covariance of all values: their scatter over fits without each block, and what was known before.

@@ -10,7 +10,7 @@ use cft_ident_core::robot::Robot;
 
 use super::law::{DriveLawKind, MachineLaw};
 use super::roll_out::{PastStates, RolledDrive, first_speed, steps};
-use super::set_point::{CommandIntegral, Follower};
+use super::set_point::{CommandLines, Follower};
 use super::track::DriveLog;
 
 /// Sweeps in which the impulses of friction settle.
@@ -105,7 +105,7 @@ impl RobotChains {
             v[j] = first_speed(t, &track.position);
             out[j][0] = track.position[0];
             sides.push(Side {
-                command: CommandIntegral::new(t, &track.command, log.command_is, t[0] - late),
+                command: CommandLines::new(t, &track.command, log.command_is, t[0] - late),
                 follower: Follower::new(track.command[0], of.slowness),
                 past: PastStates::new(law.loop_delay, q[j], v[j]),
             });
@@ -128,8 +128,8 @@ impl RobotChains {
                 }
                 for (j, (track, of)) in joints.clone().enumerate() {
                     let side = &mut sides[j];
-                    let target = side.command.mean_up_to(begin + h - late);
-                    let set = side.follower.step(target, h);
+                    let end = begin + h - late;
+                    let set = side.follower.mean_up_to(&mut side.command, end);
                     let on = track.on.get(k - 1).copied().unwrap_or(true);
                     let supply = match (law.supply, track.supply.get(k - 1)) {
                         (Some(reference), Some(volts)) => volts / reference,
@@ -155,7 +155,7 @@ impl RobotChains {
                 }
             }
             for (j, (track, of)) in joints.clone().enumerate() {
-                if !((q[j] - track.position[k]).abs() < LOST) {
+                if (q[j] - track.position[k]).abs() >= LOST || q[j].is_nan() {
                     (q[j], v[j]) = (track.position[k] + LOST, 0.0);
                 }
                 out[j][k] = q[j] - of.bias;
@@ -167,7 +167,7 @@ impl RobotChains {
 
 /// What stands before a controller.
 struct Side<'a> {
-    command: CommandIntegral<'a>,
+    command: CommandLines<'a>,
     follower: Follower,
     past: PastStates,
 }

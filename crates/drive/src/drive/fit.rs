@@ -343,12 +343,12 @@ fn sums(
 ) -> Sums {
     let mut out = Sums::zero(p);
     for ((r, scale), columns) in r.iter().zip(scales).zip(columns) {
-        for k in piece.from..piece.to {
-            let (loss, weight) = robust(r[k] / scale);
+        for (k, error) in r.iter().enumerate().take(piece.to).skip(piece.from) {
+            let (loss, weight) = robust(error / scale);
             let weight = weight / (scale * scale);
             for (at, a) in columns.iter().enumerate() {
                 let by = weight * a.slope[k];
-                out.g[a.unknown] += by * r[k];
+                out.g[a.unknown] += by * error;
                 for b in &columns[..=at] {
                     out.h[(a.unknown, b.unknown)] += by * b.slope[k];
                 }

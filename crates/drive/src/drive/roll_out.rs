@@ -5,7 +5,7 @@
 //! against the motion (Moreau 1988): a joint that rests stays at rest, and the motion is continuous in every number.
 
 use super::law::{DriveLawKind, JointLaw, MachineLaw};
-use super::set_point::{CommandIntegral, Follower};
+use super::set_point::{CommandLines, Follower};
 use super::track::{DriveLoad, DriveLog};
 
 /// Longest step [s]. Half: positions of the measured servo move by under 0.1 mrad; twice: by 0.5 mrad.
@@ -91,7 +91,7 @@ pub fn roll_axis(
     };
     let t = &log.t;
     let late = law.command_delay + law.loop_delay;
-    let mut command = CommandIntegral::new(t, &track.command, log.command_is, t[0] - late);
+    let mut command = CommandLines::new(t, &track.command, log.command_is, t[0] - late);
     let mut follower = Follower::new(track.command[0], of.slowness);
     let mut q = track.position[0] + of.bias;
     let mut v = first_speed(t, &track.position);
@@ -110,8 +110,7 @@ pub fn roll_axis(
         let damping = if on { of.damping } else { of.viscous };
         for i in 0..count {
             let begin = t[k - 1] + i as f64 * h;
-            let target = command.mean_up_to(begin + h - late);
-            let set = follower.step(target, h);
+            let set = follower.mean_up_to(&mut command, begin + h - late);
             let half = q + 0.5 * h * v;
             let seen = past.seen(begin, h, half, v);
             let (tau, slope) = match on {
@@ -130,7 +129,7 @@ pub fn roll_axis(
             q = half + 0.5 * h * v;
             past.push(begin + h, q, v);
         }
-        if !((q - track.position[k]).abs() < LOST) {
+        if (q - track.position[k]).abs() >= LOST || q.is_nan() {
             (q, v) = (track.position[k] + LOST, 0.0);
         }
         out[k] = q - of.bias;

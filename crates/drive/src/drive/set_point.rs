@@ -1,87 +1,78 @@
 //! The set point that a firmware makes of its command, step by step.
 //!
-//! A step's set point is the mean of the late command over it: what an impulse over the step sees, whether the command
-//! jumps inside the step or not, so that it is smooth in the delay.
+//! A step's set point is the mean over it, exact along each straight line of the late command: what an impulse over the
+//! step sees, wherever inside the step the command jumps or bends, so that it is smooth in the delay and in the speed limit.
 
 use super::track::CommandIs;
 
-/// The running integral of a command.
+/// A command along time, line by line.
 #[derive(Debug, Clone)]
-pub struct CommandIntegral<'a> {
+pub struct CommandLines<'a> {
     t: &'a [f64],
     x: &'a [f64],
     kind: CommandIs,
-    sums: Vec<f64>,
     at: usize,
-    /// Where the last step ended, and the integral up to there.
-    last: (f64, f64),
+    /// Where the last line ended.
+    last: f64,
 }
 
-impl<'a> CommandIntegral<'a> {
+/// A part of a command on one straight line: its first value, its slope and how long it lasts.
+#[derive(Debug, Clone, Copy)]
+struct StraightLine {
+    from: f64,
+    slope: f64,
+    long: f64,
+}
+
+impl<'a> CommandLines<'a> {
     /// From a time on.
     pub fn new(t: &'a [f64], x: &'a [f64], kind: CommandIs, from: f64) -> Self {
-        let mut sums = Vec::with_capacity(t.len());
-        let mut sum = 0.0;
-        for k in 0..t.len() {
-            if k > 0 {
-                let mean = match kind {
-                    CommandIs::Held => x[k - 1],
-                    CommandIs::Linear => 0.5 * (x[k - 1] + x[k]),
-                };
-                sum += mean * (t[k] - t[k - 1]);
-            }
-            sums.push(sum);
-        }
-        let mut out = CommandIntegral {
+        CommandLines {
             t,
             x,
             kind,
-            sums,
             at: 0,
-            last: (from, 0.0),
-        };
-        out.last.1 = out.up_to(from).0;
-        out
+            last: from,
+        }
     }
 
-    /// The integral up to a time, and the command there; before the first sample the command is the first.
-    fn up_to(&mut self, time: f64) -> (f64, f64) {
-        let last = self.t.len() - 1;
-        if time <= self.t[0] {
-            return (self.x[0] * (time - self.t[0]), self.x[0]);
+    /// The line from where the last one ended, at most up to a time; before the first sample the command is the first,
+    /// after the last the last.
+    #[inline]
+    fn next(&mut self, to: f64) -> StraightLine {
+        let (from, last) = (self.last, self.t.len() - 1);
+        if from < self.t[0] {
+            self.last = to.min(self.t[0]);
+            return StraightLine {
+                from: self.x[0],
+                slope: 0.0,
+                long: self.last - from,
+            };
         }
-        while self.at > 0 && self.t[self.at] > time {
-            self.at -= 1;
-        }
-        while self.at < last && self.t[self.at + 1] <= time {
+        while self.at < last && self.t[self.at + 1] <= from {
             self.at += 1;
         }
         let k = self.at;
-        let since = time - self.t[k];
         let mut slope = 0.0;
-        if self.kind == CommandIs::Linear && k < last {
-            slope = (self.x[k + 1] - self.x[k]) / (self.t[k + 1] - self.t[k]);
+        self.last = to;
+        if k < last {
+            self.last = to.min(self.t[k + 1]);
+            if self.kind == CommandIs::Linear {
+                slope = (self.x[k + 1] - self.x[k]) / (self.t[k + 1] - self.t[k]);
+            }
         }
-        let sum = self.sums[k] + (self.x[k] + 0.5 * slope * since) * since;
-        (sum, self.x[k] + slope * since)
-    }
-
-    /// Mean from where the last step ended up to a time, and the command there.
-    #[inline]
-    pub fn mean_up_to(&mut self, to: f64) -> (f64, f64) {
-        let (from, before) = self.last;
-        let (sum, there) = self.up_to(to);
-        self.last = (to, sum);
-        ((sum - before) / (to - from), there)
+        StraightLine {
+            from: self.x[k] + slope * (from - self.t[k]),
+            slope,
+            long: self.last - from,
+        }
     }
 }
 
-/// A set point that runs after its target no faster than it may.
+/// A set point that runs after its command no faster than it may.
 #[derive(Debug, Clone, Copy)]
 pub struct Follower {
     at: f64,
-    /// The target where the last step ended.
-    target: f64,
     /// Longest way of one second [rad].
     v_max: f64,
 }
@@ -93,28 +84,52 @@ impl Follower {
         } else {
             f64::INFINITY
         };
-        let target = at;
-        Follower { at, target, v_max }
+        Follower { at, v_max }
     }
 
-    /// The mean of the set point over a step of `h`, along which its target has a mean and an end.
+    /// Mean of the set point from where the last step ended up to a time.
     #[inline]
-    pub fn step(&mut self, (mean, end): (f64, f64), h: f64) -> f64 {
-        let way = self.v_max * h;
-        let moved = end - self.target;
-        let behind = self.at - self.target;
-        self.at += (end - self.at).clamp(-way, way);
-        self.target = end;
-        let left = self.at - end;
-        if left != 0.0 {
-            return mean + 0.5 * (behind + left);
+    pub fn mean_up_to(&mut self, command: &mut CommandLines, to: f64) -> f64 {
+        let from = command.last;
+        let mut integral = 0.0;
+        while command.last < to {
+            integral += self.along(command.next(to));
         }
-        if behind == 0.0 {
-            return mean;
+        match to > from {
+            true => integral / (to - from),
+            false => self.at,
         }
-        // it catches up inside the step
-        let closing = way + moved * behind.signum();
-        mean + 0.5 * behind * (behind.abs() / closing.max(behind.abs()))
+    }
+
+    /// Integral of the set point along a line of the command.
+    fn along(&mut self, line: StraightLine) -> f64 {
+        let StraightLine {
+            mut from,
+            slope,
+            long,
+        } = line;
+        let (mut left, mut integral) = (long, 0.0);
+        if self.v_max.is_finite() && self.at != from {
+            let behind = self.at - from;
+            let closing = self.v_max + slope * behind.signum();
+            let speed = -self.v_max * behind.signum();
+            // where it does not catch up, it runs to the line's end
+            let run = match closing * left > behind.abs() {
+                true => behind.abs() / closing,
+                false => left,
+            };
+            integral = (self.at + 0.5 * speed * run) * run;
+            self.at += speed * run;
+            left -= run;
+            if left <= 0.0 {
+                return integral;
+            }
+            from += slope * run;
+        }
+        // on its command: it stays there, or falls behind one that is too fast
+        let speed = slope.clamp(-self.v_max, self.v_max);
+        self.at = from + speed * left;
+        integral + (from + 0.5 * speed * left) * left
     }
 }
 
@@ -122,12 +137,14 @@ impl Follower {
 mod tests {
     use super::*;
 
+    /// Mean of the set point over a span, of a command that is followed at any speed.
+    fn mean(t: &[f64], x: &[f64], kind: CommandIs, [from, to]: [f64; 2]) -> f64 {
+        let mut command = CommandLines::new(t, x, kind, from);
+        Follower::new(x[0], 0.0).mean_up_to(&mut command, to)
+    }
+
     #[test]
     fn the_mean_over_a_step_is_exact_for_jumps_and_ramps() {
-        let t = [0.0, 1.0, 2.0];
-        let mean = |x: &[f64], kind, [from, to]: [f64; 2]| {
-            CommandIntegral::new(&t, x, kind, from).mean_up_to(to).0
-        };
         let (held, ramp) = (CommandIs::Held, CommandIs::Linear);
         for (kind, span, expected) in [
             (held, [0.5, 1.5], 1.0),
@@ -137,7 +154,7 @@ mod tests {
             // after its last sample the command stays
             (ramp, [5.0, 6.0], 2.0),
         ] {
-            let found = mean(&[0.0, 2.0, 2.0], kind, span);
+            let found = mean(&[0.0, 1.0, 2.0], &[0.0, 2.0, 2.0], kind, span);
             assert!(
                 (found - expected).abs() < 1e-12,
                 "{kind:?} {span:?}: {found}"
@@ -150,21 +167,34 @@ mod tests {
         let t: Vec<f64> = (0..100).map(|k| 0.005 * f64::from(k)).collect();
         let x: Vec<f64> = t.iter().map(|t| if *t < 0.2 { 0.0 } else { 1.0 }).collect();
         let (h, step) = (2.5e-3, 1e-6);
-        let total = |late: f64| -> f64 {
-            let mut command = CommandIntegral::new(&t, &x, CommandIs::Held, -late);
-            let ends = (1..190).map(|k| f64::from(k) * h);
-            ends.map(|end| command.mean_up_to(end - late).0).sum()
-        };
-        let change = total(0.0312 + step) - total(0.0312);
-        assert!((change * h / step + 1.0).abs() < 1e-6, "{change}");
+        for kind in [CommandIs::Held, CommandIs::Linear] {
+            for slowness in [0.0, 0.2] {
+                let total = |late: f64| -> f64 {
+                    let mut command = CommandLines::new(&t, &x, kind, -late);
+                    let mut follower = Follower::new(0.0, slowness);
+                    let ends = (1..190).map(|k| f64::from(k) * h);
+                    ends.map(|end| follower.mean_up_to(&mut command, end - late))
+                        .sum()
+                };
+                // a set point that is behind at the end is behind by as much as its command came later
+                for late in [0.03, 0.0312, 0.0324] {
+                    let change = total(late + step) - total(late);
+                    assert!(
+                        (change * h / step + 1.0).abs() < 1e-6,
+                        "{kind:?} {slowness} {late}: {change}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]
     fn a_slow_set_point_runs_at_its_speed_and_arrives() {
         let steps = |count: usize| {
+            let mut command = CommandLines::new(&[0.0, 1.0], &[1.0, 1.0], CommandIs::Held, 0.0);
             let mut follower = Follower::new(0.0, 0.2);
-            (0..count)
-                .map(|_| follower.step((1.0, 1.0), 2.5e-3))
+            let ends = (1..=count).map(|k| 2.5e-3 * k as f64);
+            ends.map(|end| follower.mean_up_to(&mut command, end))
                 .last()
                 .unwrap()
         };
@@ -173,12 +203,38 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_set_point_over_long_steps_is_that_of_short_ones() {
+        let t: Vec<f64> = (0..40).map(|k| 0.013 * f64::from(k)).collect();
+        let x: Vec<f64> = (0..40)
+            .map(|k| 0.3 * (0.9 * f64::from(k)).sin() + 0.1 * f64::from(k % 3))
+            .collect();
+        for kind in [CommandIs::Held, CommandIs::Linear] {
+            for slowness in [0.05, 0.2, 1.0] {
+                let means = |h: f64, count: usize| -> Vec<f64> {
+                    let mut command = CommandLines::new(&t, &x, kind, -0.0312);
+                    let mut follower = Follower::new(x[0], slowness);
+                    let ends = (1..=count).map(|k| h * k as f64 - 0.0312);
+                    ends.map(|end| follower.mean_up_to(&mut command, end))
+                        .collect()
+                };
+                let (long, short) = (means(5e-3, 100), means(5e-6, 100_000));
+                for (long, short) in long.iter().zip(short.chunks(1000)) {
+                    let short = short.iter().sum::<f64>() / 1000.0;
+                    assert!((long - short).abs() < 1e-9, "{kind:?} {slowness}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_set_point_that_is_fast_enough_is_its_target() {
+        let t: Vec<f64> = (0..100).map(|k| 2.5e-3 * f64::from(k)).collect();
+        let x: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
+        let mut command = CommandLines::new(&t, &x, CommandIs::Linear, 0.0);
         let mut follower = Follower::new(0.0, 0.2);
-        for k in 0..100 {
-            let (from, to) = (0.01 * f64::from(k), 0.01 * f64::from(k + 1));
-            let mean = 0.5 * (from + to);
-            assert!((follower.step((mean, to), 2.5e-3) - mean).abs() < 1e-12);
+        for k in 1..100 {
+            let mean = 0.5 * (x[k - 1] + x[k]);
+            assert!((follower.mean_up_to(&mut command, t[k]) - mean).abs() < 1e-12);
         }
     }
 }

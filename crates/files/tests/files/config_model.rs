@@ -264,7 +264,7 @@ fn a_robot_file_given_as_a_model_is_named_so() {
         std::fs::read_to_string(format!("{}/configs/cft.toml", cft_ident_support::ROOT)).unwrap();
     refused(
         ModelFile::parse("configs/cft.toml", &text),
-        &["`parameter` is missing", "robot file", "-r"],
+        &["not a model file", "robot file", "-r"],
     );
 }
 

@@ -14,7 +14,7 @@ use crate::log::{Bridge, EvenSpacing};
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Inspection {
-    One(Findings),
+    One(Box<Findings>),
     Several(Several),
 }
 
@@ -45,7 +45,7 @@ impl Inspection {
     /// The findings of logs, by their names.
     pub fn of(logs: &[(String, Findings)]) -> Self {
         if let [(_, only)] = logs {
-            return Inspection::One(only.clone());
+            return Inspection::One(Box::new(only.clone()));
         }
         let all = || logs.iter().map(|(_, findings)| findings);
         Inspection::Several(Several {

@@ -40,7 +40,13 @@ impl EvenClock {
         } = self.even;
         let place = self.last.map_or(first_s, |last| last + step_s);
         let late = (stamp - place) / step_s;
-        let lost = if late > late_steps { late.round() } else { 0.0 };
+        // stamps that are late by themselves make up their own share of it: no more rows are lost than what is left
+        let own = late_steps - LOST_FROM;
+        let lost = if late > late_steps {
+            (late - own).round()
+        } else {
+            0.0
+        };
         let follow = FOLLOWED / late_steps.max(1.0);
         let t = place + step_s * (lost + follow * (late - lost));
         self.last = Some(t);
@@ -200,7 +206,7 @@ mod tests {
     #[test]
     fn bursts_lie_evenly_at_the_declared_rate_and_a_lost_burst_stays_lost() {
         let stamps: Vec<(u32, f64)> = (0..2000)
-            .filter(|k| !(800..810).contains(k))
+            .filter(|k| !(800..810).contains(k) && *k != 1504)
             .map(|k: u32| (k, 0.1 * f64::from(k / 10 + 1) + 1e-5 * f64::from(k % 10)))
             .collect();
         let mut declared = DeclaredEven::default();
@@ -211,7 +217,12 @@ mod tests {
         let mut before = 0.0;
         for (k, stamp) in stamps {
             let t = clock.take(stamp);
-            let steps = if k == 810 { 11.0 } else { 1.0 };
+            // a message that is lost within a burst shows with the next one
+            let steps = match k {
+                810 => 11.0,
+                1510 => 2.0,
+                _ => 1.0,
+            };
             assert!(
                 k == 0 || (t - before - 0.01 * steps).abs() < 0.001,
                 "{k}: {}",

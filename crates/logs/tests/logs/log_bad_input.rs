@@ -114,6 +114,32 @@ fn nan_infinity_and_text_in_a_number_are_reported_with_line_and_column() {
 }
 
 #[test]
+fn positions_and_torques_in_rows_of_their_own_are_told_from_single_empty_cells() {
+    let table = |row: &dyn Fn(u32) -> String| -> String {
+        let rows = (0..12).map(|k| format!("{}{}\n", f64::from(k) / 8.0, row(k)));
+        ["t,q_q1,tau_q1\n".to_owned()]
+            .into_iter()
+            .chain(rows)
+            .collect()
+    };
+    let turns = table(&|k| [",1,", ",,2"][k as usize % 2].to_owned());
+    let words = ["log.csv:2", "`tau_q1`", "rows of their own", "d['q_q1']"];
+    says(turns, &words);
+    // some rows hold both, where the two clocks meet
+    let some = table(&|k| [",1,2", ",,2", ",1,"][k as usize % 3].to_owned());
+    says(some, &["log.csv:3", "`q_q1`", "rows of their own"]);
+    let single = table(&|k| match k {
+        5 => ",,2".to_owned(),
+        8 => ",1,".to_owned(),
+        _ => ",1,2".to_owned(),
+    });
+    says(single, &["log.csv:7", "`q_q1`", "without a measurement"]);
+    // torques at half the rate of the positions have no clock of their own
+    let half = table(&|k| [",1,2", ",1,"][k as usize % 2].to_owned());
+    says(half, &["log.csv:3", "`tau_q1`", "without a measurement"]);
+}
+
+#[test]
 fn a_decimal_comma_among_points_and_half_a_clock_time_are_recognised() {
     says(
         "t;q_q1;tau_q1\n0;1,5;2.5\n1;2;3\n",

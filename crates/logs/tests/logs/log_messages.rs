@@ -231,10 +231,10 @@ fn a_clock_that_runs_backwards_names_the_message_and_the_other_clock() {
 fn a_message_whose_number_is_none_is_left_out_and_reported_and_a_recording_of_none_else_is_refused()
 {
     let folder = tempfile::tempdir().unwrap();
-    let recorded = |name: &str, none: &dyn Fn(u64) -> bool| {
+    let recorded = |name: &str, count: u64, none: &dyn Fn(u64) -> bool| {
         let path = folder.path().join(name);
         let mut recording = Recording::create(&path, WriteOptions::new());
-        for k in 0..5_u64 {
+        for k in 0..count {
             let state = JointState {
                 stamp_ns: k * 1_000_000,
                 names: owned(&["q1"]),
@@ -247,7 +247,7 @@ fn a_message_whose_number_is_none_is_left_out_and_reported_and_a_recording_of_no
         recording.finish();
         path
     };
-    let path = recorded("log.mcap", &|k| k == 3);
+    let path = recorded("log.mcap", 5, &|k| k == 3);
     let (block, reader) = read(&shown(&path), &one_joint(""));
     assert_eq!(block.t, [0.0, 1e-3, 2e-3, 4e-3]);
     let words = [
@@ -256,7 +256,14 @@ fn a_message_whose_number_is_none_is_left_out_and_reported_and_a_recording_of_no
         "no number as `position[name=q1]`",
     ];
     says(&reader.warnings().concat(), &words);
-    let message = refused(&recorded("none.mcap", &|_| true), &one_joint(""));
+    // a driver that has no measurement yet publishes messages without numbers for a while
+    let (block, reader) = read(
+        &shown(&recorded("late.mcap", 305, &|k| k < 300)),
+        &one_joint(""),
+    );
+    assert_eq!(block.len(), 5);
+    says(&reader.warnings().concat(), &["300 of 305 messages"]);
+    let message = refused(&recorded("none.mcap", 5, &|_| true), &one_joint(""));
     says(
         &message,
         &[

@@ -76,7 +76,7 @@ fn logs_of_six_and_seven_joints_are_read_with_velocities_where_they_have_them() 
     for (file, joints, rows, velocities) in [
         ("tx40/tx40_joint.csv", 6, 45000, false),
         // without the stale rows
-        ("panda/panda_exciting.csv", 7, 20544 - 1171, true),
+        ("panda/panda_exciting.csv", 7, 20544 - 1172, true),
         ("ur10/ur10_exciting.csv", 6, 3441, true),
     ] {
         let Some(path) = shared(file) else { return };
@@ -112,7 +112,7 @@ fn the_repeated_rows_of_the_panda_log_are_counted_and_those_in_motion_dropped() 
     let (block, reader) = read(&path.to_string_lossy(), &layout);
     let warnings = reader.warnings();
     assert_eq!(warnings.len(), 1, "{warnings:?}");
-    for word in ["panda_exciting.csv", "1255 rows repeat", "1171 of them"] {
+    for word in ["panda_exciting.csv", "1255 rows repeat", "1172 of them"] {
         assert!(warnings[0].contains(word), "{word}: {}", warnings[0]);
     }
     assert_eq!(reader.samples(), block.len() as u64);

@@ -2,7 +2,7 @@
 //! before it slips makes a loop that shrinks with the amplitude, and friction over speed knows neither. How far a motion
 //! tells them apart is the torque of the one that the others cannot take over, in standard errors.
 
-use cft_ident_core::effect::smooth_coulomb;
+use cft_ident_core::effect::{backlash, presliding, smooth_coulomb};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -291,8 +291,8 @@ fn separation(path: &Strokes, task: &StrokesTask, noise: f64) -> (&'static str, 
         .fold(0.0, |most: f64, s| most.max(s[1].abs()));
     let likes = OTHERS.iter().flat_map(|part| {
         let memory = match task.effect {
-            Memory::Gap => ("presliding", Torque::Bristle(part * task.width)),
-            Memory::Bristle => ("backlash", Torque::Gap(part * task.width)),
+            Memory::Gap => (presliding::ENTRY.name, Torque::Bristle(part * task.width)),
+            Memory::Bristle => (backlash::ENTRY.name, Torque::Gap(part * task.width)),
         };
         let slow = Torque::OverSpeed(part / 8.0 * fastest);
         [memory, (smooth_coulomb::ENTRY.name, slow)]

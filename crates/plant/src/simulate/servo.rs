@@ -176,10 +176,10 @@ pub fn run_servo(
     let mut seen: VecDeque<f64> = VecDeque::from(vec![q; (servo.loop_delay / h).round() as usize]);
     let mut position = Vec::with_capacity(rows + 1);
     let tick = TAU / servo.ticks;
-    for k in 0..=rows {
+    for start in t.iter().take(rows + 1) {
         position.push((q / tick).round() * tick);
         for i in 0..STEPS {
-            let time = t[k] + i as f64 * h;
+            let time = start + i as f64 * h;
             let target = sent(time - servo.command_delay - servo.loop_delay);
             set = match servo.speed_limit {
                 Some(limit) => set + (target - set).clamp(-limit * h, limit * h),

@@ -3,6 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use cft_ident_core::explain::Explain;
+use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -366,6 +367,12 @@ fn case(
         centre: refined(before, name)?,
         rows_per_independent: firm * (rate / (2.0 * processing.cutoff_hz)).max(1.0),
     };
+    let kept = settings.keep.then(|| {
+        let size = given.model.parameters();
+        let moments = DMatrix::from_row_slice(size, size, &file.model_covariance(&given.model));
+        let inertial = given.model.theta.len();
+        moments.view((0, 0), (inertial, inertial)).into_owned()
+    });
     Ok(Case {
         in_use: refined(&settings.model.file, name)?,
         given,
@@ -381,7 +388,7 @@ fn case(
             .map(|j| machine.file.torque_unit(j).to_owned())
             .collect(),
         averaged: in_memory.averaged,
-        keep: settings.keep,
+        kept,
         own: own_laws(&settings.candidates, &machine.robot)?,
         wishes: settings.wishes.clone(),
         numbers: NUMBERS,

@@ -95,7 +95,8 @@ impl PreparedCase<'_> {
         terms: &[FormulaTerm],
         j: usize,
     ) -> Result<RowsOfJoint, MotionError> {
-        let (data, blocks, unknowns) = (&self.data, &self.blocks.list, &self.unknowns);
+        let (data, blocks) = (&self.data, &self.blocks.list);
+        let unknowns = &self.unknowns.without_held();
         let columns = Columns::of(terms);
         let moving = |s: usize| !data.split.is_stationary(s, j);
         let pieces = blocks.iter().flat_map(|b| &b.pieces);

@@ -233,7 +233,7 @@ impl OfJoint {
     ) -> Self {
         let candidate = |c: &Chosen| searched.candidates[c.candidate].clone();
         let candidates: Vec<Candidate> = confirmed.iter().map(candidate).collect();
-        let mut own = vec![false; prepared.unknowns.columns[joint].len()];
+        let mut own = vec![false; prepared.unknowns.without_held().columns[joint].len()];
         for candidate in candidates.iter().filter(|c| c.effect.place.touches(joint)) {
             let is_own = candidate.effect.place == Place::Joint(joint);
             let count = candidate.bounds.len() + candidate.slopes.len();

@@ -1,5 +1,7 @@
 //! What a diagnosis is given: a model, logs, what is known and open, and what the user asks for.
 
+use nalgebra::DMatrix;
+
 use super::data_split::{DataSplit, LogRole};
 use super::formula_numbers::FormulaNumbers;
 use super::prior::ParameterPrior;
@@ -30,8 +32,8 @@ pub struct Case {
     pub units: Vec<String>,
     /// Torques are means of two rows, as by a zero-order hold.
     pub averaged: bool,
-    /// The inertial parameters of the given model are kept.
-    pub keep: bool,
+    /// Covariance of the inertial parameters of the given model, where these are kept.
+    pub kept: Option<DMatrix<f64>>,
     /// Effects of the user's own, tried beside those that are known.
     pub own: Vec<&'static Law>,
     /// What the user asks for.
@@ -77,7 +79,7 @@ pub fn formula_name(joint: &str) -> String {
 impl Case {
     /// The declared unknowns.
     pub fn unknowns(&self) -> Unknowns {
-        Unknowns::of(&self.given, &self.open, self.keep)
+        Unknowns::of(&self.given, &self.open, self.kept.is_some())
     }
 
     /// Stretches, their filters, and the speeds up to which joints rest.

@@ -75,6 +75,8 @@ impl Candidate {
 /// Where the columns of unknowns and candidates stand in the rows of each joint.
 pub struct ColumnLayout {
     pub declared: Vec<Term>,
+    /// Terms of what is held.
+    pub held: Vec<Term>,
     /// Terms of each candidate, as many as it has coefficients.
     pub candidates: Vec<Vec<Term>>,
     /// Terms of each candidate's slopes.
@@ -90,7 +92,7 @@ impl ColumnLayout {
             columns: Vec::new(),
             bound,
         };
-        let mut declared = vec![term(Bound::NONE); unknowns.len()];
+        let mut declared = vec![term(Bound::NONE); unknowns.len() + unknowns.held.len()];
         for (j, own) in unknowns.columns.iter().enumerate() {
             for (column, i) in own.iter().enumerate() {
                 declared[*i].columns.push((j, column));
@@ -111,6 +113,7 @@ impl ColumnLayout {
         });
         let (candidates, slopes) = terms.unzip();
         ColumnLayout {
+            held: declared.split_off(unknowns.len()),
             declared,
             candidates,
             slopes,
@@ -280,7 +283,7 @@ impl<'a> Window<'a> {
         let (model, part) = (self.model, &self.part);
         let scene = self.scene();
         let mut friction = friction_columns(&model.model.friction[j], &part.v[j]);
-        let column = |i: &usize| match unknowns.list[*i] {
+        let column = |i: &usize| match unknowns.of_column(*i) {
             Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
             Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
             Unknown::Offset(_) => vec![1.0; part.len()],

@@ -19,7 +19,9 @@ pub enum Unknown {
 #[derive(Debug, Clone)]
 pub struct Unknowns {
     pub list: Vec<Unknown>,
-    /// Index in the list of each column of a joint's rows.
+    /// Parameters that are held as given: their columns tell what their own covariance does to the unknowns.
+    pub held: Vec<Unknown>,
+    /// Of each column of a joint's rows its index in the list, and behind it in that of what is held.
     pub columns: Vec<Vec<usize>>,
 }
 
@@ -33,27 +35,51 @@ pub struct FreeParameters {
 }
 
 impl Unknowns {
-    /// The unknowns of a model; without its inertial parameters where these are kept.
+    /// The unknowns of a model; its inertial parameters are held where these are kept.
     pub fn of(model: &AugmentedModel, open: &FreeParameters, keep: bool) -> Self {
         let plain = &model.model;
         let n = plain.robot.joints();
-        let inertial = if keep { 0 } else { plain.theta.len() };
-        let mut list: Vec<Unknown> = (0..inertial).map(Unknown::Theta).collect();
+        let inertial = (0..plain.theta.len()).map(Unknown::Theta);
+        let (mut list, held): (Vec<Unknown>, Vec<Unknown>) = inertial.partition(|_| !keep);
         for (joint, law) in plain.friction.iter().enumerate() {
             let free = |k: &usize| open.friction[joint].get(*k).copied().unwrap_or(true);
             let own = (0..law.parameters()).filter(free);
             list.extend(own.map(|k| Unknown::Friction { joint, k }));
         }
         list.extend((0..n).filter(|j| open.offset[*j]).map(Unknown::Offset));
-        let held = plain.robot.parameters_by_joint();
+        let inertial = plain.robot.parameters_by_joint();
         let touches = |u: &Unknown, j: usize| match *u {
-            Unknown::Theta(i) => held[j].contains(&i),
+            Unknown::Theta(i) => inertial[j].contains(&i),
             Unknown::Friction { joint, .. } | Unknown::Offset(joint) => joint == j,
         };
-        let columns = (0..n)
-            .map(|j| (0..list.len()).filter(|i| touches(&list[*i], j)).collect())
-            .collect();
-        Unknowns { list, columns }
+        let of_joint = |j: usize| {
+            let all = list.iter().chain(&held).enumerate();
+            all.filter(|(_, u)| touches(u, j)).map(|(i, _)| i).collect()
+        };
+        let columns = (0..n).map(of_joint).collect();
+        Unknowns {
+            list,
+            held,
+            columns,
+        }
+    }
+
+    /// The same without the columns of what is held.
+    pub fn without_held(&self) -> Self {
+        let free = |own: &Vec<usize>| own.iter().copied().filter(|i| *i < self.len()).collect();
+        Unknowns {
+            list: self.list.clone(),
+            held: Vec::new(),
+            columns: self.columns.iter().map(free).collect(),
+        }
+    }
+
+    /// What a column is of.
+    pub fn of_column(&self, index: usize) -> Unknown {
+        match index.checked_sub(self.len()) {
+            Some(held) => self.held[held],
+            None => self.list[index],
+        }
     }
 
     pub fn len(&self) -> usize {

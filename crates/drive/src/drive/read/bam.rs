@@ -88,7 +88,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
     })?;
     let mut findings = Vec::new();
     let t: Vec<f64> = rig.entries.iter().map(|e| e.timestamp).collect();
-    if let Some(k) = (1..t.len()).find(|k| !(t[*k] > t[k - 1])) {
+    if let Some(k) = (1..t.len()).find(|k| t[*k] <= t[k - 1] || t[*k].is_nan()) {
         return Err(wrong(
             format!(
                 "entry {k}: the time does not increase ({} after {})",

@@ -197,7 +197,7 @@ fn plain(
 }
 
 fn increasing(file: &str, log: &DriveLog) -> Result<(), DriveError> {
-    match (1..log.t.len()).find(|k| !(log.t[*k] > log.t[k - 1])) {
+    match (1..log.t.len()).find(|k| log.t[*k] <= log.t[k - 1] || log.t[*k].is_nan()) {
         None => Ok(()),
         Some(k) => Err(DriveError::File {
             file: file.to_owned(),

@@ -40,9 +40,11 @@ pub fn read(control: &str, state: &str) -> Result<SageLog, String> {
             at += 1;
         }
         out.t.push(*t);
-        for j in 0..wide {
-            out.position[j].push(numbers[j]);
-            out.command[j].push(commands[at].1[j]);
+        for (signal, number) in out.position.iter_mut().zip(numbers) {
+            signal.push(*number);
+        }
+        for (signal, number) in out.command.iter_mut().zip(&commands[at].1) {
+            signal.push(*number);
         }
     }
     Ok(out)
@@ -77,7 +79,7 @@ fn rows(text: &str) -> Result<Rows, String> {
             return Err(wrong("its number of joints is another"));
         }
         if let Some((last, _)) = out.last()
-            && !(t * MICROSECOND > *last)
+            && (t * MICROSECOND <= *last || t.is_nan())
         {
             return Err(wrong("its time does not increase"));
         }

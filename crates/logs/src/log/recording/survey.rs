@@ -1,5 +1,6 @@
 //! Finds the topics that hold a robot's channels, by reading the beginning of a recording.
 
+use std::ops::Range;
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
@@ -52,14 +53,34 @@ struct TopicCandidate {
 /// What messages of a topic were seen to hold.
 #[derive(Clone, Copy, Default, PartialEq)]
 struct Shown {
-    positions: bool,
-    torques: bool,
-    /// Both in one message.
-    both: bool,
+    /// Channels as numbers.
+    measured: Channels,
+    /// Channels by their names; a driver without that sensor publishes NaN.
+    named: Channels,
     /// No message with the positions was without the velocities.
     velocities: bool,
     header: bool,
     time: bool,
+}
+
+/// Which channels of the robot some message held all of.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct Channels {
+    positions: bool,
+    torques: bool,
+    /// Both in one message.
+    both: bool,
+}
+
+impl Channels {
+    /// Adds those of one message; a robot without positions (or torques) to read finds them everywhere.
+    fn add(&mut self, fields: &RobotFields, is: impl Fn(&Value) -> bool, values: &[Value]) {
+        let all = |range: &Range<usize>| values[range.clone()].iter().all(&is);
+        let (q, tau) = (all(&fields.positions), all(&fields.torques));
+        self.positions |= q && !fields.positions.is_empty();
+        self.torques |= tau && !fields.torques.is_empty();
+        self.both |= q && tau;
+    }
 }
 
 impl TopicCandidate {
@@ -97,49 +118,47 @@ impl TopicCandidate {
         shown.header |= fields.has_header(values);
         shown.time |= fields.has_time(values);
         self.parts.join(fields, head, values);
-        // A robot without positions (or torques) to read finds them everywhere.
-        let all = |range| RobotFields::all(values, range) || range.is_empty();
-        // NaN is what a driver without that sensor publishes
-        let measured = |range: &std::ops::Range<usize>| {
-            let mut own = values[range.clone()].iter();
-            own.all(|value| value.number().is_some_and(f64::is_finite))
-        };
-        let (q, tau) = (
-            all(&fields.positions) && measured(&fields.positions),
-            all(&fields.torques) && measured(&fields.torques),
-        );
-        if q {
+        let is_measured = |value: &Value| value.number().is_some_and(f64::is_finite);
+        if RobotFields::all(values, &fields.positions) || fields.positions.is_empty() {
             // one that is NaN is no measurement, as a driver without velocities publishes them
             let own = &values[fields.velocities.clone()];
             self.measured.resize(own.len(), false);
             for (measured, value) in self.measured.iter_mut().zip(own) {
-                *measured |= value.number().is_some_and(f64::is_finite);
+                *measured |= is_measured(value);
             }
-            shown.velocities = (shown.velocities || !shown.positions)
+            shown.velocities = (shown.velocities || !shown.named.positions)
                 && RobotFields::all(values, &fields.velocities);
         }
-        shown.positions |= q && !fields.positions.is_empty();
-        shown.torques |= tau && !fields.torques.is_empty();
-        shown.both |= q && tau;
+        shown.measured.add(fields, is_measured, values);
+        let is_there = |value: &Value| *value != Value::Absent;
+        shown.named.add(fields, is_there, values);
         before != *shown
     }
 }
 
 /// Reads the beginning of a recording, and chooses.
 pub(super) fn choose(paths: &[PathBuf], layout: &Layout) -> Result<(Choice, Layout), LogError> {
-    let by = |layout: &Layout| {
+    let mut surveys = Vec::new();
+    for layout in [Some(layout), layout.otherwise.as_deref()]
+        .into_iter()
+        .flatten()
+    {
         let fields = RobotFields::new(layout);
         let found = survey(paths, layout, &fields)?;
-        Ok::<_, LogError>(pick(&found, layout, &fields))
-    };
-    let chosen = by(layout)?;
-    if let (Err(_), Some(other)) = (&chosen, &layout.otherwise)
-        && let Ok(choice) = by(other)?
-    {
-        return Ok((choice, (**other).clone()));
+        if let Ok(choice) = pick(&found, layout, &fields, &[MEASURED]) {
+            return Ok((choice, layout.clone()));
+        }
+        surveys.push((layout, fields, found));
     }
-    let choice = chosen.map_err(|(problem, remedy)| refused(paths, problem, remedy))?;
-    Ok((choice, layout.clone()))
+    let mut refusal = None;
+    for (layout, fields, found) in surveys {
+        match pick(&found, layout, &fields, &[MEASURED, NAMED]) {
+            Ok(choice) => return Ok((choice, layout.clone())),
+            Err(problem) => refusal = refusal.or(Some(problem)),
+        }
+    }
+    let (problem, remedy) = refusal.unwrap_or_default();
+    Err(refused(paths, problem, remedy))
 }
 
 /// Looks at the messages of every topic until the channels are found and no other topic has them.
@@ -176,7 +195,7 @@ fn survey(
         if candidate.tries < TRIES
             && candidate.look((&message.head, message.data), fields, &mut values)
         {
-            complete = pick(&found, layout, fields).is_ok();
+            complete = pick(&found, layout, fields, &[MEASURED]).is_ok();
         }
         if complete {
             let named = layout.section.topic.is_some();
@@ -207,12 +226,26 @@ fn survey(
     Ok(found)
 }
 
-/// Chooses among the topics; else what is wrong and what to do.
-fn pick(
-    found: &[TopicCandidate],
+/// The topics that hold the channels of a robot.
+struct Holding<'c> {
+    /// Positions and torques in one message.
+    both: Option<&'c TopicCandidate>,
+    positions: Option<&'c TopicCandidate>,
+    torques: Option<&'c TopicCandidate>,
+}
+
+/// What counts as held.
+type Counted = fn(&Shown) -> Channels;
+const MEASURED: Counted = |shown| shown.measured;
+const NAMED: Counted = |shown| shown.named;
+
+/// The one topic that holds each of the channels; an error where several do.
+fn holding<'c>(
+    found: &'c [TopicCandidate],
     layout: &Layout,
     fields: &RobotFields,
-) -> Result<Choice, (String, String)> {
+    counted: Counted,
+) -> Result<Holding<'c>, (String, String)> {
     let asked = &layout.section;
     let one = |holds: &dyn Fn(&TopicCandidate) -> bool, key: &str, what: &str| {
         let mut holding = found.iter().filter(|c| holds(c));
@@ -237,7 +270,7 @@ fn pick(
     let both = match separate {
         true => None,
         false => one(
-            &|c| c.shown.both && is(c, &asked.topic),
+            &|c| counted(&c.shown).both && is(c, &asked.topic),
             key,
             match fields.torques.is_empty() {
                 true if layout.temperatures => "temperatures",
@@ -246,20 +279,49 @@ fn pick(
             },
         )?,
     };
-    let (first, second) = match both {
-        Some(candidate) => (candidate, None),
-        None => {
-            let q = |c: &TopicCandidate| c.shown.positions && is(c, &asked.topic);
-            let tau = |c: &TopicCandidate| c.shown.torques && is(c, &asked.torque_topic);
-            let q = one(&q, key, "positions")?;
-            let tau = one(&tau, "torque_topic", "torques")?;
-            match (q, tau) {
-                (Some(q), Some(tau)) => (q, Some(tau)),
-                (q, _) => return Err(missing(found, layout, fields, q)),
+    let (mut positions, mut torques) = (None, None);
+    if both.is_none() {
+        let q = |c: &TopicCandidate| counted(&c.shown).positions && is(c, &asked.topic);
+        let tau = |c: &TopicCandidate| counted(&c.shown).torques && is(c, &asked.torque_topic);
+        positions = one(&q, key, "positions")?;
+        torques = one(&tau, "torque_topic", "torques")?;
+    }
+    Ok(Holding {
+        both,
+        positions,
+        torques,
+    })
+}
+
+/// Chooses among the topics by the first of these that counts enough; else what is wrong and what to do.
+fn pick(
+    found: &[TopicCandidate],
+    layout: &Layout,
+    fields: &RobotFields,
+    counted: &[Counted],
+) -> Result<Choice, (String, String)> {
+    let mut positions = None;
+    for counted in counted {
+        let found = holding(found, layout, fields, *counted)?;
+        let (first, second) = match (found.both, found.positions, found.torques) {
+            (Some(both), ..) => (both, None),
+            (None, Some(q), Some(tau)) => (q, Some(tau)),
+            (None, q, _) => {
+                positions = q;
+                continue;
             }
-        }
-    };
-    let (time, notes) = time_source(first, second, asked.stamp)?;
+        };
+        return choice(first, second, layout.section.stamp);
+    }
+    Err(missing(found, layout, fields, positions))
+}
+
+fn choice(
+    first: &TopicCandidate,
+    second: Option<&TopicCandidate>,
+    stamp: Stamp,
+) -> Result<Choice, (String, String)> {
+    let (time, notes) = time_source(first, second, stamp)?;
     Ok(Choice {
         topic: first.name.clone(),
         torque_topic: second.map(|c| c.name.clone()),

@@ -1,7 +1,9 @@
 //! Tables whose rows or cells hold more than one number a column: a row for each joint, lists in cells.
 
 use super::line::{Line, Parting};
+use super::number;
 use super::table::is_datum;
+use crate::log::time::Instant;
 use crate::log::{LogError, escape};
 
 /// Rows that are looked at.
@@ -35,6 +37,17 @@ fn python(name: &str) -> String {
     format!(
         "'{}'",
         escape(name).replace(['\'', '"', '\\', '`', '$'], "_")
+    )
+}
+
+/// Whether a field is a later time than another one: a greater number or a later date.
+fn is_later(field: &str, before: &str) -> bool {
+    let [field, before] = [field, before].map(str::as_bytes);
+    let numbers = number::parse(field).zip(number::parse(before));
+    let dates = || Instant::parse_iso(field).zip(Instant::parse_iso(before));
+    numbers.map_or_else(
+        || dates().is_some_and(|(date, before)| date > before),
+        |(number, before)| number > before,
     )
 }
 
@@ -101,11 +114,14 @@ fn row_of_each_joint(file: &str, header: &[String], rows: &[Vec<&str>]) -> Optio
     if count < 2 || rows.len() < 3 * count || !(0..count - 1).all(apart) {
         return None;
     }
-    // the time is the first column of numbers that all rows of a round share
+    // the time is the first column of numbers that all rows of a round share, and that increases from round to round
     let rounds = || rows.chunks_exact(count).take(20);
     let shared = |at: &usize| {
         is_datum(first[*at])
             && rounds().all(|round| round.iter().all(|row| row[*at] == round[0][*at]))
+            && rounds()
+                .zip(rounds().skip(1))
+                .all(|(round, next)| is_later(next[0][*at], round[0][*at]))
     };
     let same_names = rounds().all(|round| round.iter().zip(rows).all(|(a, b)| a[text] == b[text]));
     let time = (0..header.len()).find(shared).filter(|_| same_names)?;
@@ -169,5 +185,10 @@ mod tests {
             .map(|k| format!("{k},{},1.5\n", ["a", "b", "c"][k % 3]))
             .collect();
         assert_eq!(refused(&format!("t,state,q\n{words}")), None);
+        // nor is a table whose only times are those of each row, beside a number that stands still or goes back and forth
+        let words: String = (0..9)
+            .map(|k| format!("{},{k},{}\n", ["a", "b", "c"][k % 3], k / 3 % 2))
+            .collect();
+        assert_eq!(refused(&format!("state,t,q\n{words}")), None);
     }
 }

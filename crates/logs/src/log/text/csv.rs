@@ -16,7 +16,7 @@ use crate::log::{LogError, escape, source};
 use cft_ident_core::number::beyond;
 
 pub(super) struct TextFile {
-    path: PathBuf,
+    pub(super) path: PathBuf,
     reader: Records,
     record: Record,
     previous: Record,
@@ -315,6 +315,11 @@ impl TextFile {
             None => self.record.get(column),
             Some(runs) => self.record.get(*runs.get(column)?),
         }
+    }
+
+    /// Whether the rows arrive while they are read.
+    pub(super) fn is_stream(&self) -> bool {
+        self.watch.is_some()
     }
 
     /// Whether nothing stands in a column of the current row.

@@ -173,9 +173,10 @@ mod tests {
             let (listed, names) = ListedJoints::find(&header, &row).unwrap();
             assert!(names[3].ends_with("position.wrist") && names[4].ends_with("position.elbow"));
             assert_eq!(names[5], header[5]);
-            let places = listed.places(6, &["elbow", "wrist"]);
+            let places = listed.places(6, &["0.2", "elbow", "wrist", "2.5", "1.5", "7"]);
             assert_eq!(places, Some(vec![0, 1, 2, 4, 3, 5]));
-            assert_eq!(listed.places(6, &["elbow", "hand"]), None);
+            let other = listed.places(6, &["0.2", "elbow", "hand", "2.5", "1.5", "7"]);
+            assert_eq!(other, None);
         }
         let header = owned("t,name.0,name.1,position.0,position.1");
         assert_eq!(

@@ -26,6 +26,8 @@ use cft_ident_core::number::is_usable;
 
 /// A time of day that leaps back by more than this has passed midnight [s].
 const HALF_A_DAY_S: f64 = 43_200.0;
+/// Rows at the beginning of a log that show whether its channels have rows of their own.
+const LOOKED_AT: usize = 10_000;
 
 #[derive(Debug, Clone, Copy)]
 struct TimeColumn {
@@ -47,6 +49,8 @@ pub(super) struct TextRows {
     strictness: Strictness,
     /// The last time of day, and the days that have passed.
     of_day: (Option<Instant>, u32),
+    /// What the log was opened by, to look at its beginning again.
+    asked: Layout,
 }
 
 impl TextRows {
@@ -62,6 +66,7 @@ impl TextRows {
             at: format!("{}:{}", file.file(), file.header_line),
             names: &file.header,
         };
+        let asked = layout.clone();
         let layout = choose(header.names, layout);
         let (columns, refused) = match (header.columns(&layout), strictness) {
             (Ok(columns), _) => (columns, None),
@@ -75,6 +80,7 @@ impl TextRows {
             strictness,
             columns,
             of_day: (None, 0),
+            asked,
         };
         if let Some(time) = rows.columns.time {
             rows.set_time(time.index, time.factor);
@@ -232,17 +238,45 @@ impl LogRows for TextRows {
 }
 
 impl TextRows {
+    /// Whether positions and torques have rows of their own at the beginning of the log, and fewer rows hold both.
+    fn takes_turns(&self) -> bool {
+        let path = &self.file.path;
+        let opened = || TextFile::open(path, Content::open(path)?, &self.asked, Strictness::Record);
+        // what arrives on a stream cannot be read again
+        let Some(mut file) = (!self.file.is_stream()).then(opened).and_then(Result::ok) else {
+            return false;
+        };
+        let (mut positions, mut torques, mut both) = (0_usize, 0_usize, 0_usize);
+        for _ in 0..LOOKED_AT {
+            if !file.next().unwrap_or(false) {
+                break;
+            }
+            match self.holds(&file) {
+                [true, true] => both += 1,
+                [true, false] => positions += 1,
+                [false, true] => torques += 1,
+                [false, false] => {}
+            }
+        }
+        positions.min(torques) > 0 && both < positions + torques
+    }
+
+    /// Whether anything stands in the columns of positions and of torques of the current row of a file.
+    ///
+    /// Cells are empty, and no numbers that are none, where a table of two topics has a row of the other one.
+    fn holds(&self, file: &TextFile) -> [bool; 2] {
+        let any = |columns: &[ScaledColumn]| columns.iter().any(|c| !file.is_empty_cell(c.index));
+        [any(&self.columns.positions), any(&self.columns.torques)]
+    }
+
     /// Why a field of the current row cannot be used: nothing stands there, or all of its kind have another clock.
     #[cold]
     fn unusable(&self, index: usize) -> LogError {
-        // empty cells, not numbers that are none: a table of two topics has them where the other topic has its row
-        let blank =
-            |columns: &[ScaledColumn]| columns.iter().all(|c| self.file.is_empty_cell(c.index));
-        let (positions, torques) = (&self.columns.positions, &self.columns.torques);
-        let (Some(q), Some(time)) = (positions.first(), self.time) else {
+        let (Some(q), Some(time)) = (self.columns.positions.first(), self.time) else {
             return self.file.no_number(index);
         };
-        if torques.is_empty() || blank(positions) == blank(torques) {
+        let [positions, torques] = self.holds(&self.file);
+        if self.columns.torques.is_empty() || positions == torques || !self.takes_turns() {
             return self.file.no_number(index);
         }
         let name = |at: usize| escape(&self.names()[at]).replace(['\'', '"', '`', '$', '\\'], "_");

@@ -165,12 +165,13 @@ mod tests {
     #[test]
     fn every_number_is_listed_with_its_path_and_the_names_beside_it() {
         let listed = of_tree(&tree(&parsed(MESSAGE).unwrap()));
-        for pair in [
-            ("arm.position[name=b]", "arm.position.b"),
-            ("joints[1].q", "joints.y.q"),
+        for (path, label, expected) in [
+            ("arm.position[name=b]", "arm.position.b", Value::Float(2.5)),
+            ("joints[id=y].q", "joints.y.q", Value::Int(7)),
         ] {
             let mut pairs = listed.iter().map(|leaf| (&*leaf.path, &*leaf.label));
-            assert!(pairs.any(|leaf| leaf == pair), "{listed:?}");
+            assert!(pairs.any(|leaf| leaf == (path, label)), "{listed:?}");
+            assert_eq!(value(&[path]), expected, "{path}");
         }
     }
 

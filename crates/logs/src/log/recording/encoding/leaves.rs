@@ -50,12 +50,13 @@ pub(super) fn placed(tree: &Tree, path: &FieldPath) -> Option<FieldPath> {
                 elements.get(*index)?
             }
             (PathStep::Named { list, value }, Tree::Elements(elements)) => {
-                let beside = lists.iter().rev().find(|(name, _)| name == list);
-                let beside =
-                    beside.and_then(|(_, names)| names.iter().position(|own| own == value));
                 let own =
                     |element: &Tree| own_name(element) == Some((list.as_str(), value.as_str()));
-                let index = beside.or_else(|| elements.iter().position(own))?;
+                let beside = || {
+                    let (_, names) = lists.iter().rev().find(|(name, _)| name == list)?;
+                    names.iter().position(|name| name == value)
+                };
+                let index = elements.iter().position(own).or_else(beside)?;
                 steps.push(PathStep::Index(index));
                 elements.get(index)?
             }
