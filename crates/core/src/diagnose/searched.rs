@@ -109,7 +109,7 @@ impl PreparedCase<'_> {
         let model = &self.fitted.model;
         let (mut candidates, not_tried) = candidates(model, self.case, &self.cover);
         let mut summed = self.summed(model.clone(), &candidates, &[])?;
-        if !determines_some(&summed.sums, &summed.declared) && !self.case.kept.is_some() {
+        if !determines_some(&summed.sums, &summed.declared) && self.case.kept.is_none() {
             return Err(self.nothing_determined());
         }
         let field = self.field(&candidates, &summed);

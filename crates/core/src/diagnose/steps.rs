@@ -263,7 +263,8 @@ impl Judging<'_> {
             return 0.0;
         };
         let s = verified.amplitude.s;
-        let sure = s > self.field.numbers().confirmed || self.prepared.case.kept.is_some() && s > 0.0;
+        let sure =
+            s > self.field.numbers().confirmed || self.prepared.case.kept.is_some() && s > 0.0;
         match (way.accepted, effect.law.entry.measurable) {
             (true, _) => 1.0,
             (false, false) => s,
@@ -461,7 +462,7 @@ impl Judging<'_> {
         let s = amplitude.s;
         let [torque, std] = amplitude.torque;
         // what one would not notice is not named, whatever else speaks against it
-        let small = !verified.beside.noticeable && !self.prepared.case.kept.is_some();
+        let small = !verified.beside.noticeable && self.prepared.case.kept.is_none();
         let left = way.left.map(|left| match left {
             NotWritten::Unsure | NotWritten::Bound if small => NotWritten::Small,
             left => left,

@@ -118,9 +118,13 @@ mod tests {
         let mut with = Accumulator::new(rates, 0.1);
         for k in 0..4000 {
             let k = f64::from(k);
-            let [v, mut a, slope, bend] = motion(k * STEP);
-            // the motor stands before its link by what the inertia's torque turns the drive
-            a += soft * STEP * STEP * (bend + truth[1] / truth[0] * slope);
+            let [v, a, slope, bend] = motion(k * STEP);
+            // the motor stands before its link by what the torque over the inertia turns the drive
+            let (by, damped) = (soft * STEP * STEP, truth[1] / truth[0]);
+            let (v, a) = (
+                v + by * (slope + damped * a),
+                a + by * (bend + damped * slope),
+            );
             let rate = (torque(k + 1.0) - torque(k - 1.0)) / 2.0;
             plain.add(0, STEP, &[a, v, torque(k), torque(k)]);
             let bend = torque(k + 1.0) - 2.0 * torque(k) + torque(k - 1.0);

@@ -44,13 +44,17 @@ fn a_filter_is_linear() {
 }
 
 #[test]
-fn a_constant_passes_and_what_is_added_to_a_signal_is_added_to_its_output() {
+fn a_constant_passes_with_the_gain_at_0_and_what_is_added_to_a_signal_is_added_to_its_output() {
     for filter in filters() {
         let x: Vec<f64> = (0..900).map(|k| signal(k, 2)).collect();
         let lifted: Vec<f64> = x.iter().map(|x| x + 7.0).collect();
         let [x, lifted] = [x, lifted].map(|of| filtered(&filter, of));
-        let expected: Vec<f64> = x.iter().map(|x| x + 7.0).collect();
+        // one of even order that ripples is at the bottom of its ripple at frequency 0
+        let gain = filter.sos().gain(0.0, RATE).powi(2);
+        let expected: Vec<f64> = x.iter().map(|x| x + 7.0 * gain).collect();
         alike(&lifted, &expected, 1e-10);
+        let constant = filtered(&filter, vec![7.0; 900]);
+        alike(&constant, &[7.0 * gain; 900], 1e-10);
     }
 }
 
