@@ -38,7 +38,7 @@ one() {
     fi
     while IFS= read -r next; do
       # a search takes logs that are long enough to fit
-      case $next in *" --search"*) next=${next//LOG/$log} ;; *) next=${next//LOG/$held} ;; esac
+      case $next in *" --search"* | *" --holdout "*) next=${next//LOG/$log} ;; *) next=${next//LOG/$held} ;; esac
       next=${next//ROBOT.toml/$robot}
       queue+=("$next")
     done < <(proposed < said)

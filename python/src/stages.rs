@@ -225,6 +225,7 @@ pub fn validate(
             found: &found,
             limit: None,
             given: &provenance,
+            next: "cft_ident.diagnose(model, [fitted], holdout=[log])",
         });
         Ok(shown(&document.map_err(of_input)?, &report))
     })

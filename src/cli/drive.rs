@@ -19,8 +19,8 @@ use cft_ident_report::report::stages::drive as words;
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident drive rig/*.json -o servo.toml --holdout-where kp=16 --report servo.html
-  cft-ident drive walk.csv -r robot.toml --command 'q_des_*' --kp 20 --kd 1.5 -o legs.toml
+  cft-ident drive rig/*.json -o servo.toml --holdout-where kp=16
+  cft-ident drive walk.csv -r a.toml --command 'q_des_*' --kp 20 -o legs.toml
   cft-ident drive arm/*/ --joints pan,lift,elbow -o arm.toml";
 
 /// Find armature, friction, delay and limits of servos or legs from commanded and measured positions.

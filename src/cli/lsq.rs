@@ -160,11 +160,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
 /// Logs as a shell takes them; of many, and of reduced ones, which hold no rows to diagnose, a word.
 fn typed_logs(logs: &[LogSpec]) -> String {
-    if logs.len() > MAX_LOGS_ON_LINE || logs.iter().any(|log| identify::is_reduced(&log.path)) {
+    if logs.len() > typed::MAX_LOGS || logs.iter().any(|log| identify::is_reduced(&log.path)) {
         return "LOG".to_owned();
     }
     typed::logs(logs.iter().map(LogSpec::to_string))
 }
-
-/// Logs that a line has room for.
-const MAX_LOGS_ON_LINE: usize = 3;

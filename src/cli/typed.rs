@@ -44,6 +44,9 @@ pub(super) fn line(arguments: &[OsString]) -> String {
     words.join(" ")
 }
 
+/// Logs that a line has room for.
+pub(super) const MAX_LOGS: usize = 3;
+
 pub(super) fn logs(all: impl Iterator<Item = String>) -> String {
     all.map(|log| quoted(&log)).collect::<Vec<_>>().join(" ")
 }

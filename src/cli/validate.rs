@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::{
     CliError, Context, Outcome, arguments, columns_of, files, logs, names_of, outputs, paths_of,
-    pictures, written,
+    pictures, typed, written,
 };
 use cft_ident_core::number;
 use cft_ident_core::validate::{JointError, Reconstructed, TorqueErrors};
@@ -158,6 +158,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let names = names_of(&args.logs);
     let document = Document::new("validate", &found.inputs, &found.warnings, &found)?;
+    let model_path = typed::quoted(&args.model.to_string_lossy());
+    let unseen = args
+        .logs
+        .iter()
+        .filter(|log| !identify::is_reduced(&log.path));
+    let unseen = unseen.take(typed::MAX_LOGS);
+    let unseen: String = unseen
+        .map(|log| format!(" --holdout {}", typed::quoted(&log.to_string())))
+        .collect();
+    let next = format!("cft-ident diagnose LOG -m {model_path}{unseen}");
     let of = stages::validate::Validate {
         machine: &machine,
         file,
@@ -166,6 +176,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         found: &found,
         limit: args.max_relative_error,
         given: &given.provenance,
+        next: &next,
     };
     let mut report = stages::validate::validate(&of);
     if let Some(found) = &found.open_loop {

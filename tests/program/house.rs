@@ -88,7 +88,7 @@ const DOORS: &[(&str, &str)] = &[
     ("rusqlite", "log/recording/format/bag.rs"),
     (
         "flate2",
-        "log/content.rs|log/table/zip.rs|log/table/mat.rs|output/log.rs",
+        "log/content.rs|log/table/zip.rs|log/table/mat.rs|output/log.rs|identify/reduced/file.rs",
     ),
     ("parquet", "log/table/parquet.rs|output/parquet.rs"),
     ("zstd", "log/content.rs|output/log.rs"),

@@ -191,3 +191,68 @@ fn errors_know_what_they_are_about() {
     assert_eq!(none.err().unwrap().kind(), ErrorKind::Usage);
     assert!(Log::of_rows("screw", &t, &q, &tau[1..]).is_err());
 }
+
+#[test]
+fn torques_of_a_controller_give_what_a_column_of_them_gives_and_its_faults_are_named() {
+    let [t, q, tau] = motion();
+    let [kp, kd] = [400.0, 30.0];
+    let waves = [(0.1, 2.1), (0.02, 7.3)];
+    let speed = |t: f64| -> f64 { waves.iter().map(|(a, w)| a * w * (w * t).cos()).sum() };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("screw.csv");
+    let mut text = "t,x,vx,x_goal,force\n".to_owned();
+    for ((t, q), tau) in t.iter().zip(&q).zip(&tau) {
+        let goal = q + (tau + kd * speed(*t)) / kp;
+        writeln!(text, "{t:?},{q:?},{:?},{goal:?},{tau:?}", speed(*t)).unwrap();
+    }
+    std::fs::write(&path, &text).unwrap();
+    let with = |torque: &str, columns: &str| {
+        let text =
+            format!("{ROBOT}\n[log]\n{torque}\n[log.joint.q1]\nposition = \"x\"\n{columns}\n");
+        let file = RobotFile::parse("screw.toml", &text).map_err(|error| error.to_string())?;
+        let robot = LoggedRobot::new("screw.toml", file);
+        let log: Log = LogSpec::whole(&path).into();
+        let data = Dataset::new(&robot, &[log]);
+        lsq(&data, &LsqSettings::default(), &Control::default()).map_err(|error| error.to_string())
+    };
+    let plain = with("", "velocity = \"vx\"\ntorque = \"force\"").unwrap();
+    let own = "velocity = \"vx\"\nreference = \"x_goal\"";
+    for (torque, columns) in [
+        (
+            "torque = { pd = [400.0, 30.0], command = \"x_goal\" }",
+            "velocity = \"vx\"",
+        ),
+        ("torque = { pd = [[400.0, 30.0]] }", own),
+    ] {
+        let found = with(torque, columns).unwrap();
+        for (a, b) in found.unknowns.iter().zip(&plain.unknowns) {
+            assert!(
+                (a.fitted - b.fitted).abs() < 1e-6 * b.fitted.abs().max(1.0),
+                "{torque}"
+            );
+        }
+    }
+    let commanded = |pd: &str| format!("torque = {{ pd = {pd}, command = \"x_goal\" }}");
+    for (torque, columns, words) in [
+        (commanded("[400.0, 30.0]"), "", "has none"),
+        (commanded("[0.0, 30.0]"), own, "kp above 0"),
+        (
+            commanded("[[1.0, 1.0], [1.0, 1.0]]"),
+            own,
+            "a list of 1 such",
+        ),
+        (
+            "torque = { pd = [1.0, 0.0] }".to_owned(),
+            "",
+            "names no command",
+        ),
+        (
+            commanded("[1.0, 0.0]"),
+            "torque = \"force\"",
+            "keep one of the two",
+        ),
+    ] {
+        let message = with(&torque, columns).unwrap_err();
+        assert!(message.contains(words), "{torque}: {message}");
+    }
+}

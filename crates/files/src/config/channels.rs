@@ -8,8 +8,8 @@ use cft_ident_core::robot::cft::actuation::ENCODER_SCALE;
 use cft_ident_core::robot::cft::{COORDINATES, Setup, pantograph};
 use cft_ident_core::robot::tree::MOST_JOINTS;
 use cft_ident_logs::log::{
-    ActuatorChannels, Channel, ChannelChoice, Conversion, DeclaredChannels, JointChannels, Layout,
-    LogSection, PositionUnit, TorqueUnit, channel,
+    ActuatorChannels, Channel, ChannelChoice, ControllerTorque, Conversion, DeclaredChannels,
+    JointChannels, Layout, LogSection, PositionUnit, TorqueUnit, channel,
 };
 
 impl RobotFile {
@@ -193,12 +193,45 @@ impl RobotFile {
             )
             .said(given.torque_unit.is_some(), given.torque_scale);
         }
+        if let Some(asked) = &self.log.torque {
+            let named = self.commands(asked, robot.joint_names());
+            for ((torque, position), (column, key)) in
+                layout.torques.iter_mut().zip(&layout.positions).zip(named)
+            {
+                *torque = Channel {
+                    wrap: None,
+                    column,
+                    key: Some(key),
+                    ..position.clone()
+                };
+            }
+            layout.conversion = asked.pd.of(layout.torques.len()).map(of_controller);
+        }
         if !self.log.gears.is_empty() {
             let offsets = layout.positions.iter_mut();
             let offsets = offsets.map(|channel| std::mem::take(&mut channel.offset));
             layout.conversion = through_gears(&self.log.gears, offsets.collect());
         }
         layout
+    }
+
+    /// Columns of the commands of joints, and the keys that name them.
+    fn commands(&self, asked: &ControllerTorque, joints: &[String]) -> Vec<(String, String)> {
+        let of_joint = |joint: &String| match &asked.command {
+            Some(command) => (
+                command.replace("{joint}", joint),
+                "[log] torque.command".to_owned(),
+            ),
+            None => {
+                let own = self.log.joint.get(joint);
+                let reference = own.and_then(|own| own.reference.clone());
+                (
+                    reference.map_or(String::new(), |column| column.0),
+                    format!("[log.joint.{joint}] reference"),
+                )
+            }
+        };
+        joints.iter().map(of_joint).collect()
     }
 
     fn actuator_layout(&self) -> Layout {
@@ -265,6 +298,23 @@ fn to_joint_side(setup: Setup) -> Conversion {
         // A log that is read without torques has no volts either.
         if let Ok(volts) = <[f64; 4]>::try_from(&*torques) {
             torques.copy_from_slice(&setup.volts_to_torques(&q, &volts));
+        }
+        true
+    })
+}
+
+/// Commands in the places of torques to the torques that a controller with these gains asked for; it cannot where
+/// velocities are wanted and the log has none.
+fn of_controller(gains: Vec<[f64; 2]>) -> Conversion {
+    Conversion::new(move |positions, torques, velocities| {
+        for (j, torque) in torques.iter_mut().enumerate() {
+            let [kp, kd] = gains[j];
+            let damped = match velocities.get(j) {
+                Some(velocity) => kd * velocity,
+                None if kd == 0.0 => 0.0,
+                None => return false,
+            };
+            *torque = kp * (*torque - positions[j]) - damped;
         }
         true
     })

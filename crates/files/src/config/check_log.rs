@@ -6,6 +6,7 @@ use super::ConfigError;
 use super::channels::gear_matrix;
 use super::document::Document;
 use super::robot_file::{ModelKind, RobotFile};
+use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::COORDINATES;
 use cft_ident_logs::log::{
@@ -25,6 +26,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
         ));
     }
     gears(file, document)?;
+    controller(file, document)?;
     foreign_effort(file, document)?;
     // Which key reads which column: no column may be read twice.
     let mut columns: BTreeMap<&str, String> = BTreeMap::new();
@@ -76,6 +78,59 @@ fn foreign_effort(file: &RobotFile, document: &Document) -> Result<(), ConfigErr
         return Err(document.missing(
             &["log", "torque_is"],
             "what the messages hold as torque or effort: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
+        ));
+    }
+    Ok(())
+}
+
+/// `[log] torque`: gains of every joint, a column of each command, and no other torque beside.
+fn controller(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+    let Some(asked) = &file.log.torque else {
+        return Ok(());
+    };
+    let joints = file.joint_names();
+    let usable = |[kp, kd]: &[f64; 2]| is_usable(*kp) && *kp > 0.0 && is_usable(*kd) && *kd >= 0.0;
+    let gains = asked.pd.of(joints.len());
+    if !gains.is_some_and(|gains| gains.iter().all(usable)) {
+        let remedy = format!(
+            "give [kp, kd] for all joints or a list of {} such pairs, kp above 0 and kd not below 0",
+            joints.len()
+        );
+        return Err(document.value(&["log", "torque"], "has gains that cannot be used", &remedy));
+    }
+    if !file.log.gears.is_empty() || file.robot.model == ModelKind::Cft {
+        return Err(document.value(
+            &["log", "torque"],
+            "is of a controller of joints, and this log is of motors or actuators",
+            "log positions and commands of the joints",
+        ));
+    }
+    for joint in &joints {
+        let own = file.log.joint.get(joint);
+        let named = own.is_some_and(|own| own.reference.is_some());
+        if asked.command.is_none() && !named {
+            let remedy = "name the column of the command: `command = \"q_des_{joint}\"`";
+            return Err(document.value(&["log", "torque"], "names no command", remedy));
+        }
+        if let Some(own) = own
+            && (own.torque.is_some() || own.torque_unit.is_some() || own.torque_scale.is_some())
+        {
+            return Err(document.value(
+                &["log", "joint", joint, "torque"],
+                "stands beside [log] torque, by which torques are those of the controller",
+                "keep one of the two",
+            ));
+        }
+    }
+    if asked
+        .command
+        .as_ref()
+        .is_some_and(|c| joints.len() > 1 && !c.contains("{joint}"))
+    {
+        return Err(document.value(
+            &["log", "torque", "command"],
+            "is one column for several joints",
+            "write {joint} where the name of the joint stands",
         ));
     }
     Ok(())

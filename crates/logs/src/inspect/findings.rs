@@ -116,7 +116,7 @@ pub struct Findings {
     /// Torques that are exactly 0 in motion, by the places of their channels: from, to [s].
     #[serde(skip)]
     pub off: Vec<(usize, [f64; 2])>,
-    /// Rows for which each sample was held.
+    /// Rows for which a sample was held at most.
     #[serde(skip)]
     pub held: Option<usize>,
     /// Rows lie evenly though their stamps do not.

@@ -69,7 +69,7 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     let (from, to) = (begin.from, end.to);
     let first = judge.clock.first.unwrap_or(0.0);
     let remedy = "log each sample of the robot once, by the robot's own clock";
-    if let Some(rows) = judge.repeats.hold(stale.moving) {
+    if let Some((rows, longest)) = judge.repeats.hold(stale.moving) {
         let repeated = judge.repeats.repeated();
         let effect = format!(
             "{:.0} % of the rows repeat positions and torques of the row before: samples are held for about {rows} rows, so that there is one every {}; only fresh rows are used",
@@ -82,7 +82,7 @@ fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             ..LogFault::whole(Warning, kind, to_s, effect, remedy)
         });
         if draft.acts((Warning, kind, None)) {
-            draft.found.held = Some(rows);
+            draft.found.held = Some(longest);
         }
         return;
     }

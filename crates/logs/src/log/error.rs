@@ -259,6 +259,13 @@ pub enum LogError {
         /// x_c1..x_c4 [m, m, rad, m].
         positions: String,
     },
+    /// A damping without velocities.
+    #[explain(
+        "{at}: the damping of the controller, kd in [log] torque, acts on velocities and this log has none",
+        "name the columns of the velocities, `velocity = ..` in [log.joint]",
+        "or give kd = 0, if the controller had no damping"
+    )]
+    NoVelocities { at: String },
     /// A line or a quoted field without an end.
     #[explain(
         "{at}: a line or a quoted field is longer than {limit} bytes",

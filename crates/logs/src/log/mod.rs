@@ -51,8 +51,8 @@ pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
 pub use recording::{CdrReader, StateGroup, TopicFacts, Value};
 pub use section::{
-    ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection, RowFault,
-    Stamp, TimeUnit, TorqueIs, TorqueSign,
+    ActuatorChannels, ChannelChoice, ColumnName, ControllerGains, ControllerTorque, Delimiter,
+    JointChannels, LogSection, RowFault, Stamp, TimeUnit, TorqueIs, TorqueSign,
 };
 pub use shared::shares_rows;
 pub use source::{DataRole, Provenance, begins_with, sha256};

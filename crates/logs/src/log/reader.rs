@@ -121,7 +121,7 @@ impl Reader {
         self.stale.keep = mending.keep_repeats;
     }
 
-    /// Rows for which each sample was held, in a log that repeats most of its rows while the robot
+    /// Rows for which a sample was held at most, in a log that repeats most of its rows while the robot
     /// moves; call it after the last block.
     pub fn hold(&self) -> Option<usize> {
         self.stale.hold()
@@ -358,9 +358,13 @@ impl Reader {
         if let Some(conversion) = &self.pass.layout.conversion
             && !conversion.apply(q, tau, &mut block.dq[at_dq..])
         {
-            return Err(LogError::NoPose {
-                at: self.pass.rows.place(),
-                positions: format!("{q:?}"),
+            let at = self.pass.rows.place();
+            return Err(match self.pass.layout.section.torque {
+                Some(_) => LogError::NoVelocities { at },
+                None => LogError::NoPose {
+                    at,
+                    positions: format!("{q:?}"),
+                },
             });
         }
         let same = || block.repeats_beside_positions();

@@ -222,6 +222,36 @@ pub struct ActuatorChannels {
     pub volts_scale: Option<f64>,
 }
 
+/// `[log] torque`: the torque that a controller of positions asked of a torque drive, kp (command - q) - kd dq.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ControllerTorque {
+    /// Stiffness and damping, `[kp, kd]` \[Nm/rad, Nm s/rad or N/m, N s/m\]: one pair for all joints, or one of each.
+    pub pd: ControllerGains,
+    /// Column of the commanded position, in which `{joint}` stands for the name of the joint; in the unit, sign and
+    /// scale of the position. `reference` of `[log.joint.NAME]` where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub command: Option<String>,
+}
+
+/// Stiffness and damping.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ControllerGains {
+    OfAll([f64; 2]),
+    OfEach(Vec<[f64; 2]>),
+}
+
+impl ControllerGains {
+    /// Of each of so many joints; none where another number of pairs is given.
+    pub fn of(&self, joints: usize) -> Option<Vec<[f64; 2]>> {
+        match self {
+            Self::OfAll(pair) => Some(vec![*pair; joints]),
+            Self::OfEach(pairs) => (pairs.len() == joints).then(|| pairs.clone()),
+        }
+    }
+}
+
 /// `[log] sign`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -277,6 +307,9 @@ pub struct LogSection {
     /// What the torque channel is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_is: Option<TorqueIs>,
+    /// Torques are those that a controller asked for, and not a column of their own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque: Option<ControllerTorque>,
     /// Where the sign of torques or currents comes from, whose channels hold their size alone: `lsq --static` takes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sign: Option<TorqueSign>,

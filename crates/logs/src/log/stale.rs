@@ -40,9 +40,8 @@ pub(super) struct Stale {
     pub(super) repeated: u64,
     pub(super) dropped: u64,
     pub(super) keep: bool,
-    /// Steps of a motion that goes on, and rows between them that repeat everything.
-    moving: u64,
-    held: u64,
+    /// Steps of a motion that goes on, by the rows before them that repeat everything.
+    held: [u64; MAX_STALE_ROWS + 1],
 }
 
 impl Stale {
@@ -56,11 +55,17 @@ impl Stale {
         }
     }
 
-    /// Rows for which each sample was held, where at least every other row of the motion is one that was held.
+    /// Rows for which a sample was held at most, where at least every other row of the motion is one that was held. Two
+    /// clocks hold some samples longer than others; from half as long again on it is two.
     pub(super) fn hold(&self) -> Option<usize> {
-        let held = self.moving >= MIN_MOTION_STEPS && 2 * self.held >= self.moving;
-        let rows = 1.0 + self.held as f64 / self.moving.max(1) as f64;
-        held.then(|| rows.round() as usize)
+        let runs = || self.held.iter().enumerate();
+        let steps: u64 = self.held.iter().sum();
+        let held: u64 = runs().map(|(rows, steps)| rows as u64 * steps).sum();
+        let mean = 1.0 + held as f64 / steps.max(1) as f64;
+        let one = |(rows, steps): &(usize, &u64)| **steps > 0 && 1.0 + *rows as f64 <= 1.5 * mean;
+        let longest = runs().filter(one).map(|(rows, _)| 1 + rows).max();
+        let longest = longest.unwrap_or(0).max(mean.round() as usize);
+        (steps >= MIN_MOTION_STEPS && 2 * held >= steps).then_some(longest)
     }
 
     /// Takes the next row; `same`: all but its positions repeats too. How many rows before it turn out to be stale.
@@ -87,8 +92,7 @@ impl Stale {
     fn moved(&mut self, duration: f64, q: &[f64]) -> usize {
         let goes_on = self.run <= MAX_STALE_ROWS && self.goes_on(duration, q);
         if goes_on {
-            self.moving += 1;
-            self.held += if self.whole { self.run as u64 } else { 0 };
+            self.held[if self.whole { self.run } else { 0 }] += 1;
         }
         let stale = goes_on && self.run > 0 && (self.whole || self.dropped >= KNOWN) && !self.keep;
         let joints = self.step.iter_mut().zip(&mut self.resolution);

@@ -354,7 +354,7 @@ pub fn regressor(
     let robot = &model.model.robot;
     let (n, p) = (robot.joints(), robot.parameters().len());
     let theta = |u: &Unknown| matches!(u, Unknown::Theta(_));
-    if !unknowns.list.iter().any(theta) {
+    if !unknowns.list.iter().chain(&unknowns.held).any(theta) {
         return vec![Vec::new(); n];
     }
     let samples = stretch.len();

@@ -161,12 +161,17 @@ impl Repeats {
         runs.map(|run| u64::from(run.rows)).sum()
     }
 
-    /// Rows for which each sample was held: where at least every other row of those that change is one that was held.
-    pub(crate) fn hold(&self, repeated: u64) -> Option<usize> {
+    /// Rows for which samples were held, in the mean and the longest: where at least every other row of those that
+    /// change is one that was held. Two clocks make some longer than others; from half as long again on it is two.
+    pub(crate) fn hold(&self, repeated: u64) -> Option<(usize, usize)> {
         let held = self.repeated();
         let holds = repeated >= MIN_HELD_ROWS && 2 * held >= self.changed;
-        let rows = 1.0 + held as f64 / self.changed.max(1) as f64;
-        holds.then(|| rows.round() as usize)
+        let mean = 1.0 + held as f64 / self.changed.max(1) as f64;
+        let runs = self.runs.iter().filter(|run| run.identical);
+        let rows = runs.map(|run| 1 + run.rows as usize);
+        let longest = rows.filter(|rows| *rows as f64 <= 1.5 * mean).max();
+        let mean = mean.round() as usize;
+        holds.then(|| (mean, longest.unwrap_or(mean).max(mean)))
     }
 
     /// What was found; `channels` are the joints' own, in the same order.

@@ -227,7 +227,7 @@ fn survey(
 }
 
 /// The topics that hold the channels of a robot.
-struct Holding<'c> {
+struct ChannelTopics<'c> {
     /// Positions and torques in one message.
     both: Option<&'c TopicCandidate>,
     positions: Option<&'c TopicCandidate>,
@@ -235,17 +235,17 @@ struct Holding<'c> {
 }
 
 /// What counts as held.
-type Counted = fn(&Shown) -> Channels;
-const MEASURED: Counted = |shown| shown.measured;
-const NAMED: Counted = |shown| shown.named;
+type CountedChannels = fn(&Shown) -> Channels;
+const MEASURED: CountedChannels = |shown| shown.measured;
+const NAMED: CountedChannels = |shown| shown.named;
 
 /// The one topic that holds each of the channels; an error where several do.
 fn holding<'c>(
     found: &'c [TopicCandidate],
     layout: &Layout,
     fields: &RobotFields,
-    counted: Counted,
-) -> Result<Holding<'c>, (String, String)> {
+    counted: CountedChannels,
+) -> Result<ChannelTopics<'c>, (String, String)> {
     let asked = &layout.section;
     let one = |holds: &dyn Fn(&TopicCandidate) -> bool, key: &str, what: &str| {
         let mut holding = found.iter().filter(|c| holds(c));
@@ -286,7 +286,7 @@ fn holding<'c>(
         positions = one(&q, key, "positions")?;
         torques = one(&tau, "torque_topic", "torques")?;
     }
-    Ok(Holding {
+    Ok(ChannelTopics {
         both,
         positions,
         torques,
@@ -298,7 +298,7 @@ fn pick(
     found: &[TopicCandidate],
     layout: &Layout,
     fields: &RobotFields,
-    counted: &[Counted],
+    counted: &[CountedChannels],
 ) -> Result<Choice, (String, String)> {
     let mut positions = None;
     for counted in counted {

@@ -203,8 +203,9 @@ pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head,
             false => (0, 0),
         },
     };
-    if fields.iter().all(|field| table::is_datum(field)) {
-        // numpy.savetxt puts the names into a comment.
+    let numbers = fields.iter().all(|field| table::is_datum(field));
+    if numbers || is_row(&fields, &lines, &rows, (at, parting)) {
+        // numpy.savetxt puts the names into a comment, `rostopic echo -p` does beside columns of text
         let of = |k: &usize| {
             let names = parting.split(&lines[*k].text[1..]);
             (names.len() == fields.len()).then_some((*k, names))
@@ -224,6 +225,7 @@ pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head,
                     out.table.notes.push(note);
                 }
             }
+            None if !numbers => {}
             None if layout.by_number() => out.headerless = true,
             None => {
                 let at = format!("{}:{number}", file());
@@ -251,6 +253,22 @@ pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head,
     }
     out.first_row = fields.into_iter().map(str::to_owned).collect();
     Ok(out)
+}
+
+/// Whether the first line has its numbers where the next row has them, as another row has.
+fn is_row(
+    fields: &[&str],
+    lines: &[Line<'_>],
+    rows: &[usize],
+    (at, parting): (usize, Parting),
+) -> bool {
+    let numbers = |fields: &[&str]| -> Vec<bool> {
+        fields.iter().map(|field| table::is_datum(field)).collect()
+    };
+    let own = numbers(fields);
+    let next = rows.iter().find(|row| **row > at);
+    let next = next.map(|row| numbers(&parting.split(&lines[*row].text)));
+    own.contains(&true) && next.as_ref() == Some(&own)
 }
 
 /// Whether numbers have commas for points, and none has a point.

@@ -29,6 +29,8 @@ pub struct Validate<'a> {
     pub limit: Option<f64>,
     /// The model file.
     pub given: &'a Provenance,
+    /// The command that looks for what the model lacks.
+    pub next: &'a str,
 }
 
 /// The errors, and the verdict on them.
@@ -49,9 +51,8 @@ pub fn validate(of: &Validate) -> Report {
     }
     said.write(&mut report.everywhere());
     used_before(&mut report.everywhere(), of);
-    let next =
-        "Next: find what the model lacks: `cft-ident diagnose` with this log as `--holdout`.";
-    report.everywhere().next(next, None);
+    let next = "Next: find what the model lacks, from the log that it was fitted to:";
+    report.everywhere().next(next, Some(of.next.to_owned()));
     report.terminal().line("");
     let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
     let whole = caption(logs);

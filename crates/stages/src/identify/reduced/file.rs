@@ -1,12 +1,15 @@
 //! The file of reduced logs: `.cfi`.
 //!
 //! The first bytes say what it is, then follow as little-endian numbers the format (`u32`), the length of the head
-//! and of the matrices in bytes (`u64` each); the head as JSON, the matrices, and the SHA-256 of all before it as 64
+//! and of the matrices in bytes (`u64` each); the head as deflated JSON, the matrices, and the SHA-256 of all before it as 64
 //! hexadecimal digits. One set of reduced logs gives the same bytes on every machine.
 
+use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
+use flate2::Compression;
+use flate2::read::{DeflateDecoder, DeflateEncoder};
 use serde::{Deserialize, Serialize};
 
 use super::error::ReducedError;
@@ -17,7 +20,11 @@ use cft_ident_core::motion::{Skipped, Summary};
 use cft_ident_logs::log::{Provenance, REDUCED, begins_with, escape, sha256_of_bytes};
 
 /// Number of the format.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
+/// The format before, whose head is plain JSON.
+const PLAIN_HEAD: u32 = 2;
+/// Bytes that a head may have, unpacked.
+const MAX_HEAD: u64 = 1 << 30;
 /// Hexadecimal digits of the checksum.
 const CHECKSUM: usize = 64;
 /// Bytes before the head.
@@ -140,6 +147,7 @@ impl ReducedLogs {
             file: "the reduced logs".to_owned(),
             problem: format!("a number cannot be written: {error}"),
         })?;
+        let head = packed(&head);
         let mut matrices = Vec::new();
         for log in self.logs() {
             for factors in log.readings() {
@@ -176,7 +184,7 @@ impl ReducedLogs {
         let before = bytes.get(REDUCED.len()..BEFORE);
         let before = before.ok_or_else(|| cut_off((BEFORE + CHECKSUM) as u64))?;
         let found = u32::from_le_bytes(before[..4].try_into().map_err(|_| damaged())?);
-        if found != FORMAT {
+        if ![PLAIN_HEAD, FORMAT].contains(&found) {
             return Err(ReducedError::Format {
                 file: file(),
                 found,
@@ -206,7 +214,12 @@ impl ReducedLogs {
             file: file(),
             problem,
         };
-        let head: FileHead = serde_json::from_slice(head)
+        let head = match found {
+            PLAIN_HEAD => Some(head.to_vec()),
+            _ => unpacked(head),
+        };
+        let head = head.ok_or_else(damaged)?;
+        let head: FileHead = serde_json::from_slice(&head)
             .map_err(|error| problem(format!("its head cannot be read: {error}")))?;
         let n = head.made_with.joints.len();
         let whole = |f: &FrictionGiven| [f.laws.len(), f.covariances.len()] == [n, n];
@@ -222,6 +235,22 @@ impl ReducedLogs {
             _ => Err(problem("its matrices do not belong to its head".to_owned())),
         }
     }
+}
+
+fn packed(head: &[u8]) -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut encoder = DeflateEncoder::new(head, Compression::best());
+    // memory takes all that is written
+    let _ = encoder.read_to_end(&mut out);
+    out
+}
+
+/// The head as it was; none where it cannot be unpacked or is too long.
+fn unpacked(head: &[u8]) -> Option<Vec<u8>> {
+    let mut out = Vec::new();
+    let mut decoder = DeflateDecoder::new(head).take(MAX_HEAD);
+    decoder.read_to_end(&mut out).ok()?;
+    ((out.len() as u64) < MAX_HEAD).then_some(out)
 }
 
 fn read_log(made_with: &Arc<MadeWith>, head: LogHead, rest: &mut &[u8]) -> Option<Arc<ReducedLog>> {
