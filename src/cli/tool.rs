@@ -12,7 +12,7 @@ use cft_ident_tool::tool::{ForceUnit, ToolError, ToolFile, WrenchRequest, analys
 const EXAMPLE: &str = "\
 Example:
   cft-ident tool poses.csv --wrench wrenches.csv -o tool.toml
-  cft-ident tool run.mcap --urdf arm.urdf --frame tool0 -o tool.toml --report tool.html";
+  cft-ident tool run.mcap --urdf arm.urdf --frame tool0 -o tool.toml";
 
 /// Find what hangs on a wrist force-torque sensor: bias, weight, centre of gravity, and the inertia where it moves.
 ///

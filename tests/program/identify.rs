@@ -215,7 +215,11 @@ fn torques_of_a_controller_give_what_a_column_of_them_gives_and_its_faults_are_n
         let data = Dataset::new(&robot, &[log]);
         lsq(&data, &LsqSettings::default(), &Control::default()).map_err(|error| error.to_string())
     };
-    let plain = with("", "velocity = \"vx\"\ntorque = \"force\"").unwrap();
+    let plain = with(
+        "torque_is = \"joint\"",
+        "velocity = \"vx\"\ntorque = \"force\"",
+    )
+    .unwrap();
     let own = "velocity = \"vx\"\nreference = \"x_goal\"";
     for (torque, columns) in [
         (

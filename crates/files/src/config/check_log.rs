@@ -74,7 +74,8 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
 fn foreign_effort(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let log = &file.log;
     let mapped = log.joint.values().any(|channels| channels.name.is_some());
-    if log.torque_is.is_none() && (mapped || log.torque_topic.is_some()) {
+    let foreign = log.torque.is_none() && (mapped || log.torque_topic.is_some());
+    if log.torque_is.is_none() && foreign {
         return Err(document.missing(
             &["log", "torque_is"],
             "what the messages hold as torque or effort: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
@@ -103,6 +104,17 @@ fn controller(file: &RobotFile, document: &Document) -> Result<(), ConfigError> 
             &["log", "torque"],
             "is of a controller of joints, and this log is of motors or actuators",
             "log positions and commands of the joints",
+        ));
+    }
+    if file
+        .log
+        .torque_is
+        .is_some_and(|is| is != TorqueIs::Commanded)
+    {
+        return Err(document.value(
+            &["log", "torque_is"],
+            "is another than that of [log] torque",
+            "set `torque_is = \"commanded\"`, or delete it",
         ));
     }
     for joint in &joints {
