@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use super::example::{self, ExampleMachine};
 use super::{CliError, Context};
 use cft_ident_files::config::{Campaign, RobotFile};
-use cft_ident_logs::log::LogSpec;
+use cft_ident_logs::log::{DOCUMENT, LogSpec, begins_with};
 
 /// What `identify` works on.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +38,10 @@ pub(super) fn named(
         ([], []) => Ok(Named::BuiltIn),
         ([], [first, ..]) => {
             let name = first.name();
+            if begins_with(&first.path, DOCUMENT) {
+                let problem = format!("{name}: is a JSON document of this program, not a log");
+                return Err(CliError::usage(problem).hint("give the log that it is of"));
+            }
             Err(CliError::usage(format!("{name}: a log without a robot"))
                 .hint(format!(
                     "name its URDF: cft-ident identify ROBOT.urdf {name}"

@@ -3,6 +3,7 @@
 use super::channel::InspectedChannel;
 use super::detectors::clock::{LogClock, RowStep, mean_step, typical_step};
 use super::detectors::copies::Copies;
+use super::detectors::dips::Dips;
 use super::detectors::excitation::Excitation;
 use super::detectors::failed::FailedReads;
 use super::detectors::flat::Flat;
@@ -56,6 +57,7 @@ pub(super) struct Track {
     pub(super) spikes: Spikes,
     pub(super) leaps: Leaps,
     pub(super) turns: Turns,
+    pub(super) dips: Dips,
     pub(super) excitation: Option<Excitation>,
     /// The channel with the position of the same joint.
     pub(super) position: Option<usize>,
@@ -86,6 +88,7 @@ impl Track {
             spikes: Spikes::default(),
             leaps: Leaps::default(),
             turns: Turns::default(),
+            dips: Dips::default(),
             excitation: None,
             position,
             latest: f64::NAN,
@@ -180,6 +183,9 @@ impl Track {
         self.rows += 1;
         self.low = self.low.min(value);
         self.high = self.high.max(value);
+        if self.channel.role == ChannelRole::Torque {
+            self.dips.take(value);
+        }
         // Welford 1962
         let d = value - self.mean;
         self.mean += d / self.rows as f64;

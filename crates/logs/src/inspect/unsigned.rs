@@ -10,9 +10,6 @@ use super::fault::Severity::Error;
 use super::judge::{Depth, LogJudge, Track};
 use super::words::ChannelRole;
 
-/// A size comes down to zero where its least is below this part of its greatest: the torque of a joint that always
-/// carries stays away from it.
-const DOWN_TO_ZERO: f64 = 0.02;
 /// Turns of a joint after which both directions are known.
 const REVERSALS: u64 = 2;
 /// Bits of numbers that begin anew.
@@ -59,8 +56,8 @@ pub(super) fn faults(judge: &LogJudge, draft: &mut FaultList) {
             (Depth::Whole, Some(place)) => leaps(judge, place),
             _ => None,
         };
-        let (least, most) = sizes(track);
-        let Some(cause) = cause.or((least <= DOWN_TO_ZERO * most).then_some(SignLoss::Size)) else {
+        let size = track.dips.lost_their_sign().then_some(SignLoss::Size);
+        let Some(cause) = cause.or(size) else {
             continue;
         };
         let (effect, remedy) = words(&cause, track);

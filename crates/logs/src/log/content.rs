@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use super::stream::Hashed;
 use super::{LogError, source, table};
 
+/// How the JSON documents of this program begin.
+pub const DOCUMENT: &[u8] = b"{\n  \"schema\": \"cft-ident/";
 /// First bytes of a file of reduced logs.
 pub const REDUCED: &[u8] = b"cft-ident reduced\n";
 

@@ -41,7 +41,7 @@ mod unit;
 
 pub use arrays::Arrays;
 pub use cft_ident_core::block::Block;
-pub use content::REDUCED;
+pub use content::{DOCUMENT, REDUCED};
 pub use error::LogError;
 pub use even::EvenSpacing;
 pub use layout::{Channel, Conversion, DeclaredChannels, Layout};

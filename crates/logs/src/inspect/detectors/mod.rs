@@ -2,6 +2,7 @@
 
 pub(super) mod clock;
 pub(super) mod copies;
+pub(super) mod dips;
 pub(super) mod excitation;
 pub(super) mod failed;
 pub(super) mod flat;

@@ -7,7 +7,7 @@ use super::header::HeaderLines;
 use super::line::{Line, Parting, lines_of};
 use super::listed::echo_names;
 use super::table::{self, Found};
-use crate::log::content::HEAD;
+use crate::log::content::{DOCUMENT, HEAD};
 use crate::log::layout::Layout;
 use crate::log::{LogError, source};
 
@@ -37,6 +37,11 @@ const OTHERS: &[(&[&[u8]], &str, &str)] = &[
         &[b"\xff\xfe", b"\xfe\xff"],
         "UTF-16 text",
         "save it as UTF-8: `iconv -f UTF-16 -t UTF-8 IN > OUT`",
+    ),
+    (
+        &[DOCUMENT],
+        "a JSON document of this program",
+        "give the log that it is of",
     ),
     (
         &[b"#ROSBAG V1"],
