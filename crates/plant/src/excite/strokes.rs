@@ -6,12 +6,13 @@ use cft_ident_core::effect::{backlash, presliding, smooth_coulomb};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use cft_ident_files::config::trajectory::{Coordinates, Point, PointsSection};
+use cft_ident_files::config::trajectory::{Coordinates, Point, PointsSection, Trajectory};
 
 use super::ExciteError;
 use super::from_files::place_of;
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
+use super::motion::Motion;
 
 /// Strokes from end to end, as parts of the width: two stay inside of it. Without those a gap looks like friction that
 /// begins later; without the last ones the width does not show beside the stroke.
@@ -116,16 +117,25 @@ pub fn design_strokes(
         let by_acceleration = turn * (amplitude / acceleration).sqrt();
         by_speed.max(by_acceleration).max(PERIODS / task.cutoff_hz)
     };
-    let path = Strokes::of(&amplitudes, &period);
-    let points = path.points.iter().map(|[t, x]| {
-        let mut position = pose.clone();
-        position[joint] += x;
-        Point { t: *t, position }
-    });
-    let file = PointsSection {
-        coordinates: Coordinates::Joint,
-        points: points.collect(),
+    let file_of = |path: &Strokes| {
+        let points = path.points.iter().map(|[t, x]| {
+            let mut position = pose.clone();
+            position[joint] += x;
+            Point { t: *t, position }
+        });
+        PointsSection {
+            coordinates: Coordinates::Joint,
+            points: points.collect(),
+        }
     };
+    let mut path = Strokes::of(&amplitudes, &period);
+    let mut file = file_of(&path);
+    // where one stroke goes over into the next a curve through the points is faster than either
+    let slower = slower_by(machine, joint, &file, free)?;
+    if slower > 1.0 {
+        path = Strokes::of(&amplitudes, &|amplitude| slower * period(amplitude));
+        file = file_of(&path);
+    }
     let rows = 2.0 * task.cutoff_hz;
     // the noise of a row that is the mean of its samples
     let noise = machine.noise[joint] * (rows / task.rate_hz).min(1.0).sqrt();
@@ -140,6 +150,31 @@ pub fn design_strokes(
             deviations,
         },
     })
+}
+
+/// How many times slower a motion must be to leave this share of a joint's limits of speed and acceleration.
+fn slower_by(
+    machine: &ForeseenRobot,
+    joint: usize,
+    file: &PointsSection,
+    free: f64,
+) -> Result<f64, ExciteError> {
+    let seconds = file.points.last().map_or(0.0, |last| last.t);
+    let motion = Motion::of_file(machine, &Trajectory::Points(file.clone()), seconds, 0)?;
+    let of = |quantity| BoundedQuantity::find(&machine.channels, quantity, joint).cloned();
+    let channels: Vec<BoundedQuantity> = [Quantity::Speed, Quantity::Acceleration]
+        .into_iter()
+        .filter_map(of)
+        .collect();
+    let uses = motion.usage(machine, &channels).into_iter();
+    let slower = uses.map(|of| {
+        let over = of.share / free;
+        match of.channel.quantity {
+            Quantity::Acceleration => over.sqrt(),
+            _ => over,
+        }
+    });
+    Ok(slower.fold(0.0, f64::max))
 }
 
 /// A way to and fro: times and positions, and its parts as amplitude, period and begin.

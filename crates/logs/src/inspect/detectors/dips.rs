@@ -38,6 +38,10 @@ impl Dips {
         if self.rows < 5 || b >= a || b >= size || b > DOWN_TO_ZERO * self.most {
             return;
         }
+        // between two rows zero is nearer to one of them than half of the way
+        if b > 0.5 * (a.max(size) - b) {
+            return;
+        }
         // the parabola through the three before either number goes on below zero, or turns back with the numbers
         let next = [3.0 * a - 3.0 * before + far, 3.0 * b - 3.0 * a + before];
         let edged = next.iter().any(|next| *next < -EXACT * self.most);
@@ -72,5 +76,8 @@ mod tests {
             assert!(!lost(|t| 2.0 + least - 2.0 * (4.1 * t).sin()), "{least}");
         }
         assert!(!lost(|t| 5.0 + torque(t)));
+        // noise close above zero
+        let noise = |t: f64| ((t * 1e4).sin() * 1e4).fract().abs();
+        assert!(!lost(|t| 0.02 + 0.05 * noise(t) + (0.4 * t).sin().powi(2)));
     }
 }
