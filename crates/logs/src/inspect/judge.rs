@@ -3,7 +3,7 @@
 use super::channel::InspectedChannel;
 use super::detectors::clock::{LogClock, RowStep, mean_step, typical_step};
 use super::detectors::copies::Copies;
-use super::detectors::dips::Dips;
+use super::detectors::dips::ZeroDips;
 use super::detectors::excitation::Excitation;
 use super::detectors::failed::FailedReads;
 use super::detectors::flat::Flat;
@@ -57,7 +57,7 @@ pub(super) struct Track {
     pub(super) spikes: Spikes,
     pub(super) leaps: Leaps,
     pub(super) turns: Turns,
-    pub(super) dips: Dips,
+    pub(super) dips: ZeroDips,
     pub(super) excitation: Option<Excitation>,
     /// The channel with the position of the same joint.
     pub(super) position: Option<usize>,
@@ -88,7 +88,7 @@ impl Track {
             spikes: Spikes::default(),
             leaps: Leaps::default(),
             turns: Turns::default(),
-            dips: Dips::default(),
+            dips: ZeroDips::default(),
             excitation: None,
             position,
             latest: f64::NAN,

@@ -4,27 +4,27 @@
 /// Heights of a dip that are near zero, over the greatest size so far.
 pub(crate) const DOWN_TO_ZERO: f64 = 0.02;
 
-/// Dips of the sizes of numbers that follow one another.
+/// ZeroDips of the sizes of numbers that follow one another.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Dips {
+pub(crate) struct ZeroDips {
     last: [f64; 4],
     rows: usize,
     most: f64,
-    /// Dips near zero at which the numbers go on as they came.
+    /// ZeroDips near zero at which the numbers go on as they came.
     rounded: u64,
-    /// Dips near zero at which they would go on as they came with the other sign.
+    /// ZeroDips near zero at which they would go on as they came with the other sign.
     edged: u64,
 }
 
 /// Part of the greatest size by which sums of numbers are off.
 const EXACT: f64 = 1e-12;
-/// Dips by which a sign is known to be lost. Half: one that grazes zero is taken for it; twice: slow motions are passed
+/// ZeroDips by which a sign is known to be lost. Half: one that grazes zero is taken for it; twice: slow motions are passed
 /// over.
 const MIN_DIPS: u64 = 4;
 /// Edged dips for each rounded one.
 const MIN_RATIO: u64 = 3;
 
-impl Dips {
+impl ZeroDips {
     pub(crate) fn take(&mut self, value: f64) {
         let size = value.abs();
         let [far, before, a, b] = self.last;
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     fn lost(of: impl Fn(f64) -> f64) -> bool {
-        let mut dips = Dips::default();
+        let mut dips = ZeroDips::default();
         (0..2000).for_each(|k| dips.take(of(0.004 * f64::from(k))));
         dips.lost_their_sign()
     }

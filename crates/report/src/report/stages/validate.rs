@@ -52,7 +52,10 @@ pub fn validate(of: &Validate) -> Report {
     said.write(&mut report.everywhere());
     used_before(&mut report.everywhere(), of);
     let next = "Next: find what the model lacks, from the log that it was fitted to:";
-    report.everywhere().next(next, Some(of.next.to_owned()));
+    report.terminal().next(next, Some(of.next.to_owned()));
+    // a page is the same wherever its logs lie
+    let next = "Next: find what the model lacks: diagnose the log that it was fitted to, with this one held out.";
+    report.page().next(next, None);
     report.terminal().line("");
     let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
     let whole = caption(logs);
