@@ -255,6 +255,11 @@ fn torques_of_a_controller_give_what_a_column_of_them_gives_and_its_faults_are_n
             "torque = \"force\"",
             "keep one of the two",
         ),
+        (
+            commanded("[1.0, 0.0]"),
+            "torque_sign = -1.0",
+            "keep one of the two",
+        ),
     ] {
         let message = with(&torque, columns).unwrap_err();
         assert!(message.contains(words), "{torque}: {message}");

@@ -124,11 +124,19 @@ fn controller(file: &RobotFile, document: &Document) -> Result<(), ConfigError> 
             let remedy = "name the column of the command: `command = \"q_des_{joint}\"`";
             return Err(document.value(&["log", "torque"], "names no command", remedy));
         }
-        if let Some(own) = own
-            && (own.torque.is_some() || own.torque_unit.is_some() || own.torque_scale.is_some())
-        {
+        let column = own.and_then(|own| {
+            let keys = [
+                ("torque", own.torque.is_some()),
+                ("torque_unit", own.torque_unit.is_some()),
+                ("torque_scale", own.torque_scale.is_some()),
+                ("torque_sign", own.torque_sign.is_some()),
+                ("torque_offset", own.torque_offset.is_some()),
+            ];
+            keys.into_iter().find(|(_, given)| *given)
+        });
+        if let Some((key, _)) = column {
             return Err(document.value(
-                &["log", "joint", joint, "torque"],
+                &["log", "joint", joint, key],
                 "stands beside [log] torque, by which torques are those of the controller",
                 "keep one of the two",
             ));

@@ -19,6 +19,8 @@ pub struct InspectedChannel {
     pub speed: Option<f64>,
     /// Whether a number at its limit is what was really applied: the volts of an amplifier.
     pub saturates: bool,
+    /// Whether its numbers are commands of positions, of which torques are made.
+    pub commands: bool,
     /// What a 0 of the column stands for.
     pub zero: f64,
     /// Unit of its numbers per unit of the column, so that what is to be written into a robot file
@@ -47,6 +49,7 @@ impl InspectedChannel {
             limits: None,
             speed: None,
             saturates: false,
+            commands: false,
             zero: 0.0,
             factor: 1.0,
         }

@@ -318,10 +318,12 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
         (&layout.positions, ChannelRole::Position, false),
         (&layout.torques, ChannelRole::Torque, volts),
     ];
+    let commands = layout.section.torque.is_some();
     let each = kinds.into_iter().flat_map(|(channels, role, saturates)| {
         let joints = channels.iter().zip(&layout.joints);
         joints.map(move |(channel, joint)| InspectedChannel {
             saturates,
+            commands: commands && role == ChannelRole::Torque,
             factor: channel.factor,
             zero: channel.offset,
             ..InspectedChannel::new(&channel.column, role, Some(joint), None)

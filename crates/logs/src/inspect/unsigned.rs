@@ -36,7 +36,10 @@ pub(super) fn faults(judge: &LogJudge, draft: &mut FaultList) {
         };
         judge.moves(position) && motion.reversals() >= REVERSALS
     };
-    let torque = |track: &&Track| track.channel.role == ChannelRole::Torque && track.travel() > 0.0;
+    let torque = |track: &&Track| {
+        let channel = &track.channel;
+        channel.role == ChannelRole::Torque && !channel.commands && track.travel() > 0.0
+    };
     let turned: Vec<&Track> = judge
         .tracks
         .iter()

@@ -93,6 +93,13 @@ impl Failed {
     }
 }
 
+/// Rows for which a sample is held at most, by those of each that was: two clocks hold some longer than others, and from
+/// half as long again as the mean on it is two.
+pub(crate) fn longest_hold(mean: f64, each: impl Iterator<Item = usize>) -> usize {
+    let one = each.filter(|rows| *rows as f64 <= 1.5 * mean);
+    one.fold(mean.round() as usize, usize::max)
+}
+
 /// Finds rows that repeat the one before, in a log that holds its samples.
 #[derive(Debug, Default)]
 pub(super) struct Held {

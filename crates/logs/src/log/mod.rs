@@ -66,7 +66,7 @@ pub use columns::unit_of;
 pub use content::unpacked;
 pub(crate) use even::{EvenClock, EvenFit};
 pub use layout::channel;
-pub(crate) use mend::Unwrap;
+pub(crate) use mend::{Unwrap, longest_hold};
 pub use names::{did_you_mean, is_hidden, list};
 pub(crate) use pass::round_within;
 pub(crate) use recording::{DelayEstimate, DelayEstimator};

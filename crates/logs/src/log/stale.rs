@@ -7,6 +7,8 @@
 //! there is none. In a log with many such rows, those count too whose positions alone are repeated:
 //! there the torque was read a moment later.
 
+use super::mend::longest_hold;
+
 /// Rows in succession that may be stale; a longer standstill is one.
 const MAX_STALE_ROWS: usize = 20;
 /// Steps of a joint's resolution that a motion takes from row to row, at least.
@@ -55,16 +57,14 @@ impl Stale {
         }
     }
 
-    /// Rows for which a sample was held at most, where at least every other row of the motion is one that was held. Two
-    /// clocks hold some samples longer than others; from half as long again on it is two.
+    /// Rows for which a sample was held at most, where at least every other row of the motion is one that was held.
     pub(super) fn hold(&self) -> Option<usize> {
         let runs = || self.held.iter().enumerate();
         let steps: u64 = self.held.iter().sum();
         let held: u64 = runs().map(|(rows, steps)| rows as u64 * steps).sum();
         let mean = 1.0 + held as f64 / steps.max(1) as f64;
-        let one = |(rows, steps): &(usize, &u64)| **steps > 0 && 1.0 + *rows as f64 <= 1.5 * mean;
-        let longest = runs().filter(one).map(|(rows, _)| 1 + rows).max();
-        let longest = longest.unwrap_or(0).max(mean.round() as usize);
+        let each = runs().filter(|(_, steps)| **steps > 0);
+        let longest = longest_hold(mean, each.map(|(rows, _)| 1 + rows));
         (steps >= MIN_MOTION_STEPS && 2 * held >= steps).then_some(longest)
     }
 

@@ -31,7 +31,8 @@ pub fn fit(
     (data, blocks): (&Data, &[TimeBlock]),
     weights: Option<&[f64]>,
 ) -> Result<Fitted, MotionError> {
-    let unknowns = case.unknowns();
+    // nothing is fitted to the columns of what is held
+    let unknowns = case.unknowns().without_held();
     let layout = ColumnLayout::of(&unknowns, &[]);
     let mut model = start.clone();
     let mut passes = 0;

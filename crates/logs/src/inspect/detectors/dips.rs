@@ -2,23 +2,23 @@
 //! number turned back.
 
 /// Heights of a dip that are near zero, over the greatest size so far.
-pub(crate) const DOWN_TO_ZERO: f64 = 0.02;
+const DOWN_TO_ZERO: f64 = 0.02;
 
-/// ZeroDips of the sizes of numbers that follow one another.
+/// Dips of the sizes of numbers that follow one another.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ZeroDips {
     last: [f64; 4],
     rows: usize,
     most: f64,
-    /// ZeroDips near zero at which the numbers go on as they came.
+    /// Dips near zero at which the numbers go on as they came.
     rounded: u64,
-    /// ZeroDips near zero at which they would go on as they came with the other sign.
+    /// Dips near zero at which they would go on as they came with the other sign.
     edged: u64,
 }
 
 /// Part of the greatest size by which sums of numbers are off.
 const EXACT: f64 = 1e-12;
-/// ZeroDips by which a sign is known to be lost. Half: one that grazes zero is taken for it; twice: slow motions are passed
+/// Dips by which a sign is known to be lost. Half: one that grazes zero is taken for it; twice: slow motions are passed
 /// over.
 const MIN_DIPS: u64 = 4;
 /// Edged dips for each rounded one.

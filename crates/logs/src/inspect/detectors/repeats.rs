@@ -5,6 +5,7 @@
 
 use super::flat::Flat;
 use crate::inspect::fault::Episodes;
+use crate::log::longest_hold;
 
 /// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
 const MAX_RUN_ROWS: usize = 20;
@@ -162,16 +163,14 @@ impl Repeats {
     }
 
     /// Rows for which samples were held, in the mean and the longest: where at least every other row of those that
-    /// change is one that was held. Two clocks make some longer than others; from half as long again on it is two.
+    /// change is one that was held.
     pub(crate) fn hold(&self, repeated: u64) -> Option<(usize, usize)> {
         let held = self.repeated();
         let holds = repeated >= MIN_HELD_ROWS && 2 * held >= self.changed;
         let mean = 1.0 + held as f64 / self.changed.max(1) as f64;
         let runs = self.runs.iter().filter(|run| run.identical);
-        let rows = runs.map(|run| 1 + run.rows as usize);
-        let longest = rows.filter(|rows| *rows as f64 <= 1.5 * mean).max();
-        let mean = mean.round() as usize;
-        holds.then(|| (mean, longest.unwrap_or(mean).max(mean)))
+        let longest = longest_hold(mean, runs.map(|run| 1 + run.rows as usize));
+        holds.then(|| (mean.round() as usize, longest))
     }
 
     /// What was found; `channels` are the joints' own, in the same order.

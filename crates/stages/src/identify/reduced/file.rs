@@ -1,8 +1,8 @@
 //! The file of reduced logs: `.cfi`.
 //!
 //! The first bytes say what it is, then follow as little-endian numbers the format (`u32`), the length of the head
-//! and of the matrices in bytes (`u64` each); the head as deflated JSON, the matrices, and the SHA-256 of all before it as 64
-//! hexadecimal digits. One set of reduced logs gives the same bytes on every machine.
+//! and of the matrices in bytes (`u64` each); the head as deflated JSON, the matrices, and the SHA-256 of all before it
+//! as 64 hexadecimal digits. One set of reduced logs gives the same bytes on every machine.
 
 use std::io::Read;
 use std::path::Path;
@@ -23,8 +23,8 @@ use cft_ident_logs::log::{Provenance, REDUCED, begins_with, escape, sha256_of_by
 pub const FORMAT: u32 = 3;
 /// The format before, whose head is plain JSON.
 const PLAIN_HEAD: u32 = 2;
-/// Bytes that a head may have, unpacked.
-const MAX_HEAD: u64 = 1 << 30;
+/// Bytes that a head may have, unpacked: some kilobytes a log, and of a small file no memory without end.
+const MAX_HEAD: u64 = 1 << 28;
 /// Hexadecimal digits of the checksum.
 const CHECKSUM: usize = 64;
 /// Bytes before the head.
