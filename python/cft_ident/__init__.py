@@ -214,10 +214,10 @@ class _Files:
         if not len(names) == q.shape[1] == tau.shape[1]:
             raise UsageError(f"{log.name}: {q.shape[1]} columns of positions and {tau.shape[1]} of torques, and the "
                              f"robot has the joints {', '.join(names)}")
-        columns = {f"q_{name}": q[:, k] for k, name in enumerate(names)}
+        columns: dict[str, Any] = {f"q_{name}": q[:, k] for k, name in enumerate(names)}
         columns |= {f"tau_{name}": tau[:, k] for k, name in enumerate(names)}
         path = self.new(f"{log.name}.npz")
-        np.savez(path, t=t, **columns)
+        np.savez(path, **columns, t=t)
         return path
 
     def model(self, model: Model | PathLike) -> str:

@@ -34,7 +34,8 @@ class Result:
 
         document = self.to_dict()
         sides = [side for side in ("before", "after") if side in document]
-        parts = {side: document[side].get("holdout") or document[side]["train"] for side in sides} or {"error": document}
+        parts: dict[str, dict[str, Any]] = {side: document[side].get("holdout") or document[side]["train"] for side in sides}
+        parts = parts or {"error": document}
         rows = {side: part["joints"] for side, part in parts.items()}
         first = next(iter(rows.values()))
         found: dict[str, Any] = {"joint": [row["joint"] for row in first]}

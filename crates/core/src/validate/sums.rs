@@ -77,9 +77,10 @@ impl ErrorSums {
     }
 }
 
-/// norm(tau - tau_hat) / norm(tau) from the squares of both, where there are rows.
+/// norm(tau - tau_hat) / norm(tau) from the squares of both, where there are rows; NaN where the torque is one that
+/// rounding alone makes, of a motor that is off.
 pub(super) fn ratio([error, torque]: [f64; 2], rows: u64) -> Option<f64> {
-    let relative = match torque > 0.0 {
+    let relative = match torque > f64::EPSILON * error {
         true => (error / torque).sqrt(),
         false => f64::NAN,
     };

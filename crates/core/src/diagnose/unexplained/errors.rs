@@ -181,8 +181,13 @@ pub fn pieces(
     Ok(pieces)
 }
 
-fn ratio(a: f64, b: f64) -> f64 {
-    if b > 0.0 { (a / b).sqrt() } else { f64::NAN }
+/// norm(tau - tau_hat) / norm(tau) from the squares of both; NaN where the torque is one that rounding alone makes, of a
+/// motor that is off.
+fn ratio(error: f64, torque: f64) -> f64 {
+    match torque > f64::EPSILON * error {
+        true => (error / torque).sqrt(),
+        false => f64::NAN,
+    }
 }
 
 /// Relative error of every joint over those of the pieces that were picked, of the rows in which it moves, or of all
