@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use cft_ident::cli;
+use cft_ident::config::RobotFile;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
     self, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings, LoggedRobot,
@@ -34,12 +35,25 @@ fn all(logs: &[PyRef<'_, Log>]) -> Vec<identify::Log> {
 struct Checked {
     findings: Vec<cft_ident::setup::Finding>,
     warnings: Vec<String>,
+    /// The robot file with torques that its drives do not exceed, where the logs ask for more.
+    limited: Option<RobotFile>,
+}
+
+impl Checked {
+    /// The robot to go on with.
+    fn machine(&self, declared: LoggedRobot) -> LoggedRobot {
+        match &self.limited {
+            Some(file) => LoggedRobot::new(&declared.name, file.clone()),
+            None => declared,
+        }
+    }
 }
 
 /// Refuses a set-up that the torques plainly contradict, as the commands do.
 fn checked(data: &Dataset, control: &Control) -> PyResult<Checked> {
     // of logs that cannot be checked the fit itself says why
-    let report = check_setup(data, control).unwrap_or_default().report;
+    let found = check_setup(data, control).unwrap_or_default();
+    let report = found.report;
     control.check().map_err(of_stage)?;
     if let Some(finding) = report.refusals().next() {
         return Err(InputError::new_err(format!(
@@ -51,9 +65,11 @@ fn checked(data: &Dataset, control: &Control) -> PyResult<Checked> {
     let likely = report.findings.iter().filter(|f| !f.sure);
     let likely = likely.map(|f| format!("the set-up may be wrong: {}", f.in_words()));
     let power = report.friction_power.iter().map(|power| power.sentence());
+    let limits = report.torque_limits.iter().map(|limit| limit.sentence());
     Ok(Checked {
-        warnings: likely.chain(power).collect(),
+        warnings: likely.chain(power).chain(limits).collect(),
         findings: report.findings,
+        limited: found.limited,
     })
 }
 
@@ -101,6 +117,8 @@ pub fn friction(
             true => Checked::default(),
             false => checked(&data, control)?,
         };
+        let machine = setup.machine(machine);
+        let data = Dataset::new(&machine, &logs);
         let settings = FrictionSettings { joint };
         let mut found = identify::friction(&data, &settings, control).map_err(of_stage)?;
         found.setup = setup.findings;
@@ -171,6 +189,8 @@ pub fn lsq(
             true => Checked::default(),
             false => checked(&data, control)?,
         };
+        let machine = setup.machine(machine);
+        let data = Dataset::new(&machine, &logs);
         let settings = LsqSettings {
             estimator: kind,
             consistent: !unconstrained,
@@ -291,9 +311,11 @@ pub fn reduce(
     let friction = model.map(|m| m.given.clone());
     work::run(py, move |control, _| {
         let data = Dataset::new(&machine, &logs);
-        if !as_declared {
-            checked(&data, control)?;
-        }
+        let setup = match as_declared {
+            true => Checked::default(),
+            false => checked(&data, control)?,
+        };
+        let data = Dataset::new(&setup.machine(machine), &logs);
         let found = identify::reduce(&data, friction.as_ref(), control).map_err(of_stage)?;
         Ok(Part {
             logs: Arc::new(found),

@@ -82,6 +82,12 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     number(text, &wrong, |x| is_usable(x) && x >= SMALLEST)
 }
 
+/// A number that is 0 or above.
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    let wrong = format!("must be a number from 0 to {LARGEST:e}");
+    number(text, &wrong, |x| is_usable(x) && x >= 0.0)
+}
+
 /// A part of a whole: above 0, at most 1.
 pub(super) fn part(text: &str) -> Result<f64, String> {
     let wrong = "must be above 0 and at most 1, the whole";

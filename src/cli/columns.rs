@@ -148,6 +148,9 @@ fn place(
                 let limits = machine.file.limits.get(joint);
                 seen.speed = limits.and_then(|limits| limits.speed);
             }
+            if role == ChannelRole::Torque && !raw {
+                seen.delivers = layout.torque_limit(joint);
+            }
             seen.factor = channel.factor;
             known[column] = Some(ChannelColumn {
                 column,

@@ -6,7 +6,9 @@ use super::{CliError, Context};
 use cft_ident_files::config::correction::{Edit, edited};
 use cft_ident_files::config::{self, RobotFile};
 use cft_ident_stages::identify::{CheckedSetup, Dataset, IdentifyError, LoggedRobot, check_setup};
-use cft_ident_stages::setup::{Finding, FindingSeverity, FrictionPower, SetupReport};
+use cft_ident_stages::setup::{
+    Finding, FindingSeverity, FoundTorqueLimit, FrictionPower, SetupReport,
+};
 
 /// What to do with a set-up that the torques contradict.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -59,6 +61,7 @@ pub fn checked(
         report,
         corrected,
         edits,
+        limited,
     } = check(&data, context)?;
     let of = |severity| (report.findings.iter()).filter(move |f| f.severity == severity);
     let likely = |f: &Finding| {
@@ -70,6 +73,7 @@ pub fn checked(
     let mut warnings: Vec<String> = of(FindingSeverity::Warning).map(likely).collect();
     of(FindingSeverity::Hint).for_each(|f| context.note(&format!("hint: {}", f.in_words())));
     warnings.extend(report.friction_power.iter().map(FrictionPower::sentence));
+    warnings.extend(report.torque_limits.iter().map(FoundTorqueLimit::sentence));
     let refusals: Vec<&Finding> = report.refusals().collect();
     if refusals.is_empty() {
         let path = args.fix_setup.as_ref().filter(|_| !before.is_empty());
@@ -78,6 +82,13 @@ pub fn checked(
             Ok::<_, CliError>((path.clone(), text))
         });
         let new_file = new_file.transpose()?;
+        let data = match limited {
+            Some(file) => Dataset {
+                machine: LoggedRobot::new(&machine.name, file),
+                ..data
+            },
+            None => data,
+        };
         return Ok(Checked {
             data,
             report,

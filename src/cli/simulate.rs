@@ -1,5 +1,7 @@
 //! `cft-ident simulate`: a log of the simulated robot, and its truth beside it.
 
+mod servo;
+
 use std::ffi::OsStr;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -17,6 +19,7 @@ use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::{Block, LogSpec, Provenance, Reader};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_plant::simulate::effects::EffectValue;
+use cft_ident_plant::simulate::servo::BenchMotion;
 use cft_ident_plant::simulate::{
     self, EffectSpec, Experiment, InitialConditions, LimitEvent, Order, RunEnding,
 };
@@ -25,19 +28,26 @@ use cft_ident_report::report::table::{Align, Table};
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident simulate -r configs/cft.toml --move q4 --seconds 20 -o moved.csv";
+  cft-ident simulate -r configs/cft.toml --move q4 --seconds 20 -o moved.csv
+  cft-ident simulate --servo sines --kp 16 --drive command_delay=0.03 -o servo.json";
 
 /// Simulate the robot under control and write its log.
 ///
 /// Without --reference, --move or --volts it runs the excitation trajectory of the report's Table 3.
 /// The truth (parameters, effects, seed) goes to a file of its own beside the log: LOG's stem with
-/// .truth.toml.
+/// .truth.toml. With --servo it is command and position of a servo on a pendulum rig: driven by volts
+/// with counts as gains, or by torque where --kd is given.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE, override_usage = "cft-ident simulate [OPTIONS] -r ROBOT.toml -o LOG.csv|.mcap")]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident simulate [OPTIONS] -r ROBOT.toml -o LOG.csv|.mcap\n       cft-ident simulate [OPTIONS] --servo MOTION -o LOG.json|.csv")]
 pub struct Args {
     /// Robot file, or a built-in one such as configs/cft.toml
-    #[arg(short, long, value_name = "ROBOT.toml")]
-    pub robot: PathBuf,
+    #[arg(
+        short,
+        long,
+        value_name = "ROBOT.toml",
+        required_unless_present = "servo"
+    )]
+    pub robot: Option<PathBuf>,
     /// Model file whose parameters are the truth [default: the robot's nominal ones]
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
@@ -47,6 +57,33 @@ pub struct Args {
     /// One-joint experiment: JOINT moves over its range at several speeds, the others are held
     #[arg(long = "move", value_name = "JOINT", group = "motion")]
     pub move_joint: Option<String>,
+    /// A servo on a pendulum rig instead of a robot, and its motion: step, sines, chirp, ramps or
+    /// places
+    #[arg(
+        long,
+        value_name = "MOTION",
+        group = "motion",
+        value_parser = servo::motion,
+        conflicts_with_all = ["robot", "model", "seconds", "position", "effects"]
+    )]
+    pub servo: Option<BenchMotion>,
+    /// Proportional gain of the servo [counts of its firmware, or N m/rad with --kd] [default: 16]
+    #[arg(long, value_name = "X", requires = "servo", value_parser = arguments::positive)]
+    pub kp: Option<f64>,
+    /// Gain of the speed of a servo that is driven by torque [N m s/rad]; a URDF of the rig is
+    /// written beside LOG.csv
+    #[arg(long, value_name = "X", requires = "servo", value_parser = arguments::not_negative)]
+    pub kd: Option<f64>,
+    /// Numbers of the servo and of its rig that are not those of a hobby servo, as
+    /// armature=0.03,speed_limit=4.8,command_delay=0.03
+    #[arg(
+        long,
+        value_name = "NAME=X,..",
+        value_delimiter = ',',
+        requires = "servo",
+        value_parser = servo::numbered
+    )]
+    pub drive: Vec<(String, f64)>,
     /// Part of its range that JOINT moves over, about the middle [default: 1]
     #[arg(hide_short_help = true, long, value_name = "PART", value_parser = arguments::part, requires = "move_joint")]
     pub travel: Option<f64>,
@@ -91,7 +128,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Log to write
-    #[arg(short, long, value_name = "LOG.csv|.mcap", value_parser = arguments::log_file)]
+    #[arg(short, long, value_name = "LOG.csv|.mcap|.json", value_parser = servo::log_or_rig)]
     pub output: PathBuf,
 }
 
@@ -100,11 +137,20 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let log = args.volts.as_ref().map(|log| &*log.path);
     let (reference, model) = (args.reference.as_deref(), args.model.as_deref());
     let candidates = args.candidates.as_deref();
-    let read = [Some(&*args.robot), reference, model, candidates, log];
+    let read = [args.robot.as_deref(), reference, model, candidates, log];
     let read = read.into_iter().flatten();
     context.check_outputs(read, [&*args.output, &*truth_path])?;
 
-    let robot = files::robot(&args.robot)?;
+    let path = match (args.servo, &args.robot) {
+        (Some(motion), _) => return servo::run(motion, args, &truth_path, context),
+        (None, Some(path)) => path,
+        (None, None) => return Err(CliError::usage("no robot is given").hint("-r ROBOT.toml")),
+    };
+    if args.output.extension().is_some_and(|end| end == "json") {
+        let text = "-o: a .json is the log of a servo, --servo MOTION";
+        return Err(CliError::usage(text));
+    }
+    let robot = files::robot(path)?;
     let mut inputs = vec![robot.provenance];
     let mut robot = robot.value;
     let model = model

@@ -61,9 +61,9 @@ pub fn missed(errors: &TorqueErrors, limit: Option<f64>) -> Vec<String> {
         return Vec::new();
     };
     // an error that is not a number is no error within the limit
-    let above = |e: &&JointError| e.relative_error.is_nan() || e.relative_error > limit;
+    let above = |e: &&JointError| e.headline().is_nan() || e.headline() > limit;
     let words = |e: &JointError| {
-        let [error, limit] = [e.relative_error, limit].map(number::percent);
+        let [error, limit] = [e.headline(), limit].map(number::percent);
         format!("{}: relative error {error} is above {limit}", e.joint)
     };
     errors.joints.iter().filter(above).map(words).collect()

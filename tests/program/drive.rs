@@ -74,3 +74,74 @@ fn a_held_out_gain_that_no_log_has_is_an_error_that_names_those_there_are() {
         .stderr(contains("no log has it"))
         .stderr(contains("kp=16"));
 }
+
+#[test]
+fn a_simulated_torque_drive_is_found_by_its_rig_and_gains() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut drive = vec!["drive".to_owned()];
+    for motion in ["step", "sines", "chirp", "ramps", "places"] {
+        for kp in ["10", "30"] {
+            let log = format!("{motion}_{kp}.csv");
+            let numbers = "armature=0.02,coulomb=0.15,viscous=0.05,command_delay=0.02";
+            let simulate = ["simulate", "--servo", motion, "--kp", kp, "--kd", "0.4"];
+            let made = [&simulate[..], &["--drive", numbers, "-o", &log]].concat();
+            run(folder.path(), &made);
+            assert!(
+                folder
+                    .path()
+                    .join(format!("{motion}_{kp}.truth.toml"))
+                    .exists()
+            );
+            if kp == "30" {
+                drive.push(log);
+            }
+        }
+    }
+    let more = "-r step_30.urdf --command q_des_* --kp 30 --kd 0.4 -o drive.toml";
+    drive.extend(more.split(' ').map(str::to_owned));
+    let found = run(folder.path(), &drive);
+    let value = |name: &str| {
+        let all = found["parameters"].as_array().unwrap();
+        let of = all.iter().find(|p| p["name"] == name);
+        of.unwrap_or_else(|| panic!("{name}: {found}"))["value"]
+            .as_f64()
+            .unwrap()
+    };
+    assert!((value("armature") - 0.02).abs() < 2e-3);
+    assert!((value("coulomb") - 0.15).abs() < 0.015);
+    assert!((value("command_delay") - 0.02).abs() < 2e-3);
+}
+
+#[test]
+fn a_simulated_servo_says_what_is_wrong_with_its_arguments() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, says) in [
+        ("--servo wave -o a.json", "the motions are step"),
+        ("--servo step -o a.csv", "-o LOG.json for a servo"),
+        ("--servo step --kd 1 -o a.json", "-o LOG.json for a servo"),
+        ("--servo step --drive weight=1 -o a.json", "the names are"),
+        (
+            "--servo step --drive mass=-1 -o a.json",
+            "must be 0 or more",
+        ),
+        (
+            "--servo step --drive command_delay=20 -o a.json",
+            "in seconds",
+        ),
+        (
+            "-r configs/cft.toml -o a.json",
+            "a .json is the log of a servo",
+        ),
+        ("-o a.json", "--robot"),
+    ] {
+        let mut command = Command::cargo_bin("cft-ident").unwrap();
+        let arguments = arguments.split(' ');
+        let run = command
+            .current_dir(&folder)
+            .arg("simulate")
+            .args(arguments)
+            .assert();
+        run.code(2).stderr(contains(says));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

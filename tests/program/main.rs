@@ -10,6 +10,7 @@ mod cli_simulate;
 mod cli_status;
 mod cli_terminal;
 mod compare;
+mod conformance;
 mod controllers;
 mod currents_arm;
 mod cut_out;

@@ -461,3 +461,70 @@ fn a_ratio_among_several_that_fit_alike_is_a_warning_with_all_of_them() {
     let readings = findings["tied_with"].to_string() + &findings["remedy"].to_string();
     assert!(readings.contains("position_scale = 0.02`"), "{readings}");
 }
+
+/// A log of commanded torques of a joint (0.03 kg m^2, 0.25 Nm s/rad, 0.5 Nm) whose drive gives no more than 1.1 Nm.
+fn asked_for_more_than_is_given(folder: &std::path::Path) {
+    let (inertia, viscous, coulomb, most) = (0.03, 0.25, 0.5, 1.1);
+    let (mut q, mut v, h) = (0.0_f64, 0.0_f64, 1e-4);
+    let mut text = "time,position,torque\n".to_owned();
+    let target = |t: f64| 0.25 * (1.3 * t).sin() + 0.15 * (4.1 * t).sin();
+    for k in 0..30 * 250 {
+        let t = f64::from(k) * 0.004;
+        // steps that the drive cannot follow, every 5 s
+        let step = if t % 5.0 < 0.4 { 0.4 } else { 0.0 };
+        let tau = 12.0 * (target(t) + step - q) - 0.1 * v;
+        let noise = 1e-3 * f64::from(k * 7919 % 101 - 50) / 50.0;
+        text += &format!("{t},{q:.6},{:.4}\n", tau + noise);
+        let given = tau.clamp(-most, most);
+        for _ in 0..40 {
+            if v == 0.0 && given.abs() <= coulomb {
+                continue;
+            }
+            let against = if v == 0.0 { given.signum() } else { v.signum() };
+            let next = v + h * (given - viscous * v - coulomb * against) / inertia;
+            v = if v != 0.0 && next * v <= 0.0 {
+                0.0
+            } else {
+                next
+            };
+            q += h * v;
+        }
+    }
+    std::fs::write(folder.join("a.csv"), text).unwrap();
+    let robot = "[robot]\nmodel = \"single-joint\"\njoint = \"q1\"\nkind = \"revolute\"\n\n\
+        [friction]\nlaw = \"viscous-coulomb\"\nfitted_with_inertias = true\noffset = true\n\n\
+        [log]\ntime = \"time\"\ntorque_is = \"joint\"\n\n\
+        [log.joint.q1]\nposition = \"position\"\ntorque = \"torque\"\n\n[filter]\ncutoff_hz = 20\n";
+    std::fs::write(folder.join("a.toml"), robot).unwrap();
+}
+
+#[test]
+fn torques_that_a_drive_does_not_deliver_are_named_with_their_limit_and_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    asked_for_more_than_is_given(folder.path());
+    let lsq = ["lsq", "a.csv", "-r", "a.toml", "-o", "m.toml"];
+    let found = measured_support::run(folder.path(), &lsq);
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("saturation of q1"), "{warnings}");
+    let of = |name: &str| {
+        let all = found["parameters"].as_array().unwrap();
+        let own = all.iter().find(|p| p["name"] == name).unwrap();
+        own["value"].as_f64().unwrap_or(f64::NAN)
+    };
+    assert!((of("inertia") - 0.03).abs() < 2e-3, "{found}");
+    assert!((of("viscous") - 0.25).abs() < 0.02, "{found}");
+    assert!((of("coulomb") - 0.5).abs() < 0.02, "{found}");
+    // the model remembers it
+    let text = std::fs::read_to_string(folder.path().join("m.toml")).unwrap();
+    let model: toml::Value = toml::from_str(&text).unwrap();
+    let limit = model["log"]["joint"]["q1"]["torque_limit"].as_float();
+    assert!(
+        limit.is_some_and(|limit| (0.8..1.3).contains(&limit)),
+        "{text}"
+    );
+    // and without it the rows spoil the fit
+    let kept = [&lsq[..], &["--as-declared"]].concat();
+    let kept = measured_support::run(folder.path(), &kept);
+    assert!(!kept["warnings"].to_string().contains("saturation of q1"));
+    assert!(kept["joints"][0]["relative_error_moving"].as_f64().unwrap() > 0.25);
+}

@@ -28,6 +28,8 @@ pub struct JointError {
     /// The same of the rows in which the joint moves, weighed as a fit does: samples where it turns or stands count
     /// less; null where there are none.
     pub relative_error_moving: Option<f64>,
+    /// Root mean square of the same rows in the torque's unit.
+    pub rmse_moving: Option<f64>,
     /// The same of the rows in which it rests.
     pub relative_error_rest: Option<f64>,
     /// The same of every raw sample.
@@ -60,9 +62,16 @@ pub struct Overall {
     pub relative_error_rest: Option<f64>,
     /// Root mean square of the relative errors of the joints that move.
     pub mean_relative_error: f64,
+    /// The same of the rows in which each joint moves: the headline.
+    pub mean_relative_error_moving: f64,
 }
 
 impl JointError {
+    /// The error that is spoken of: of the rows in which the joint moves, of all where it never does.
+    pub fn headline(&self) -> f64 {
+        self.relative_error_moving.unwrap_or(self.relative_error)
+    }
+
     /// Whether it moves at all: the torque of a joint that stands still is any that friction takes.
     pub fn moves(&self) -> bool {
         self.resting < self.samples
@@ -399,6 +408,8 @@ impl<'a> Reconstruction<'a> {
             rmse: (s.error / s.rows.max(1) as f64).sqrt(),
             relative_error: ratio([s.error, s.torque], 1).unwrap_or(f64::NAN),
             relative_error_moving: ratio(s.moving, s.rows - s.resting),
+            rmse_moving: (s.rows > s.resting)
+                .then(|| (s.moving[0].max(0.0) / (s.rows - s.resting) as f64).sqrt()),
             relative_error_rest: ratio(s.rest, s.resting),
             relative_error_raw: known(ratio([s.raw_error, s.raw_torque], 1)),
             coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
@@ -420,15 +431,18 @@ impl<'a> Reconstruction<'a> {
             of_all.filter(|_| one_unit)
         };
         let any = joints.iter().any(JointError::moves);
-        let counted = joints.iter().filter(|e| e.moves() || !any);
-        let squares: Vec<f64> = counted.map(|e| e.relative_error.powi(2)).collect();
-        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        let mean = |of: fn(&JointError) -> f64| {
+            let counted = joints.iter().filter(|e| e.moves() || !any);
+            let squares: Vec<f64> = counted.map(|e| of(e).powi(2)).collect();
+            (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        };
         TorqueErrors {
             overall: Overall {
                 relative_error: one_unit.then(|| (pooled.error / pooled.torque).sqrt()),
                 relative_error_moving: part(pooled.moving, pooled.rows - pooled.resting),
                 relative_error_rest: part(pooled.rest, pooled.resting),
-                mean_relative_error: mean.sqrt(),
+                mean_relative_error: mean(|e| e.relative_error),
+                mean_relative_error_moving: mean(JointError::headline),
             },
             joints,
         }

@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::{CliError, Context, Outcome, file_name, inspect};
 use cft_ident_core::robot::JointKind;
+use cft_ident_files::config::serial_section::LinkSection;
 use cft_ident_files::config::{Capsules, RobotFile, UrdfChain};
 use cft_ident_logs::inspect::{LogFault, Severity};
 use cft_ident_logs::log::{LogSpec, Provenance, Reader, escape};
@@ -141,7 +142,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             "next: fill in the modified Denavit-Hartenberg rows ([[robot.link]]) of {place}\n"
         ),
         None => format!("next: cft-ident inspect LOG -r {place}\n"),
-        Some(_) if unread => format!("next: correct [log] in {place}\n"),
+        Some(_) if unread => match &found.arm {
+            Some(command) => format!("next: {command}\n"),
+            None => format!("next: correct [log] in {place}\n"),
+        },
         Some(spec) if wrong => {
             format!("next: mend the errors that are found: cft-ident inspect {spec} -r {place}\n")
         }
@@ -192,6 +196,8 @@ pub(super) struct Described {
     shape: Shape,
     model: &'static str,
     cutoff_hz: Option<f64>,
+    /// The command that describes the arm alone, whose joints the log has.
+    arm: Option<String>,
     pub warnings: Vec<String>,
 }
 
@@ -306,11 +312,15 @@ pub(super) fn describe(
     {
         warnings.push(text);
     }
-    warnings.extend(
-        chain
-            .as_ref()
-            .and_then(|chain| tip_before(chain, &mapping, args)),
-    );
+    let arm = chain.as_ref();
+    let arm = arm.and_then(|chain| arm_alone(chain, &mapping, args));
+    if let Some(command) = &arm {
+        let without = mapping.joints.iter().filter(|joint| !has_columns(joint));
+        warnings.push(format!(
+            "the log has no columns of {}; where they stood still, the arm is described without them: `{command}`",
+            cft_ident_logs::log::list(without.map(|joint| joint.joint.as_str()))
+        ));
+    }
     let (shape, model, cutoff_hz) = (draft.shape.clone(), draft.model(), draft.cutoff_hz());
     Ok(Described {
         text,
@@ -318,38 +328,42 @@ pub(super) fn describe(
         shape,
         model,
         cutoff_hz,
+        arm,
         warnings,
         mapping,
         seen,
     })
 }
 
-/// Says where the arm ends, where the last joints of a URDF have no columns: a gripper that was not logged.
-fn tip_before(chain: &UrdfChain, mapping: &Mapping, args: &Args) -> Option<String> {
-    let has = |joint: &JointColumns| joint.position.is_some() && joint.torque.is_some();
-    let last = mapping.joints.iter().rposition(has)?;
-    let without = mapping
+fn has_columns(joint: &JointColumns) -> bool {
+    joint.position.is_some() && joint.torque.is_some()
+}
+
+/// The command that ends the arm at the last joint that was logged, where the joints up to there are those of the log: a
+/// gripper, wheels or a head that were not logged.
+fn arm_alone(chain: &UrdfChain, mapping: &Mapping, args: &Args) -> Option<String> {
+    let logged: Vec<&str> = mapping
         .joints
-        .get(last + 1..)
-        .filter(|rest| !rest.is_empty())?;
-    if !mapping.joints[..=last].iter().all(has) {
-        return None;
-    }
-    let joint = &mapping.joints[last].joint;
-    let link = chain
-        .links
         .iter()
-        .find(|link| link.joint.as_ref() == Some(joint))?;
-    let names = cft_ident_logs::log::list(without.iter().map(|joint| joint.joint.as_str()));
-    let [urdf, log] = [
-        args.urdf.as_ref()?.display().to_string(),
-        args.log.as_ref()?.to_string(),
-    ];
-    Some(format!(
-        "the log has no columns of {names}; where they stood still, the arm ends before them: `cft-ident new {}-arm --urdf {urdf} --tip {} --log {log}`",
-        args.name.display(),
-        link.name.as_ref()?
-    ))
+        .filter(|joint| has_columns(joint))
+        .map(|joint| joint.joint.as_str())
+        .collect();
+    let last = *logged
+        .last()
+        .filter(|_| logged.len() < mapping.joints.len())?;
+    let of_last = |link: &&LinkSection| link.joint.as_deref() == Some(last);
+    let tip = chain.links.iter().find(of_last)?.name.as_ref()?;
+    let (urdf, log) = (args.urdf.as_ref()?, args.log.as_ref()?);
+    let arm = UrdfChain::load(urdf, Some(tip)).ok()?;
+    let joints: Vec<Known> = joints_of(&arm);
+    let same = joints.iter().map(|joint| joint.name.as_str()).eq(logged);
+    same.then(|| {
+        format!(
+            "cft-ident new {}-arm --urdf {} --tip {tip} --log {log}",
+            args.name.display(),
+            urdf.display()
+        )
+    })
 }
 
 /// Lines of a terminal that say what is to be looked at.
@@ -423,7 +437,7 @@ fn inspected(faults: Option<&[LogFault]>) -> String {
 
 /// The independent joints of a URDF, their kinds and their largest torques.
 fn joints_of(chain: &UrdfChain) -> Vec<Known> {
-    let of = |link: &cft_ident_files::config::serial_section::LinkSection| {
+    let of = |link: &LinkSection| {
         let name = link.joint.clone()?;
         let limits = chain.limits.iter().find(|(joint, _)| *joint == name);
         Some(Known {

@@ -118,6 +118,10 @@ pub struct FoundDrive {
 /// Steps of a fit of a candidate from the best of its starts on.
 const SHORT: usize = 5;
 
+/// Candidates that are fitted to the end before one of them is chosen. One: the order of short fits decides; more: the
+/// same choices.
+const RIVALS: usize = 2;
+
 /// Fits with scales that follow the residual.
 pub fn fit(
     problem: &DriveProblem,
@@ -193,6 +197,72 @@ pub fn with(problem: &DriveProblem, beside: &LawEstimate, effect: DriveEffect) -
     LawEstimate::at(problem, &unknowns, values, &beside.scales)
 }
 
+/// An effect that helps the blocks left out, beside others that do.
+struct RivalEffect {
+    effect: DriveEffect,
+    gain: [f64; 2],
+    with: LawEstimate,
+    /// Losses of the blocks left out.
+    after: Vec<f64>,
+}
+
+impl RivalEffect {
+    /// Whether it does nearly as well as another one.
+    fn is_near(&self, best: &RivalEffect) -> bool {
+        let [less, se] = judge::gain(&self.after, &best.after);
+        less < NUMBERS.screen * se
+    }
+}
+
+/// Fits the best rivals of a list, which is sorted, to the end and puts the better one first. A short fit does not tell those
+/// apart that look alike where they begin, a late command and a late loop, and each begins where the other ended too, for
+/// dry friction has more than one place to settle. Those that are near by the scales of what was there before are told
+/// apart by the residual that they leave.
+fn settle_rivals(
+    problem: &DriveProblem,
+    at: &LawEstimate,
+    before: &[f64],
+    sorted: &mut [RivalEffect],
+) {
+    let count = sorted.len().min(RIVALS);
+    let rivals = &mut sorted[..count];
+    let shared = at.unknowns.len();
+    let ends: Vec<Vec<f64>> = rivals.iter().map(|r| r.with.values.clone()).collect();
+    for rival in &mut *rivals {
+        let own = rival.with.values[shared..].to_vec();
+        let unknowns = &rival.with.unknowns;
+        let starts = ends.iter().flat_map(|end| {
+            let by_own = [&end[..shared], &own].concat();
+            // lateness of one kind is that of the other
+            let whole = Some(end.clone()).filter(|end| end.len() == by_own.len());
+            std::iter::once(by_own).chain(whole)
+        });
+        let fits = starts.map(|start| problem.fit(unknowns, &start, &at.scales, FIT.steps));
+        if let Some(whole) = fits.min_by(|a, b| a.loss.total_cmp(&b.loss)) {
+            rival.with = LawEstimate::at(problem, unknowns, whole.values, &at.scales);
+            rival.after = rival.with.left_out();
+            rival.gain = judge::gain(before, &rival.after);
+        }
+    }
+    rivals.sort_by(|a, b| b.gain[0].total_cmp(&a.gain[0]));
+    let [first, second] = rivals else {
+        return;
+    };
+    if !second.is_near(first) {
+        return;
+    }
+    let scales = problem.scales(&first.with.unknowns, &first.with.values);
+    for rival in [&mut *first, &mut *second] {
+        let unknowns = &rival.with.unknowns;
+        let whole = problem.fit(unknowns, &rival.with.values, &scales, FIT.steps);
+        rival.with = LawEstimate::at(problem, unknowns, whole.values, &scales);
+        rival.after = rival.with.left_out();
+    }
+    if judge::gain(&first.after, &second.after)[0] > 0.0 {
+        std::mem::swap(first, second);
+    }
+}
+
 /// The search, from the declared drive on.
 pub fn search(
     problem: &DriveProblem,
@@ -222,24 +292,28 @@ pub fn search(
             // a part of the error is half of that of its square
             let noticeable = gain > 2.0 * NUMBERS.noticeable;
             if noticeable && gain > NUMBERS.screen * se {
-                fitted.push((*effect, gain, se, with, after));
+                fitted.push(RivalEffect {
+                    effect: *effect,
+                    gain: [gain, se],
+                    with,
+                    after,
+                });
             }
         }
-        fitted.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let Some((effect, gain, se, with, after)) = fitted.first() else {
+        fitted.sort_by(|a: &RivalEffect, b| b.gain[0].total_cmp(&a.gain[0]));
+        settle_rivals(problem, &at, &before, &mut fitted);
+        let Some((first, others)) = fitted.split_first() else {
             break;
         };
-        let near = |other: &&(DriveEffect, f64, f64, LawEstimate, Vec<f64>)| {
-            let [less, se] = judge::gain(&other.4, after);
-            less < NUMBERS.screen * se
-        };
-        let alternatives = fitted[1..]
-            .iter()
-            .filter(near)
-            .map(|other| other.0)
-            .collect();
-        joined.push((*effect, [*gain, *se], alternatives));
-        at = fit(problem, &with.unknowns, &with.values, Some(&at.scales));
+        let near = others.iter().filter(|other| other.is_near(first));
+        let alternatives = near.map(|other| other.effect).collect();
+        joined.push((first.effect, first.gain, alternatives));
+        at = fit(
+            problem,
+            &first.with.unknowns,
+            &first.with.values,
+            Some(&at.scales),
+        );
     }
     let mut found = settle(problem, given, at, joined);
     found.tried = tried;

@@ -253,6 +253,9 @@ fn joint_channels(
     scale(document, &at("position_scale"), channels.position_scale)?;
     scale(document, &at("torque_scale"), channels.torque_scale)?;
     range(document, &at("wrap"), channels.wrap)?;
+    let remedy = "give the largest torque that the drive delivers, above 0";
+    let positive = |x: f64| x > 0.0 && x.is_finite();
+    document.number(&at("torque_limit"), channels.torque_limit, positive, remedy)?;
     match (log.torque_is, &channels.torque) {
         (None, Some(_)) => Err(document.missing(
             &["log", "torque_is"],

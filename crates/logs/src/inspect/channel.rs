@@ -19,6 +19,8 @@ pub struct InspectedChannel {
     pub speed: Option<f64>,
     /// Whether a number at its limit is what was really applied: the volts of an amplifier.
     pub saturates: bool,
+    /// Largest torque that acts, whatever the channel says.
+    pub delivers: Option<f64>,
     /// Whether its numbers are commands of positions, of which torques are made.
     pub commands: bool,
     /// What a 0 of the column stands for.
@@ -49,6 +51,7 @@ impl InspectedChannel {
             limits: None,
             speed: None,
             saturates: false,
+            delivers: None,
             commands: false,
             zero: 0.0,
             factor: 1.0,

@@ -323,6 +323,10 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
         let joints = channels.iter().zip(&layout.joints);
         joints.map(move |(channel, joint)| InspectedChannel {
             saturates,
+            delivers: match role {
+                ChannelRole::Torque if !volts => layout.torque_limit(joint),
+                _ => None,
+            },
             commands: commands && role == ChannelRole::Torque,
             factor: channel.factor,
             zero: channel.offset,

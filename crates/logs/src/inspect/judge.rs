@@ -53,6 +53,8 @@ pub(super) struct Track {
     pub(super) missing: Episodes,
     pub(super) beyond: Episodes,
     pub(super) at_limit: Episodes,
+    /// Rows of a torque that the drive does not deliver.
+    pub(super) undelivered: Episodes,
     pub(super) flat: Flat,
     pub(super) spikes: Spikes,
     pub(super) leaps: Leaps,
@@ -84,6 +86,7 @@ impl Track {
             missing: Episodes::default(),
             beyond: Episodes::default(),
             at_limit: Episodes::default(),
+            undelivered: Episodes::default(),
             flat: Flat::default(),
             spikes: Spikes::default(),
             leaps: Leaps::default(),
@@ -185,6 +188,9 @@ impl Track {
         self.high = self.high.max(value);
         if self.channel.role == ChannelRole::Torque {
             self.dips.take(value);
+        }
+        if self.channel.delivers.is_some_and(|most| value.abs() > most) {
+            self.undelivered.add(t, t, 1, join);
         }
         // Welford 1962
         let d = value - self.mean;

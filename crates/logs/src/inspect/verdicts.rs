@@ -363,6 +363,15 @@ fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
     };
     let fault = (severity, FaultKind::Nan, Some(track));
     draft.rows(fault, &track.missing, &effect, remedy);
+    if let Some(most) = track.channel.delivers {
+        let effect = format!(
+            "of more than {most}, which the drive does not deliver: what acts is not known, so that these rows are left out of a fit"
+        );
+        let remedy = "nothing where `torque_limit` in [log.joint] of the robot file is right; gentler motions keep the rows";
+        let fault = (Warning, FaultKind::Saturation, Some(track));
+        draft.rows(fault, &track.undelivered, &effect, remedy);
+        draft.cut(fault, &track.undelivered);
+    }
     let Some([low, high]) = track.channel.limits else {
         return;
     };

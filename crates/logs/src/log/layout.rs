@@ -178,6 +178,11 @@ impl Layout {
         }
     }
 
+    /// Largest torque that the drive of a joint delivers, where the robot file says so.
+    pub fn torque_limit(&self, joint: &str) -> Option<f64> {
+        self.section.joint.get(joint)?.torque_limit
+    }
+
     /// What its positions are, in words.
     pub(super) fn what(&self) -> &'static str {
         match self.temperatures {

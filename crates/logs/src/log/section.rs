@@ -187,6 +187,10 @@ pub struct JointChannels {
     /// Offset added after scaling [N or Nm].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_offset: Option<f64>,
+    /// Largest torque that the drive delivers, where the column is what it was asked for [N or Nm]: rows in which it
+    /// was asked for more are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_limit: Option<f64>,
 }
 
 /// `[log.actuator.x_c1]`..: raw channels of the CFT robot.

@@ -277,16 +277,23 @@ pub(super) fn fit<'a>(
     if let ([_], [(_, only)]) = (joints, &family.members[..]) {
         return Some((How::Fits, vec![Some(only)]));
     }
+    // a joint's own name first, for the others one that is near and nobody's own
+    let own = |column: &LogColumn| {
+        let mut own = named.iter().flatten();
+        own.any(|taken| taken.name == column.name)
+    };
     let names: Vec<&str> = (family.members.iter())
-        .filter_map(|(key, _)| match key {
+        .filter_map(|(key, column)| match key {
             // one letter is an axis
-            Key::Name(name) => Some(name.as_str()).filter(|name| name.len() > 1),
+            Key::Name(name) => Some(name.as_str()).filter(|name| name.len() > 1 && !own(column)),
             Key::Number(_) => None,
         })
         .collect();
-    let near = joints.iter().map(|joint| {
-        let near = nearest(joint, names.iter().copied())?;
-        by_key(&Key::Name(near.to_owned()))
+    let near = joints.iter().zip(&named).map(|(joint, named)| {
+        named.or_else(|| {
+            let near = nearest(joint, names.iter().copied())?;
+            by_key(&Key::Name(near.to_owned()))
+        })
     });
     let near: Vec<Option<&LogColumn>> = near.collect();
     let mut seen = BTreeSet::new();

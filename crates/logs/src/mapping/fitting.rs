@@ -276,6 +276,18 @@ mod tests {
             (&found[2..], how),
             (&[const { None }; 3][..], Some(How::InPart))
         );
+        // a torso beside the numbered joints of an arm, and wheels that the log has not
+        let torso = ["wheel", "lift", "arm_1", "arm_2"];
+        let (found, how) = matched(
+            &torso,
+            &["lift_position", "arm_1_position", "arm_2_position"],
+        );
+        assert_eq!(found[0], None);
+        assert_eq!(
+            found[1..],
+            some(&["lift_position", "arm_1_position", "arm_2_position"])
+        );
+        assert_eq!(how, Some(How::InPart));
         // one too many may begin anywhere
         let (found, how) = matched(&numbered, &["q0", "q1", "q2"]);
         assert_eq!(found.len(), 2);

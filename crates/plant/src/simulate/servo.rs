@@ -1,7 +1,9 @@
 //! A servo on a pendulum rig, to test against: what a bench logs of command and position.
 //!
 //! ```text
-//! (m l^2 + ma l^2/3 + Ja) q'' = kt i - g sin q - Fv q' - dry,   i = (V d - kt q')/R,   d = clip(k kp (s - q_seen), +-d_max)
+//! (m l^2 + ma l^2/3 + Ja) q'' = tau - g sin q - Fv q' - dry
+//! volts drive    tau = kt i,   i = (V d - kt q')/R,   d = clip(k kp (s - q_seen), +-d_max)
+//! torque drive   tau = clip(kp (s - q_seen) - kd q'_seen, +-tau_max)
 //! ```
 //!
 //! Written apart from the estimator: small explicit steps, a joint that is held while the torques on it are below its dry
@@ -13,9 +15,29 @@ use std::f64::consts::TAU;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::order::SimulationSummary;
+use super::simulated_run::RunEnding;
+use super::truth::{TruthFile, parameter};
+use cft_ident_files::config::model_file::Parameter;
+
+/// What a controller's error becomes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ServoDrive {
+    /// A duty of the supply: the motor brakes itself.
+    Volts,
+    /// A torque, by a current controller.
+    Torque {
+        /// Gain of the speed [N m s/rad].
+        kd: f64,
+        /// Largest torque [N m].
+        limit: f64,
+    },
+}
+
 /// A servo and its firmware. SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ServoPlant {
+    pub drive: ServoDrive,
     /// Torque constant [N m/A], as seen at the output.
     pub kt: f64,
     /// Winding resistance [ohm].
@@ -46,6 +68,7 @@ pub struct ServoPlant {
 impl ServoPlant {
     /// One like those of hobby arms, without limit of speed and without delay.
     pub const HOBBY: ServoPlant = ServoPlant {
+        drive: ServoDrive::Volts,
         kt: 1.1,
         resistance: 2.2,
         armature: 0.027,
@@ -164,16 +187,19 @@ pub fn run_servo(
     let t: Vec<f64> = (0..=rows).map(|k| k as f64 / RATE_HZ).collect();
     let command = motion.positions(&t, seed);
     let h = 1.0 / (RATE_HZ * STEPS as f64);
-    // what was sent lies on straight lines between the rows
+    // set points of a torque drive are sent row by row; a rig's log was interpolated, on straight lines
+    let held = servo.drive != ServoDrive::Volts;
     let sent = |time: f64| {
-        let place = (time * RATE_HZ).clamp(0.0, rows as f64);
+        let place = (time * RATE_HZ + 1e-6).clamp(0.0, rows as f64);
         let k = (place as usize).min(rows - 1);
-        command[k] + (place - k as f64) * (command[k + 1] - command[k])
+        let part = if held { 0.0 } else { place - k as f64 };
+        command[k] + part * (command[k + 1] - command[k])
     };
     let inertia = (rig.mass + rig.arm_mass / 3.0) * rig.length * rig.length + servo.armature;
     let weight = (rig.mass + 0.5 * rig.arm_mass) * 9.80665 * rig.length;
     let (mut q, mut v, mut set) = (0.0f64, 0.0f64, command[0]);
-    let mut seen: VecDeque<f64> = VecDeque::from(vec![q; (servo.loop_delay / h).round() as usize]);
+    let old = (servo.loop_delay / h).round() as usize;
+    let mut seen: VecDeque<[f64; 2]> = VecDeque::from(vec![[q, v]; old]);
     let mut position = Vec::with_capacity(rows + 1);
     let tick = TAU / servo.ticks;
     for start in t.iter().take(rows + 1) {
@@ -185,12 +211,20 @@ pub fn run_servo(
                 Some(limit) => set + (target - set).clamp(-limit * h, limit * h),
                 None => target,
             };
-            seen.push_back(q);
-            let old = seen.pop_front().unwrap_or(q);
-            let duty = servo.firmware_gain * kp * (set - old);
-            let volts = servo.supply * duty.clamp(-servo.duty_max, servo.duty_max);
-            let motor = servo.kt * (volts - servo.kt * v) / servo.resistance;
-            let stalled = servo.kt * volts / servo.resistance;
+            seen.push_back([q, v]);
+            let [old, old_speed] = seen.pop_front().unwrap_or([q, v]);
+            let (motor, stalled) = match servo.drive {
+                ServoDrive::Volts => {
+                    let duty = servo.firmware_gain * kp * (set - old);
+                    let volts = servo.supply * duty.clamp(-servo.duty_max, servo.duty_max);
+                    let torque = |volts: f64| servo.kt * volts / servo.resistance;
+                    (torque(volts - servo.kt * v), torque(volts))
+                }
+                ServoDrive::Torque { kd, limit } => {
+                    let torque = (kp * (set - old) - kd * old_speed).clamp(-limit, limit);
+                    (torque, torque)
+                }
+            };
             let dry = servo.coulomb + servo.load_friction * stalled.abs();
             let pushed = motor - weight * q.sin() - servo.viscous * v;
             if v == 0.0 && pushed.abs() <= dry {
@@ -222,7 +256,137 @@ pub fn run_servo(
     }
 }
 
+impl ServoPlant {
+    /// Its numbers by the names of a drive's model file.
+    fn parameters(&self) -> Vec<Parameter> {
+        let per_volt = self.kt / self.resistance;
+        let of = |name: &str, value: f64, unit: &str, meaning: &str| {
+            parameter(name, Some("servo"), value, unit, meaning)
+        };
+        let mut out = vec![
+            of(
+                "armature",
+                self.armature,
+                "kg m^2",
+                "inertia of rotor and gears at the output",
+            ),
+            of("coulomb", self.coulomb, "Nm", "dry friction"),
+        ];
+        match self.drive {
+            ServoDrive::Volts => out.extend([
+                of(
+                    "stiffness",
+                    self.firmware_gain * self.supply * per_volt,
+                    "Nm/rad",
+                    "torque per radian and unit of kp",
+                ),
+                of(
+                    "damping",
+                    self.kt * per_volt + self.viscous,
+                    "Nm s/rad",
+                    "viscous friction and back-EMF",
+                ),
+                of(
+                    "torque_limit",
+                    self.duty_max * self.supply * per_volt,
+                    "Nm",
+                    "largest torque at standstill",
+                ),
+            ]),
+            ServoDrive::Torque { limit, .. } => {
+                out.push(of("damping", self.viscous, "Nm s/rad", "viscous friction"));
+                if limit.is_finite() {
+                    out.push(of("torque_limit", limit, "Nm", "largest torque"));
+                }
+            }
+        }
+        if self.load_friction > 0.0 {
+            let meaning = "dry friction per torque of the drive";
+            out.push(of("load_friction", self.load_friction, "", meaning));
+        }
+        if let Some(limit) = self.speed_limit {
+            out.push(of(
+                "speed_limit",
+                limit,
+                "rad/s",
+                "largest speed of the set point",
+            ));
+        }
+        let late = [
+            ("command_delay", self.command_delay, "the command is late"),
+            (
+                "loop_delay",
+                self.loop_delay,
+                "the controller acts on an old position",
+            ),
+        ];
+        let late = late.into_iter().filter(|(_, value, _)| *value > 0.0);
+        out.extend(late.map(|(name, value, meaning)| parameter(name, None, value, "s", meaning)));
+        out
+    }
+}
+
 impl ServoRun {
+    /// Columns of its table and its rows.
+    pub fn table(&self) -> ([&'static str; 3], impl Iterator<Item = [f64; 3]>) {
+        let rows = self.t.iter().zip(&self.position).zip(&self.command);
+        let rows = rows.map(|((t, q), command)| [*t, *q, *command]);
+        (["t", "q_servo", "q_des_servo"], rows)
+    }
+
+    /// What was true.
+    pub fn summary(&self, version: &str, seed: u64) -> SimulationSummary {
+        SimulationSummary {
+            truth: TruthFile {
+                version: version.to_owned(),
+                seed,
+                model: "servo".to_owned(),
+                setup: None,
+                ending: "completed".to_owned(),
+                volt_noise: Vec::new(),
+                torque_noise: Vec::new(),
+                parameters: self.servo.parameters(),
+                effects: Vec::new(),
+            },
+            limits: Vec::new(),
+            ending: RunEnding::Completed,
+            saturated: Vec::new(),
+        }
+    }
+
+    /// The rig as a URDF: a rod that hangs down, with a mass at its end.
+    pub fn urdf(&self) -> String {
+        let ServoRig {
+            mass,
+            arm_mass,
+            length,
+        } = self.rig;
+        let whole = mass + arm_mass;
+        let centre = (mass + 0.5 * arm_mass) * length / whole;
+        let about_axis = (mass + arm_mass / 3.0) * length * length;
+        let about_centre = about_axis - whole * centre * centre;
+        format!(
+            r#"<robot name="rig">
+  <link name="base"/>
+  <joint name="servo" type="revolute">
+    <parent link="base"/>
+    <child link="rod"/>
+    <axis xyz="0 1 0"/>
+    <limit lower="-3.2" upper="3.2" effort="100" velocity="100"/>
+  </joint>
+  <link name="rod">
+    <inertial>
+      <origin xyz="0 0 {}"/>
+      <mass value="{whole}"/>
+      <inertia ixx="{about_centre}" iyy="{about_centre}" izz="1e-6" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+  </link>
+</robot>
+"#,
+            -centre
+        )
+    }
+
     /// Name of its file.
     pub fn file_name(&self) -> String {
         let (mass, length) = (self.rig.mass, self.rig.length);

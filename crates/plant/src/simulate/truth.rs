@@ -20,7 +20,7 @@ pub struct TruthFile {
     pub version: String,
     /// Seed of everything that chance decided.
     pub seed: u64,
-    /// "cft", "single-joint" or "serial".
+    /// "cft", "single-joint", "serial" or "servo".
     pub model: String,
     /// Set-up of the CFT robot.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,7 +84,14 @@ impl<const J: usize> Plant<J> {
     }
 }
 
-fn parameter(name: &str, joint: Option<&str>, value: f64, unit: &str, meaning: &str) -> Parameter {
+/// A true parameter.
+pub(super) fn parameter(
+    name: &str,
+    joint: Option<&str>,
+    value: f64,
+    unit: &str,
+    meaning: &str,
+) -> Parameter {
     Parameter {
         name: name.to_owned(),
         theta: None,

@@ -24,7 +24,7 @@ pub(super) fn most_wrong(errors: &[f64]) -> (Vec<usize>, Option<String>) {
 
 /// The errors of the joints with the largest ones, for a screen.
 pub(super) fn largest_errors(writer: &mut Writer, caption: &str, rows: &[JointError]) {
-    let errors: Vec<f64> = rows.iter().map(|row| row.relative_error).collect();
+    let errors: Vec<f64> = rows.iter().map(JointError::headline).collect();
     let (joints, more) = most_wrong(&errors);
     writer.table(torque_errors(caption, joints.iter().map(|j| &rows[*j])));
     if let Some(more) = more {
@@ -37,12 +37,18 @@ pub(super) fn torque_errors<'a>(
     caption: &str,
     joints: impl IntoIterator<Item = &'a JointError>,
 ) -> Table {
-    Columns::new(caption, joints)
+    let joints: Vec<&JointError> = joints.into_iter().collect();
+    let rests = joints.iter().any(|e| e.relative_error_rest.is_some());
+    Columns::new(caption, &joints)
         .words("joint", |e| &e.joint)
-        .percent("relative error", |e| e.relative_error)
-        .digits("rms error", 3, |e| e.rmse)
-        .digits("largest", 3, |e| e.max_abs)
+        .percent("in motion", |e| e.relative_error_moving)
+        .digits("rms error", 3, |e| e.rmse_moving)
         .words("unit", |e| e.unit)
+        .when(rests, |columns| {
+            columns.percent("at rest", |e| e.relative_error_rest)
+        })
+        .percent("all rows", |e| e.relative_error)
+        .digits("largest", 3, |e| e.max_abs)
         .numbers("R2", |e| words::r2(e.r2))
         .column(Align::Right, "samples", |e| e.samples.to_string())
         .into()
@@ -59,6 +65,7 @@ mod tests {
             unit: "Nm",
             relative_error: 0.0052,
             relative_error_moving: Some(0.0052),
+            rmse_moving: Some(0.0123),
             relative_error_rest: None,
             relative_error_raw: 0.0052,
             rmse: 0.0123,
@@ -71,6 +78,9 @@ mod tests {
         };
         let text = torque_errors("Validation on unseen.csv", [&row]).to_string();
         let last: Vec<&str> = text.lines().last().unwrap().split_whitespace().collect();
-        assert_eq!(last.join(" "), "q4 0.520 % 0.0123 0.0900 Nm 0.99993 2000");
+        assert_eq!(
+            last.join(" "),
+            "q4 0.520 % 0.0123 Nm 0.520 % 0.0900 0.99993 2000"
+        );
     }
 }

@@ -300,6 +300,8 @@ fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyEr
         .iter()
         .zip(&whole)
         .map(|(a, w)| if *w > 0.0 { a / w } else { 1.0 });
-    let error = growth.zip(&fit.relative_error).map(|(g, e)| g * e.all);
+    let error = growth
+        .zip(&fit.relative_error)
+        .map(|(g, e)| g * e.moving.unwrap_or(e.all));
     Ok((found, error.collect()))
 }

@@ -37,6 +37,8 @@ pub struct JointResidual {
     pub relative_error: f64,
     /// The same of the rows in which the joint moves.
     pub relative_error_moving: Option<f64>,
+    /// Root mean square of the rows in which the joint moves \[unit\].
+    pub rmse_moving: Option<f64>,
     /// The same of the rows in which it rests; null where it never does.
     pub relative_error_rest: Option<f64>,
 }
@@ -50,6 +52,7 @@ impl JointResidual {
             rmse: error.rmse,
             relative_error: error.relative_error,
             relative_error_moving: error.relative_error_moving,
+            rmse_moving: error.rmse_moving,
             relative_error_rest: error.relative_error_rest,
         }
     }

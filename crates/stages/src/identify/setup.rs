@@ -29,6 +29,8 @@ pub struct CheckedSetup {
     pub corrected: Option<RobotFile>,
     /// What differs in it.
     pub edits: Vec<Edit>,
+    /// The robot file as it is declared, with the torques that its drives do not exceed; none where there are none.
+    pub limited: Option<RobotFile>,
 }
 
 /// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
@@ -158,8 +160,18 @@ fn checked(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> Che
         .correction
         .as_ref()
         .filter(|by| by.begins.iter().all(Option::is_none));
+    let report = setup_words::report(machine, problem, searched);
+    let limited = (!report.torque_limits.is_empty()).then(|| {
+        let mut file = machine.file.clone();
+        for of in &report.torque_limits {
+            let own = file.log.joint.entry(of.joint.clone()).or_default();
+            own.torque_limit = Some(of.limit);
+        }
+        file
+    });
     CheckedSetup {
-        report: setup_words::report(machine, problem, searched),
+        limited,
+        report,
         corrected: by.map(|by| declared.corrected(&edits, by)),
         edits,
     }

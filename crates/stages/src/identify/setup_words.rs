@@ -6,8 +6,8 @@ use super::logged_robot::LoggedRobot;
 use super::setup_file::Declared;
 use crate::setup::{
     Alternative, Cause, Change, ChannelKind, Correction, DecidedBy, Drive, Finding, FindingKind,
-    FindingSeverity, Found, FrictionPower, LIMITS, Problem, Searched, Setting, SetupErrors,
-    SetupEstimate, SetupReport, Undecided,
+    FindingSeverity, Found, FoundTorqueLimit, FrictionPower, LIMITS, Problem, Searched, Setting,
+    SetupErrors, SetupEstimate, SetupReport, Undecided,
 };
 use ChannelKind::{Position, Torque};
 use cft_ident_core::number::{percent, significant};
@@ -38,7 +38,16 @@ pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Search
         cause: "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine".to_owned(),
     }
     };
+    let limit = |of: &crate::setup::UndeliveredTorque| FoundTorqueLimit {
+        joint: words.joints[of.joint].clone(),
+        // what is printed is what is declared
+        limit: significant(of.level, 3).parse().unwrap_or(of.level),
+        unit: machine.file.torque_unit(of.joint).to_owned(),
+        share: of.beyond,
+        errors: of.errors,
+    };
     SetupReport {
+        torque_limits: searched.undelivered.iter().map(limit).collect(),
         friction_power: searched.driven.iter().map(power).collect(),
         findings,
     }

@@ -237,11 +237,11 @@ fn errors_of(
 pub fn not_a_validation(errors: &TorqueErrors) -> Option<String> {
     let moving = |e: &&JointError| e.relative_error_moving.is_some_and(|error| error > 1.0);
     let worst = errors.joints.iter().filter(moving);
-    let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))?;
+    let worst = worst.max_by(|a, b| a.headline().total_cmp(&b.headline()))?;
     Some(format!(
         "this is no validation of {}, whose torque is off by {} of itself: a log of another robot, unit, sign or order of joints, or a joint whose torque the model does not have (`cft-ident inspect` with the robot file looks for the former, `diagnose` for the latter)",
         worst.joint,
-        number::percent(worst.relative_error)
+        number::percent(worst.headline())
     ))
 }
 

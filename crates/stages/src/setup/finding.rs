@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::condition::DecidedBy;
+use cft_ident_core::number::{percent, significant};
 
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -211,6 +212,34 @@ pub struct FrictionPower {
     pub cause: String,
 }
 
+/// A torque that the drive of a joint does not exceed, whatever it is asked for.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct FoundTorqueLimit {
+    pub joint: String,
+    /// \[unit\]
+    pub limit: f64,
+    /// N or Nm, or that of a current.
+    pub unit: String,
+    /// Share of the rows in which it is asked for more.
+    pub share: f64,
+    /// Relative error of the torque with these rows and without.
+    pub errors: [f64; 2],
+}
+
+impl FoundTorqueLimit {
+    /// As it is reported.
+    pub fn sentence(&self) -> String {
+        let limit = significant(self.limit, 3);
+        let [with, without] = self.errors.map(percent);
+        format!(
+            "saturation of {joint}: the motion follows its torque up to about {limit} {} only, and {} of the rows ask for more, which the drive does not deliver, or something holds the joint; a fit leaves them out (error {with} with them, {without} without); `torque_limit = {limit}` in [log.joint.{joint}] of the robot file declares it, --as-declared keeps the rows",
+            self.unit,
+            percent(self.share),
+            joint = self.joint,
+        )
+    }
+}
+
 /// What the check of a set-up found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct SetupReport {
@@ -218,6 +247,8 @@ pub struct SetupReport {
     pub findings: Vec<Finding>,
     /// Joints whose friction drives them.
     pub friction_power: Vec<FrictionPower>,
+    /// Joints whose torque was asked for and not delivered.
+    pub torque_limits: Vec<FoundTorqueLimit>,
 }
 
 impl SetupReport {

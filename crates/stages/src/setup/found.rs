@@ -5,6 +5,7 @@ use super::correction::{Change, Correction};
 use super::estimate::SetupEstimate;
 use super::physics::Driven;
 use super::undecided::Undecided;
+use super::undelivered::UndeliveredTorque;
 use super::weight::Weight;
 
 /// A mistake, with the errors of every joint on blocks left out.
@@ -43,4 +44,6 @@ pub struct Searched {
     pub weights: Vec<Weight>,
     /// Joints that miss much, and no mistake that repairs them.
     pub undecided: Vec<Undecided>,
+    /// Joints whose torque was asked for and not delivered, where no mistake explains them.
+    pub undelivered: Vec<UndeliveredTorque>,
 }

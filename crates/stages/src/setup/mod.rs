@@ -25,6 +25,7 @@ mod sample;
 mod search;
 mod trial;
 mod undecided;
+mod undelivered;
 mod weight;
 
 pub(crate) use channels::{Channels, Drive};
@@ -32,8 +33,8 @@ pub use condition::{DecidedBy, SetupCriterion};
 pub(crate) use correction::{Change, Correction};
 pub(crate) use estimate::SetupEstimate;
 pub use finding::{
-    Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, Setting,
-    SetupErrors, SetupReport,
+    Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FoundTorqueLimit,
+    FrictionPower, Setting, SetupErrors, SetupReport,
 };
 pub(crate) use found::{Found, Searched};
 pub(crate) use physics::Driven;
@@ -41,6 +42,7 @@ pub(crate) use problem::{KnownBeforehand, Problem};
 pub(crate) use sample::{Sample, Thinner};
 pub(crate) use search::search;
 pub(crate) use undecided::{Cause, Undecided};
+pub use undelivered::UndeliveredTorque;
 pub(crate) use weight::{Weight, WeightGain};
 
 /// The numbers that decide beside those of the judge.

@@ -94,7 +94,59 @@ impl JointRows {
     }
 }
 
+/// Least mean sign of the speed about a row in which a joint moves.
+const MOVING: f64 = 0.95;
+
+/// Rows of one joint: its columns, and its torque.
+pub(super) struct JointTable {
+    pub columns: usize,
+    data: Vec<f64>,
+}
+
+impl JointTable {
+    pub fn new(columns: usize) -> Self {
+        Self {
+            columns,
+            data: Vec::new(),
+        }
+    }
+
+    pub fn push(&mut self, columns: &[f64], torque: f64) {
+        self.data.extend_from_slice(columns);
+        self.data.push(torque);
+    }
+
+    pub fn rows(&self) -> usize {
+        self.data.len() / (self.columns + 1)
+    }
+
+    pub fn row(&self, k: usize) -> &[f64] {
+        let at = k * (self.columns + 1);
+        &self.data[at..at + self.columns]
+    }
+
+    pub fn torque(&self, k: usize) -> f64 {
+        self.data[k * (self.columns + 1) + self.columns]
+    }
+}
+
 impl Rows {
+    /// The rows of a joint in which it moves, whose torque is that of its own channel; `sign` is the place of the
+    /// column with the sign of its speed, by the number of columns. Beside a reversal, where it is not 1, friction
+    /// takes any torque.
+    pub fn of_joint(&self, j: usize, sign: impl Fn(usize) -> Option<usize>) -> JointTable {
+        let of = &self.joints[j];
+        let columns = of.columns - self.joints.len();
+        let sign = sign(columns);
+        let mut table = JointTable::new(columns);
+        for row in of.data.chunks_exact(stride(of.columns)) {
+            if sign.is_none_or(|place| row[place].abs() > MOVING) {
+                table.push(&row[..columns], row[columns + j]);
+            }
+        }
+        table
+    }
+
     /// Sums of products of a block, by joint.
     pub fn block(&self, b: usize) -> &[DMatrix<f64>] {
         let of = |rows: &Range<usize>| {

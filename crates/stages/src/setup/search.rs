@@ -13,6 +13,7 @@ use super::physics::Broken;
 use super::problem::Problem;
 use super::trial::{Compared, Trial};
 use super::undecided::undecided;
+use super::undelivered::undelivered;
 use super::weight::weights;
 use cft_ident_core::judge::NUMBERS;
 
@@ -64,8 +65,12 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
         out.without_gravity = look.without_gravity(&declared.trial);
         out.weights = weights(problem);
         out.found.extend(look.within_limits(&declared));
+        out.undelivered = undelivered(problem, &declared.trial);
         if out.estimate.is_none() && out.found.is_empty() {
             out.undecided = undecided(problem, &declared.trial);
+            let limits = &out.undelivered;
+            let limited = |j: usize| limits.iter().any(|limit| limit.joint == j);
+            out.undecided.retain(|of| !limited(of.joint));
         }
     }
     out

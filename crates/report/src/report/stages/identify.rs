@@ -7,6 +7,7 @@ use crate::report::sections::{fit, friction, parameters, provenance, residual, s
 use crate::report::words::{escaped, listed};
 use crate::report::{Report, Writer};
 use cft_ident_core::number;
+use cft_ident_core::validate::JointError;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::{Provenance, escape};
@@ -178,7 +179,7 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Ori
         }
         (ShownLogs::Model(replayed), _) => {
             if let Some(validated) = &found.validated {
-                let errors = validated.judged().joints.iter().map(|j| j.relative_error);
+                let errors = validated.judged().joints.iter().map(JointError::headline);
                 sketch::section(page, machine, replayed.poses.as_ref(), errors);
             }
             let title = escaped(of.unseen);

@@ -227,18 +227,19 @@ fn far_off(found: &IdentifiedDynamics) -> Vec<String> {
 /// The residual of the fit, of these joints.
 pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics, joints: &[usize]) {
     let torque = |v: f64| number::significant(v, 3);
-    let rows = joints.iter();
-    let rows = rows.map(|&j| (&found.joints[j], found.fit.torque_rms[j]));
-    let caption = "residual of the model, on the logs that were fitted";
+    let rows = joints.iter().map(|&j| &found.joints[j]);
+    let caption = "residual of the model in motion, on the logs that were fitted";
     let columns = Columns::new(caption, rows)
-        .words("joint", |(joint, _)| &joint.joint)
-        .percent("relative error", |(joint, _)| joint.headline())
-        .numbers("residual rms", |(joint, _)| torque(joint.rmse))
-        .numbers("torque rms", |(joint, rms)| match joint.moves() {
-            true => torque(rms),
-            false => number::ABSENT.to_owned(),
+        .words("joint", |joint| &joint.joint)
+        .percent("relative error", |joint| joint.headline())
+        .numbers("residual rms", |joint| {
+            torque(joint.rmse_moving.unwrap_or(joint.rmse))
         })
-        .words("unit", |(joint, _)| joint.unit);
+        .numbers("torque rms", |joint| match joint.rmse_moving {
+            Some(residual) => torque(residual / joint.headline()),
+            None => number::ABSENT.to_owned(),
+        })
+        .words("unit", |joint| joint.unit);
     writer.table(columns);
     let plain = &found.unconstrained_residual;
     if !plain.is_empty() {

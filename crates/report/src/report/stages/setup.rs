@@ -1,11 +1,14 @@
 //! The findings of the check of a set-up, for every report.
 
 use crate::report::Writer;
-use cft_ident_stages::setup::{FindingSeverity, SetupReport};
+use cft_ident_stages::setup::{FindingSeverity, FoundTorqueLimit, FrictionPower, SetupReport};
 
 /// The findings, nothing where there is none.
 pub fn section(out: &mut Writer, report: &SetupReport) {
-    if report.findings.is_empty() && report.friction_power.is_empty() {
+    let power = report.friction_power.iter().map(FrictionPower::sentence);
+    let limits = report.torque_limits.iter().map(FoundTorqueLimit::sentence);
+    let sentences: Vec<String> = power.chain(limits).collect();
+    if report.findings.is_empty() && sentences.is_empty() {
         return;
     }
     out.line("set-up of the robot file");
@@ -28,9 +31,9 @@ pub fn section(out: &mut Writer, report: &SetupReport) {
             out.note("    ", &text, 4);
         }
     }
-    for power in &report.friction_power {
+    for sentence in &sentences {
         out.line("");
-        out.note("", &power.sentence(), 0);
+        out.note("", sentence, 0);
     }
     out.line("");
 }

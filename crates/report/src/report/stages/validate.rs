@@ -90,8 +90,8 @@ fn bars(of: &Validate) -> ErrorFigure {
     let joints = of.found.judged().joints.iter().enumerate();
     let joints = joints.map(|(j, e)| JointBars {
         joint: e.joint.clone(),
-        before: used(j).map(|used| used.relative_error.into()),
-        after: e.relative_error.into(),
+        before: used(j).map(|used| used.headline().into()),
+        after: e.headline().into(),
     });
     ErrorFigure {
         title: "Relative torque error".to_owned(),
@@ -116,7 +116,7 @@ pub fn pictures(
     match replayed {
         Some(replayed) => {
             let machine = of.machine;
-            let errors = of.found.judged().joints.iter().map(|j| j.relative_error);
+            let errors = of.found.judged().joints.iter().map(JointError::headline);
             sketch::section(page, machine, replayed.poses.as_ref(), errors);
             friction::section(page, machine, &replayed.friction, &replayed.logs);
             torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
@@ -165,7 +165,7 @@ pub(super) fn overall(terminal: &mut Writer, of: &TorqueErrors) {
         _ => String::new(),
     };
     terminal.paragraph(&format!(
-        "over joints {}{pooled}; before the parallel filter: {}",
+        "all rows, over joints {}{pooled}; before the parallel filter: {}",
         number::percent(of.overall.mean_relative_error),
         listed(raw)
     ));
@@ -210,10 +210,9 @@ pub(super) fn words(
     title: &str,
 ) -> Words {
     let figure = |label, value, tone| Figure { label, value, tone };
-    let error = of.overall.mean_relative_error;
-    let beyond = |e: &&JointError| {
-        limit.is_some_and(|limit| e.relative_error.is_nan() || e.relative_error > limit)
-    };
+    let error = of.overall.mean_relative_error_moving;
+    let beyond =
+        |e: &&JointError| limit.is_some_and(|limit| e.headline().is_nan() || e.headline() > limit);
     let beyond = of.joints.iter().filter(|e| e.moves()).filter(beyond);
     let beyond = listed(beyond.map(|e| e.joint.as_str()));
     let tone = match (beyond.is_empty(), error > usual::band(torque_is)[1]) {
@@ -223,14 +222,10 @@ pub(super) fn words(
     };
     let mut figures = vec![figure("error", number::percent(error), tone)];
     let joints = of.joints.iter().filter(|e| e.moves());
-    let worst = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
+    let worst = joints.max_by(|a, b| a.headline().total_cmp(&b.headline()));
     let mut over = String::new();
     if let Some(worst) = worst.filter(|_| of.joints.len() > 1) {
-        let value = format!(
-            "{} ({})",
-            number::percent(worst.relative_error),
-            worst.joint
-        );
+        let value = format!("{} ({})", number::percent(worst.headline()), worst.joint);
         figures.push(figure("largest", value, Tone::Plain));
         over = format!(", rms over {} joints", of.joints.len());
     }
@@ -252,7 +247,7 @@ pub(super) fn words(
     Words {
         headline: Headline {
             figures,
-            of: format!("relative torque error on {title}{over}"),
+            of: format!("relative torque error in motion, on {title}{over}"),
         },
         found,
     }
@@ -263,13 +258,15 @@ fn errors(page: &mut Writer, of: &TorqueErrors, caption: &str) {
     let torque = |v: f64, e: &JointError| format!("{} {}", number::significant(v, 3), e.unit);
     let columns = Columns::new(caption, &of.joints)
         .words("joint", |e| &e.joint)
-        .percent("relative error", |e| e.relative_error)
-        .words("rms error", |e| torque(e.rmse, e))
+        .percent("in motion", |e| e.relative_error_moving)
+        .words("rms error", |e| {
+            torque(e.rmse_moving.unwrap_or(f64::NAN), e)
+        })
+        .percent("at rest", |e| e.relative_error_rest)
+        .percent("all rows", |e| e.relative_error)
         .words("largest", |e| torque(e.max_abs, e))
         .words("R\u{b2}", |e| r2(e.r2))
-        .percent("moving", |e| e.relative_error_moving)
-        .percent("at rest", |e| e.relative_error_rest)
-        .percent("relative error before the filter", |e| e.relative_error_raw)
+        .percent("before the filter", |e| e.relative_error_raw)
         .words("rows", |e| e.samples.to_string());
     page.table(columns);
 }
