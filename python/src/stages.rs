@@ -246,6 +246,7 @@ pub fn validate(
             limit: None,
             given: &provenance,
             next: "cft_ident.diagnose(model, [fitted], holdout=[log])",
+            uses: "model.to_c(\"model.h\")",
         });
         Ok(shown(&document.map_err(of_input)?, &report))
     })

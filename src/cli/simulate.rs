@@ -64,7 +64,7 @@ pub struct Args {
         value_name = "MOTION",
         group = "motion",
         value_parser = servo::motion,
-        conflicts_with_all = ["robot", "model", "seconds", "position", "effects"]
+        conflicts_with_all = ["robot", "model", "seconds", "travel", "position", "speed", "effects", "candidates"]
     )]
     pub servo: Option<BenchMotion>,
     /// Proportional gain of the servo [counts of its firmware, or N m/rad with --kd] [default: 16]
@@ -124,7 +124,7 @@ pub struct Args {
         requires = "effects"
     )]
     pub candidates: Option<PathBuf>,
-    /// Seed of every random number
+    /// Seed of every random number; of the motions of a servo, places are drawn
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Log to write
@@ -143,6 +143,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
     let path = match (args.servo, &args.robot) {
         (Some(motion), _) => return servo::run(motion, args, &truth_path, context),
+        (None, Some(_)) if args.kp.is_some() || args.kd.is_some() || !args.drive.is_empty() => {
+            let text = "--kp, --kd and --drive are of a servo, --servo MOTION";
+            return Err(CliError::usage(text));
+        }
         (None, Some(path)) => path,
         (None, None) => return Err(CliError::usage("no robot is given").hint("-r ROBOT.toml")),
     };

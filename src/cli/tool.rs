@@ -1,6 +1,6 @@
 //! `cft-ident tool`: what hangs on a wrist force-torque sensor.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, Outcome, arguments, paths_of, written};
 use cft_ident_core::explain::Explain;
@@ -63,6 +63,8 @@ pub(super) fn failed(error: ToolError) -> CliError {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs = paths_of(&args.logs).chain(paths_of(&args.holdout));
+    let beside = args.wrench.as_deref().map(Path::new);
+    let inputs = inputs.chain(beside).chain(args.urdf.as_deref());
     let outputs = [Some(args.output.as_path()), args.report.as_deref()];
     context.check_outputs(inputs, outputs.into_iter().flatten())?;
     let request = |logs: &[LogSpec], wrench: Option<String>| WrenchRequest {
@@ -77,7 +79,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let held_out = match args.holdout.is_empty() {
         true => None,
         false => {
-            let (held_out, more) = read_wrenches(&request(&args.holdout, None)).map_err(failed)?;
+            // a topic is that of every recording, a file the one beside its log
+            let topic = args.wrench.clone().filter(|name| !Path::new(name).exists());
+            let (held_out, more) = read_wrenches(&request(&args.holdout, topic)).map_err(failed)?;
             inputs.extend(more);
             Some(held_out)
         }

@@ -64,7 +64,7 @@ pub fn missed(errors: &TorqueErrors, limit: Option<f64>) -> Vec<String> {
     let above = |e: &&JointError| e.headline().is_nan() || e.headline() > limit;
     let words = |e: &JointError| {
         let [error, limit] = [e.headline(), limit].map(number::percent);
-        format!("{}: relative error {error} is above {limit}", e.joint)
+        format!("{}: error in motion {error} is above {limit}", e.joint)
     };
     errors.joints.iter().filter(above).map(words).collect()
 }
@@ -177,6 +177,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         limit: args.max_relative_error,
         given: &given.provenance,
         next: &next,
+        uses: &format!("cft-ident export -m {model_path} --c model.h"),
     };
     let mut report = stages::validate::validate(&of);
     if let Some(found) = &found.open_loop {

@@ -28,7 +28,7 @@ pub struct JointError {
     /// The same of the rows in which the joint moves, weighed as a fit does: samples where it turns or stands count
     /// less; null where there are none.
     pub relative_error_moving: Option<f64>,
-    /// Root mean square of the same rows in the torque's unit.
+    /// The same times the root mean square of the torque of these rows \[unit\].
     pub rmse_moving: Option<f64>,
     /// The same of the rows in which it rests.
     pub relative_error_rest: Option<f64>,
@@ -408,8 +408,10 @@ impl<'a> Reconstruction<'a> {
             rmse: (s.error / s.rows.max(1) as f64).sqrt(),
             relative_error: ratio([s.error, s.torque], 1).unwrap_or(f64::NAN),
             relative_error_moving: ratio(s.moving, s.rows - s.resting),
-            rmse_moving: (s.rows > s.resting)
-                .then(|| (s.moving[0].max(0.0) / (s.rows - s.resting) as f64).sqrt()),
+            rmse_moving: ratio(s.moving, s.rows - s.resting).map(|relative| {
+                let square = (s.torque - s.rest[1]).max(0.0);
+                relative * (square / (s.rows - s.resting).max(1) as f64).sqrt()
+            }),
             relative_error_rest: ratio(s.rest, s.resting),
             relative_error_raw: known(ratio([s.raw_error, s.raw_torque], 1)),
             coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),

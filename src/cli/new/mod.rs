@@ -8,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, file_name, inspect};
+use super::{CliError, Context, Outcome, file_name, inspect, typed};
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::serial_section::LinkSection;
 use cft_ident_files::config::{Capsules, RobotFile, UrdfChain};
@@ -359,9 +359,10 @@ fn arm_alone(chain: &UrdfChain, mapping: &Mapping, args: &Args) -> Option<String
     let same = joints.iter().map(|joint| joint.name.as_str()).eq(logged);
     same.then(|| {
         format!(
-            "cft-ident new {}-arm --urdf {} --tip {tip} --log {log}",
+            "cft-ident new {}-arm --urdf {} --tip {tip} --log {}",
             args.name.display(),
-            urdf.display()
+            typed::quoted(&urdf.to_string_lossy()),
+            typed::quoted(&log.to_string())
         )
     })
 }

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use super::{Args, CliError, Context, LogFigures, Outcome, SimulationResult, write_truth};
-use crate::cli::{arguments, file_name};
-use cft_ident_core::number;
+use crate::cli::{arguments, file_name, typed};
 use cft_ident_logs::output::{LogForm, LogWriter};
 use cft_ident_plant::simulate::servo::{
     BenchMotion, ServoDrive, ServoPlant, ServoRig, ServoRun, run_servo,
@@ -67,6 +66,9 @@ pub(super) fn numbered(text: &str) -> Result<(String, f64), String> {
     }
 }
 
+/// Travel of a servo that holds on to its commands [rad].
+const MOST_TRAVEL: f64 = 4.0 * std::f64::consts::PI;
+
 /// Delays that the simulation remembers [s].
 const LATEST_S: f64 = 1.0;
 
@@ -79,8 +81,8 @@ pub(super) fn run(
     let json = args.output.extension().is_some_and(|end| end == "json");
     if json == args.kd.is_some() {
         let text = match json {
-            true => "a rig's .json holds no gain of the speed",
-            false => "a table says nothing of the rig of a servo with counts as gains",
+            true => "with --kd the log is a .csv",
+            false => "without --kd the log is a .json",
         };
         return Err(CliError::usage(text).hint(
             "-o LOG.json for a servo that is driven by volts, -o LOG.csv with --kd for one that is driven by torque",
@@ -129,7 +131,12 @@ pub(super) fn run(
     };
     let kp = args.kp.unwrap_or(16.0);
     let made = run_servo(&servo, &numbers.rig, motion, kp, args.seed);
-    if made.position.iter().any(|q| !q.is_finite()) {
+    // a hanging rod that swings over is thrown about
+    if made
+        .position
+        .iter()
+        .any(|q| q.is_nan() || q.abs() > MOST_TRAVEL)
+    {
         return Err(
             CliError::input("this servo runs away: its loop is not stable")
                 .hint("a lower --kp, a smaller delay, or more armature"),
@@ -143,12 +150,12 @@ pub(super) fn run(
     }
     let names = (file_name(&args.output), file_name(truth));
     let result = SimulationResult::of(&summary, args.seed, &figures, &names);
-    let (log, kp) = (args.output.display(), number::significant(kp, 4));
+    let log = typed::quoted(&args.output.to_string_lossy());
     let next = match (&urdf, args.kd) {
         (Some(urdf), Some(kd)) => format!(
             "cft-ident drive {log} -r {} --command 'q_des_*' --kp {kp} --kd {} -o drive.toml",
-            urdf.display(),
-            number::significant(kd, 4)
+            typed::quoted(&urdf.to_string_lossy()),
+            kd
         ),
         _ => format!("cft-ident drive {log} -o drive.toml"),
     };

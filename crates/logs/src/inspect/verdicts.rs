@@ -365,9 +365,10 @@ fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
     draft.rows(fault, &track.missing, &effect, remedy);
     if let Some(most) = track.channel.delivers {
         let effect = format!(
-            "of more than {most}, which the drive does not deliver: what acts is not known, so that these rows are left out of a fit"
+            "of more than {most} {}, the `torque_limit` of the robot file: the drive does not deliver it, so that these rows are left out of a fit",
+            track.channel.unit.as_deref().unwrap_or("N or Nm")
         );
-        let remedy = "nothing where `torque_limit` in [log.joint] of the robot file is right; gentler motions keep the rows";
+        let remedy = "move more gently to keep them, or delete `torque_limit` in [log.joint] where the drive gives more";
         let fault = (Warning, FaultKind::Saturation, Some(track));
         draft.rows(fault, &track.undelivered, &effect, remedy);
         draft.cut(fault, &track.undelivered);

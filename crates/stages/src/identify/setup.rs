@@ -68,7 +68,17 @@ pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, Id
     );
     let searched = search(&problem, &|| control.stopped());
     control.check()?;
-    Ok(checked(machine, &problem, &searched))
+    let mut found = checked(machine, &problem, &searched);
+    // a limit that leaves too little to fit is not taken
+    if let Some(file) = &found.limited {
+        let limited = LoggedRobot::new(&machine.name, file.clone());
+        if sampled(&limited, logs, control).is_err() {
+            control.check()?;
+            found.limited = None;
+            found.report.torque_limits.clear();
+        }
+    }
+    Ok(found)
 }
 
 /// What the robot file knows beside its channels.

@@ -232,7 +232,7 @@ impl FoundTorqueLimit {
         let limit = significant(self.limit, 3);
         let [with, without] = self.errors.map(percent);
         format!(
-            "saturation of {joint}: the motion follows its torque up to about {limit} {} only, and {} of the rows ask for more, which the drive does not deliver, or something holds the joint; a fit leaves them out (error {with} with them, {without} without); `torque_limit = {limit}` in [log.joint.{joint}] of the robot file declares it, --as-declared keeps the rows",
+            "saturation of {joint}: above {limit} {} it does not move as its torque says ({} of the rows): the drive gives no more, or something holds the joint. These rows are left out (error {with} with them, {without} without; `torque_limit = {limit}` in [log.joint.{joint}]); if that is wrong: --as-declared",
             self.unit,
             percent(self.share),
             joint = self.joint,

@@ -78,14 +78,13 @@ const MOST_ROWS: usize = 6000;
 
 fn read(log: &WrenchLog, reading: WrenchReading) -> ReadProblem {
     let rows = reading.rows(log);
-    let moved = log.has_clock.then(|| moving(&rows)).flatten();
+    // how the sensor's place moves is known by its place alone
+    let rest = at_rest(&rows).filter(|rest| log.has_clock && turning(rest) >= NUMBERS.least_turn);
+    let placed = rows.iter().any(|row| row.position.is_some());
+    let moved = (log.has_clock && (placed || rest.is_none())).then(|| moving(&rows));
+    let moved = moved.flatten();
     let inertia = moved.as_ref().is_some_and(|rows| turns_enough(rows));
-    let rows = moved.unwrap_or_else(|| match log.has_clock {
-        true => at_rest(&rows)
-            .filter(|rest| turning(rest) >= NUMBERS.least_turn)
-            .unwrap_or(rows),
-        false => rows,
-    });
+    let rows = moved.or(rest).unwrap_or(rows);
     let every = rows.len().div_ceil(MOST_ROWS);
     let rows = rows.into_iter().step_by(every.max(1)).collect();
     let problem = WrenchProblem::new(rows, inertia);

@@ -64,6 +64,16 @@ impl MovingFrame {
             .iter()
             .map(|joint| self.column(table, joint))
             .collect::<Result<_, _>>()?;
+        for row in 0..table.rows() {
+            let bad = |(c, _): &&(usize, f64)| !table.columns[*c][row].is_finite();
+            if let Some((column, _)) = columns.iter().find(bad) {
+                return Err(ToolError::NoNumber {
+                    file: table.file.clone(),
+                    row: row + 1,
+                    column: escape(&table.names[*column]),
+                });
+            }
+        }
         let of = |row: usize| {
             let q: Vec<f64> = columns
                 .iter()

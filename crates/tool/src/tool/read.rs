@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cft_ident_core::robot::tree::space::{Rotation, Vector};
 use cft_ident_logs::log::{
-    LogSection, LogSpec, Provenance, RawBlock, RawReader, escape, list, listing,
+    LogSection, LogSpec, Provenance, RawBlock, RawReader, TopicFacts, escape, list, listing,
 };
 
 use super::NUMBERS;
@@ -71,6 +71,7 @@ fn table(
         names,
         columns,
         t: (timed || clock.is_some()).then_some(t),
+        origin_s: reader.origin().seconds(),
     };
     if out.t.is_none() && out.names.iter().all(|n| n.starts_with('#')) && first_is_clock(&out) {
         let columns = WrenchColumns::of(&out)?;
@@ -81,6 +82,7 @@ fn table(
             .min();
         if first == Some(1) {
             out.t = Some(out.columns[0].clone());
+            out.origin_s = 0.0;
         }
     }
     Ok(out)
@@ -92,12 +94,14 @@ fn topics(spec: &LogSpec, request: &WrenchRequest) -> Result<Option<[String; 2]>
     if found.is_empty() {
         return Ok(None);
     }
+    let full = |topic: &&TopicFacts| topic.messages > 0;
     let is = |kind: &str, ends: &[&str]| ends.iter().any(|end| kind.ends_with(end));
     let all = || list(found.iter().map(|topic| topic.name.as_str()));
     let wrench = match &request.wrench {
         Some(asked) => found.iter().find(|topic| topic.name == *asked),
         None => found
             .iter()
+            .filter(full)
             .find(|topic| is(&topic.kind, &["WrenchStamped", "Wrench"])),
     };
     let Some(wrench) = wrench else {
@@ -113,18 +117,18 @@ fn topics(spec: &LogSpec, request: &WrenchRequest) -> Result<Option<[String; 2]>
             "TransformStamped",
             "Pose",
             "Transform",
-            "TFMessage",
             "Odometry",
         ],
     };
-    let pose = found.iter().find(|topic| is(&topic.kind, poses));
+    let mut with_poses = found.iter().filter(full);
+    let pose = with_poses.find(|topic| is(&topic.kind, poses));
     let Some(pose) = pose else {
         return Err(ToolError::NoOrientation {
             files: escape(&spec.name()),
             remedy: match request.urdf {
                 Some(_) => "record a JointState beside the wrenches",
                 None => {
-                    "record a PoseStamped or a transform of the sensor beside the wrenches, or give the joints' URDF: --urdf ARM.urdf --frame tool0"
+                    "record a PoseStamped or a TransformStamped of the sensor beside the wrenches, or joint states, with --urdf ARM.urdf --frame tool0; a tree of frames (/tf) is not read"
                 }
             },
         });
@@ -318,27 +322,46 @@ fn joined(
     );
     let same = std::ptr::eq(pose, wrench);
     let clocks = pose.t.as_ref().zip(wrench.t.as_ref()).filter(|_| !same);
+    // each counts from an instant of its own
+    let later = wrench.origin_s - pose.origin_s;
     // logs follow each other
     let after = out.samples.last().map_or(0.0, |last| last.t + 1.0);
     let before = out.samples.len();
     match clocks {
-        Some((of_pose, of_wrench)) if pose.rows() != wrench.rows() || of_pose != of_wrench => {
-            for (row, t) in of_wrench.iter().enumerate() {
-                let Some((k, part)) = between(of_pose, *t) else {
+        Some((of_pose, of_wrench))
+            if pose.rows() != wrench.rows() || of_pose != of_wrench || later != 0.0 =>
+        {
+            let longest = LONGEST_STEP * median_step(of_pose);
+            let mut lost = 0;
+            for (row, t) in of_wrench.iter().map(|t| t + later).enumerate() {
+                let Some((k, part)) = between(of_pose, t) else {
                     continue;
                 };
+                let to = (k + 1).min(of_pose.len() - 1);
+                if of_pose[to] - of_pose[k] > longest {
+                    lost += 1;
+                    continue;
+                }
                 let ends = [k, (k + 1).min(poses.quaternions.len() - 1)];
                 let position = poses.places.as_ref().map(|places| {
                     let [a, b] = ends.map(|k| places[k]);
                     std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
                 });
                 out.samples.push(WrenchSample {
-                    t: *t,
+                    t,
                     quaternion: midway(ends.map(|k| poses.quaternions[k]), part),
                     position,
                     force: forces[row],
                     moment: moments[row],
                 });
+            }
+            if lost > 0 {
+                out.notes.push(format!(
+                    "{}: {lost} wrenches of {} lie in gaps of more than {LONGEST_STEP} usual steps of {} and are left out",
+                    wrench.file,
+                    wrench.rows(),
+                    pose.file
+                ));
             }
             if out.samples.len() == before {
                 return Err(ToolError::ClocksApart {
@@ -395,6 +418,19 @@ fn not_of_length_one(table: &WrenchTable) -> Option<ToolError> {
         columns: list(table.names[from..].iter().map(String::as_str)),
         length: length(row),
     })
+}
+
+/// Usual steps of poses that a straight line bridges.
+const LONGEST_STEP: f64 = 10.0;
+
+/// The step in the middle of all.
+fn median_step(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    match steps.is_empty() {
+        true => f64::INFINITY,
+        false => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
 }
 
 /// The row before a time, and the part of the way to the next.

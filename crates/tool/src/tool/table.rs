@@ -11,6 +11,8 @@ pub(super) struct WrenchTable {
     pub columns: Vec<Vec<f64>>,
     /// Times of the rows \[s\], where there is a clock.
     pub t: Option<Vec<f64>>,
+    /// The instant from which they are counted \[s\].
+    pub origin_s: f64,
 }
 
 impl WrenchTable {

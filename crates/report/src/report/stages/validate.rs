@@ -31,6 +31,8 @@ pub struct Validate<'a> {
     pub given: &'a Provenance,
     /// The command that looks for what the model lacks.
     pub next: &'a str,
+    /// The command that writes the model for a controller.
+    pub uses: &'a str,
 }
 
 /// The errors, and the verdict on them.
@@ -51,11 +53,23 @@ pub fn validate(of: &Validate) -> Report {
     }
     said.write(&mut report.everywhere());
     used_before(&mut report.everywhere(), of);
-    let next = "Next: find what the model lacks, from the log that it was fitted to:";
-    report.terminal().next(next, Some(of.next.to_owned()));
+    let used = used_for(of.file, &of.found.inputs).contains(&true);
+    let fine = judged.overall.mean_relative_error_moving < usual::band(torque_is)[0];
     // a page is the same wherever its logs lie
-    let next = "Next: find what the model lacks: diagnose the log that it was fitted to, with this one held out.";
-    report.page().next(next, None);
+    let (next, command, on_page) = match fine && !used {
+        true => (
+            "Next: use the model:",
+            of.uses,
+            "Next: use the model: `cft-ident export` writes it for controllers and simulators.",
+        ),
+        false => (
+            "Next: find what the model lacks, from the log that it was fitted to:",
+            of.next,
+            "Next: find what the model lacks: diagnose the log that it was fitted to, with this one held out.",
+        ),
+    };
+    report.terminal().next(next, Some(command.to_owned()));
+    report.page().next(on_page, None);
     report.terminal().line("");
     let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
     let whole = caption(logs);

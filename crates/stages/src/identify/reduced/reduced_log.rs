@@ -79,6 +79,12 @@ impl MadeWith {
                 covariances: known.iter().map(|k| k.covariance).collect(),
             }
         });
+        // a limit that a log's torques showed is that log's own
+        let mut file = file.clone();
+        for own in file.log.joint.values_mut() {
+            own.torque_limit = None;
+        }
+        let file = &file;
         MadeWith {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             robot: sections(file),
