@@ -98,6 +98,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 .to_owned(),
         );
     }
+    let placed = log.samples.iter().any(|sample| sample.position.is_some());
+    if found.motion && !placed {
+        warnings.push(
+            "the sensor moves and the log does not say where it is, so that its acceleration is not known: all numbers may be off by more than their intervals; hold poses, or log joint states with --urdf and --frame"
+                .to_owned(),
+        );
+    }
     let file = ToolFile::of(&found, &context.command, &inputs);
     let path = escape(&args.output.to_string_lossy());
     let mut report = stages::tool::tool(&found, &file, &path);

@@ -204,7 +204,11 @@ fn verdict(
         };
         let joint = s.joint.as_ref().filter(|_| several);
         let at = joint.map_or(String::new(), |joint| format!(" at {joint}"));
-        format!("{}{at}{size}", s.effect.words())
+        // what these data do not tell apart
+        let or: String = (s.alternatives.iter())
+            .map(|other| format!(", or {} instead", other.words()))
+            .collect();
+        format!("{}{at}{size}{or}", s.effect.words())
     });
     let mut text: Vec<String> = each.collect();
     let last = text.pop().unwrap_or_default();

@@ -78,11 +78,13 @@ const MOST_ROWS: usize = 6000;
 
 fn read(log: &WrenchLog, reading: WrenchReading) -> ReadProblem {
     let rows = reading.rows(log);
-    // how the sensor's place moves is known by its place alone
+    // how the sensor's place moves is known by its place alone, and poses that are held need not know it
     let rest = at_rest(&rows).filter(|rest| log.has_clock && turning(rest) >= NUMBERS.least_turn);
     let placed = rows.iter().any(|row| row.position.is_some());
-    let moved = (log.has_clock && (placed || rest.is_none())).then(|| moving(&rows));
-    let moved = moved.flatten();
+    let held = rest
+        .as_ref()
+        .is_some_and(|rest| !placed || 2 * rest.len() >= rows.len());
+    let moved = (log.has_clock && !held).then(|| moving(&rows)).flatten();
     let inertia = moved.as_ref().is_some_and(|rows| turns_enough(rows));
     let rows = moved.or(rest).unwrap_or(rows);
     let every = rows.len().div_ceil(MOST_ROWS);

@@ -62,6 +62,11 @@ pub enum ToolError {
     )]
     ClocksApart { poses: String, wrenches: String },
     #[explain(
+        "{file}: the forces never change",
+        "check cable and driver of the sensor, and which topic or columns hold its forces"
+    )]
+    Silent { file: String },
+    #[explain(
         "{rows} rows with wrench and orientation are too few for {unknowns} unknowns",
         "hold at least six poses, the sensor's axes up, down and to the sides"
     )]

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::tree::space::{Rotation, Vector};
 use cft_ident_logs::log::{
     LogSection, LogSpec, Provenance, RawBlock, RawReader, TopicFacts, escape, list, listing,
@@ -187,7 +188,7 @@ fn poses(
 
 fn no_number(table: &WrenchTable, row: usize, columns: &[usize]) -> ToolError {
     let mut columns = columns.iter();
-    let bad = columns.find(|column| !table.columns[**column][row].is_finite());
+    let bad = columns.find(|column| !is_usable(table.columns[**column][row]));
     ToolError::NoNumber {
         file: table.file.clone(),
         row: row + 1,
@@ -198,7 +199,7 @@ fn no_number(table: &WrenchTable, row: usize, columns: &[usize]) -> ToolError {
 fn triples(table: &WrenchTable, of: &[(usize, f64); 3]) -> Result<Vec<Vector>, ToolError> {
     let row = |row: usize| {
         let x = of.map(|(column, factor)| factor * table.columns[column][row]);
-        match x.iter().all(|x| x.is_finite()) {
+        match x.iter().all(|x| is_usable(*x)) {
             true => Ok(x),
             false => Err(no_number(table, row, &of.map(|(column, _)| column))),
         }
@@ -320,6 +321,12 @@ fn joined(
         scaled(triples(wrench, &force)?),
         scaled(triples(wrench, &moment)?),
     );
+    let constant = |k: usize| forces.iter().all(|force| force[k] == forces[0][k]);
+    if forces.len() > 1 && (0..3).all(constant) {
+        return Err(ToolError::Silent {
+            file: wrench.file.clone(),
+        });
+    }
     let same = std::ptr::eq(pose, wrench);
     let clocks = pose.t.as_ref().zip(wrench.t.as_ref()).filter(|_| !same);
     // each counts from an instant of its own
