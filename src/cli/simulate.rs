@@ -29,7 +29,7 @@ use cft_ident_report::report::table::{Align, Table};
 const EXAMPLE: &str = "\
 Example:
   cft-ident simulate -r configs/cft.toml --move q4 --seconds 20 -o moved.csv
-  cft-ident simulate --servo sines --kp 16 --drive command_delay=0.03 -o servo.json";
+  cft-ident simulate --servo sines --drive command_delay=0.03 -o late.json";
 
 /// Simulate the robot under control and write its log.
 ///
