@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use cft_ident::cli;
-use cft_ident::config::RobotFile;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
     self, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings, LoggedRobot,
@@ -35,18 +34,8 @@ fn all(logs: &[PyRef<'_, Log>]) -> Vec<identify::Log> {
 struct Checked {
     findings: Vec<cft_ident::setup::Finding>,
     warnings: Vec<String>,
-    /// The robot file with torques that its drives do not exceed, where the logs ask for more.
-    limited: Option<RobotFile>,
-}
-
-impl Checked {
-    /// The robot to go on with.
-    fn machine(&self, declared: LoggedRobot) -> LoggedRobot {
-        match &self.limited {
-            Some(file) => LoggedRobot::new(&declared.name, file.clone()),
-            None => declared,
-        }
-    }
+    /// The robot with torques that its drives do not exceed, where the logs ask for more.
+    limited: Option<LoggedRobot>,
 }
 
 /// Refuses a set-up that the torques plainly contradict, as the commands do.
@@ -117,7 +106,7 @@ pub fn friction(
             true => Checked::default(),
             false => checked(&data, control)?,
         };
-        let machine = setup.machine(machine);
+        let machine = setup.limited.unwrap_or(machine);
         let data = Dataset::new(&machine, &logs);
         let settings = FrictionSettings { joint };
         let mut found = identify::friction(&data, &settings, control).map_err(of_stage)?;
@@ -189,7 +178,7 @@ pub fn lsq(
             true => Checked::default(),
             false => checked(&data, control)?,
         };
-        let machine = setup.machine(machine);
+        let machine = setup.limited.unwrap_or(machine);
         let data = Dataset::new(&machine, &logs);
         let settings = LsqSettings {
             estimator: kind,
@@ -316,7 +305,7 @@ pub fn reduce(
             true => Checked::default(),
             false => checked(&data, control)?,
         };
-        let data = Dataset::new(&setup.machine(machine), &logs);
+        let data = Dataset::new(&setup.limited.unwrap_or(machine), &logs);
         let found = identify::reduce(&data, friction.as_ref(), control).map_err(of_stage)?;
         Ok(Part {
             logs: Arc::new(found),

@@ -83,10 +83,7 @@ pub fn checked(
         });
         let new_file = new_file.transpose()?;
         let data = match limited {
-            Some(file) => Dataset {
-                machine: LoggedRobot::new(&machine.name, file),
-                ..data
-            },
+            Some(machine) => Dataset { machine, ..data },
             None => data,
         };
         return Ok(Checked {

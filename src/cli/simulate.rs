@@ -150,7 +150,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         (None, Some(path)) => path,
         (None, None) => return Err(CliError::usage("no robot is given").hint("-r ROBOT.toml")),
     };
-    if args.output.extension().is_some_and(|end| end == "json") {
+    if servo::is_of_rig(&args.output) {
         let text = "-o: a .json is the log of a servo, --servo MOTION";
         return Err(CliError::usage(text));
     }

@@ -1,6 +1,6 @@
 //! `simulate --servo`: a log of command and position of a servo on a pendulum rig.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{Args, CliError, Context, LogFigures, Outcome, SimulationResult, write_truth};
 use crate::cli::{arguments, file_name, typed};
@@ -78,7 +78,7 @@ pub(super) fn run(
     truth: &Path,
     context: &Context,
 ) -> Result<Outcome, CliError> {
-    let json = args.output.extension().is_some_and(|end| end == "json");
+    let json = is_of_rig(&args.output);
     if json == args.kd.is_some() {
         let text = match json {
             true => "with --kd the log is a .csv",
@@ -153,9 +153,8 @@ pub(super) fn run(
     let log = typed::quoted(&args.output.to_string_lossy());
     let next = match (&urdf, args.kd) {
         (Some(urdf), Some(kd)) => format!(
-            "cft-ident drive {log} -r {} --command 'q_des_*' --kp {kp} --kd {} -o drive.toml",
-            typed::quoted(&urdf.to_string_lossy()),
-            kd
+            "cft-ident drive {log} -r {} --command 'q_des_*' --kp {kp} --kd {kd} -o drive.toml",
+            typed::quoted(&urdf.to_string_lossy())
         ),
         _ => format!("cft-ident drive {log} -o drive.toml"),
     };
@@ -197,11 +196,15 @@ fn write(
     Ok(figures)
 }
 
+/// Whether a file is to be a rig's log.
+pub(super) fn is_of_rig(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end == "json")
+}
+
 /// A log to be written, or that of a rig.
-pub(super) fn log_or_rig(text: &str) -> Result<std::path::PathBuf, String> {
-    let path = std::path::PathBuf::from(text);
-    match path.extension().is_some_and(|end| end == "json") {
-        true => Ok(path),
+pub(super) fn log_or_rig(text: &str) -> Result<PathBuf, String> {
+    match is_of_rig(Path::new(text)) {
+        true => Ok(PathBuf::from(text)),
         false => arguments::log_file(text)
             .map_err(|_| format!("must end in {}, or in .json with --servo", LogForm::ENDINGS)),
     }

@@ -90,3 +90,12 @@ pub enum MathError {
         needed: usize,
     },
 }
+
+/// norm(tau - tau_hat) / norm(tau) from the squares of both; NaN where the torque is one that rounding alone makes, of a
+/// motor that is off.
+pub(crate) fn relative_error(error: f64, torque: f64) -> f64 {
+    match torque > f64::EPSILON * error {
+        true => (error / torque).sqrt(),
+        false => f64::NAN,
+    }
+}

@@ -1,5 +1,7 @@
 //! Sums of errors of one joint, row after row and log after log.
 
+use crate::math::relative_error;
+
 /// Sums of one joint.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct ErrorSums {
@@ -77,12 +79,7 @@ impl ErrorSums {
     }
 }
 
-/// norm(tau - tau_hat) / norm(tau) from the squares of both, where there are rows; NaN where the torque is one that
-/// rounding alone makes, of a motor that is off.
+/// The relative error from the squares of error and torque, where there are rows.
 pub(super) fn ratio([error, torque]: [f64; 2], rows: u64) -> Option<f64> {
-    let relative = match torque > f64::EPSILON * error {
-        true => (error / torque).sqrt(),
-        false => f64::NAN,
-    };
-    (rows > 0).then_some(relative)
+    (rows > 0).then(|| relative_error(error, torque))
 }

@@ -234,7 +234,8 @@ fn settle_rivals(
         let starts = ends.iter().flat_map(|end| {
             let by_own = [&end[..shared], &own].concat();
             // lateness of one kind is that of the other
-            let whole = Some(end.clone()).filter(|end| end.len() == by_own.len());
+            let other = |end: &Vec<f64>| end.len() == by_own.len() && *end != by_own;
+            let whole = Some(end.clone()).filter(other);
             std::iter::once(by_own).chain(whole)
         });
         let fits = starts.map(|start| problem.fit(unknowns, &start, &at.scales, FIT.steps));

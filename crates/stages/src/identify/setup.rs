@@ -29,8 +29,8 @@ pub struct CheckedSetup {
     pub corrected: Option<RobotFile>,
     /// What differs in it.
     pub edits: Vec<Edit>,
-    /// The robot file as it is declared, with the torques that its drives do not exceed; none where there are none.
-    pub limited: Option<RobotFile>,
+    /// The robot as it is declared, with the torques that its drives do not exceed; none where there are none.
+    pub limited: Option<LoggedRobot>,
 }
 
 /// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
@@ -70,13 +70,12 @@ pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, Id
     control.check()?;
     let mut found = checked(machine, &problem, &searched);
     // a limit that leaves too little to fit is not taken
-    if let Some(file) = &found.limited {
-        let limited = LoggedRobot::new(&machine.name, file.clone());
-        if sampled(&limited, logs, control).is_err() {
-            control.check()?;
-            found.limited = None;
-            found.report.torque_limits.clear();
-        }
+    if let Some(limited) = &found.limited
+        && sampled(limited, logs, control).is_err()
+    {
+        control.check()?;
+        found.limited = None;
+        found.report.torque_limits.clear();
     }
     Ok(found)
 }
@@ -177,7 +176,7 @@ fn checked(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> Che
             let own = file.log.joint.entry(of.joint.clone()).or_default();
             own.torque_limit = Some(of.limit);
         }
-        file
+        LoggedRobot::new(&machine.name, file)
     });
     CheckedSetup {
         limited,

@@ -97,7 +97,7 @@ fn solved(sums: &DMatrix<f64>) -> Option<DVector<f64>> {
     let normal = DMatrix::from_fn(c, c, |a, b| scale[a] * sums[(a, b)] * scale[b]);
     let target = DVector::from_fn(c, |a, _| scale[a] * sums[(a, c)]);
     let svd = normal.svd(true, true);
-    let found = svd.solve(&target, NUMBERS.ridge.max(1e-10)).ok()?;
+    let found = svd.solve(&target, NUMBERS.ridge).ok()?;
     Some(found.component_mul(&scale))
 }
 
@@ -123,13 +123,16 @@ fn of_joint(joint: usize, table: &JointTable) -> Option<UndeliveredTorque> {
     let level = |i: usize| low * (high / low).powf(i as f64 / LIMITS.levels as f64);
     // residual of the rows up to each level by a fit to them
     let mut tried: Vec<(f64, f64)> = Vec::new();
+    let mut own = DMatrix::zeros(table.columns + 1, table.columns + 1);
+    let mut below = f64::NEG_INFINITY;
     for i in 0..=LIMITS.levels {
         let most = level(i);
+        own += sums(table, |_, tau| tau > below && tau <= most);
+        below = most;
         let kept = torques.partition_point(|tau| *tau <= most);
         if kept < (LIMITS.kept * rows as f64) as usize || kept < LIMITS.rows * table.columns {
             continue;
         }
-        let own = sums(table, |_, tau| tau <= most);
         let theta = solved(&own)?;
         tried.push((most, (left(&own, &theta) / square(&own)).sqrt()));
     }

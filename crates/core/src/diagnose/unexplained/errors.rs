@@ -8,6 +8,7 @@ use crate::diagnose::problem::data_split::{DataSplit, LogRole};
 use crate::diagnose::problem::rests::{resting, standing};
 use crate::effect::AugmentedModel;
 use crate::math::bootstrap::intervals_95;
+use crate::math::relative_error as ratio;
 use crate::motion::MotionError;
 use crate::robot::model::JointFriction;
 
@@ -179,15 +180,6 @@ pub fn pieces(
         }
     }
     Ok(pieces)
-}
-
-/// norm(tau - tau_hat) / norm(tau) from the squares of both; NaN where the torque is one that rounding alone makes, of a
-/// motor that is off.
-fn ratio(error: f64, torque: f64) -> f64 {
-    match torque > f64::EPSILON * error {
-        true => (error / torque).sqrt(),
-        false => f64::NAN,
-    }
 }
 
 /// Relative error of every joint over those of the pieces that were picked, of the rows in which it moves, or of all
