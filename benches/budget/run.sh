@@ -15,9 +15,9 @@ trap 'rm -rf "$work"' EXIT
 stages=$(cat <<'END'
 check of the set-up|stages::setup::trial::Trial::new
 rows of the fit and their filters|motion::window::FilterWindow::process
-data set aside: errors, bands, observer|identify::hold_out::Trial::run
-parameters that can exist|identify::consistent::consistent,identify::consistent::project_in
-solving and its uncertainty|identify::estimate::estimate
+data set aside: errors, bands, observer|held_out::hold_out::Trial::run
+parameters that can exist|fit::consistent::consistent,fit::consistent::project_in
+solving and its uncertainty|fit::estimate::estimate
 position cut-offs|cutoff_costs::{{closure}}
 look at the log|inspect::gate::findings,inspect::look::look
 friction by the Kalman filter|friction::estimate::estimate

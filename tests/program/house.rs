@@ -49,23 +49,55 @@ const ROOMS: &[(&str, &str)] = &[
     ("tool", "explain number robot log config"),
     ("held", "explain number verdict robot block log config tool"),
     (
+        "input",
+        "explain math block verdict number robot log config motion effect friction inertia judge diagnose validate \
+         inspect setup open_loop track",
+    ),
+    (
+        "held_out",
+        "input explain math block verdict number robot log config motion effect friction inertia judge validate \
+         inspect compare band observe open_loop",
+    ),
+    (
+        "fit",
+        "input held_out explain math block verdict number robot log config motion effect friction inertia \
+         judge diagnose validate inspect setup band open_loop",
+    ),
+    (
+        "find",
+        "input held_out fit explain math block verdict number robot log config motion effect friction inertia \
+         judge diagnose validate inspect setup open_loop",
+    ),
+    (
+        "fleet",
+        "input fit explain math block verdict robot log config motion inertia track",
+    ),
+    (
+        "watch",
+        "input held_out math block number robot log config motion effect export band observe",
+    ),
+    (
+        "campaign",
+        "input held_out fit find explain math verdict robot log config effect diagnose",
+    ),
+    // the door of them all
+    (
         "identify",
-        "explain math block verdict number robot log config motion effect friction inertia judge diagnose \
-         validate inspect setup compare band observe open_loop track export",
+        "compare diagnose input held_out fit find fleet watch campaign",
     ),
     (
         "replay",
-        "robot log config motion effect friction diagnose identify",
+        "robot log config motion effect friction diagnose input held_out find",
     ),
     (
         "report",
         "explain math verdict number robot log config motion effect friction inertia diagnose validate \
-         inspect setup excite compare identify band observe open_loop track replay drive tool held",
+         inspect setup excite compare input held_out fit find fleet watch campaign band observe open_loop track replay drive tool held",
     ),
     (
         "cli",
         "explain math block verdict number robot log config output motion effect friction inertia diagnose \
-         validate inspect mapping setup simulate excite compare identify report export band \
+         validate inspect mapping setup simulate excite compare input held_out fit find fleet watch campaign identify report export band \
          observe open_loop track replay drive tool held",
     ),
 ];
@@ -88,7 +120,7 @@ const DOORS: &[(&str, &str)] = &[
     ("rusqlite", "log/recording/format/bag.rs"),
     (
         "flate2",
-        "log/content.rs|log/table/zip.rs|log/table/mat.rs|output/log.rs|identify/reduced/file.rs",
+        "log/content.rs|log/table/zip.rs|log/table/mat.rs|output/log.rs|input/reduced/file.rs",
     ),
     ("parquet", "log/table/parquet.rs|output/parquet.rs"),
     ("zstd", "log/content.rs|output/log.rs"),

@@ -33,9 +33,16 @@
 #![forbid(unsafe_code)]
 
 pub mod band;
+mod campaign;
 pub mod compare;
+mod find;
+mod fit;
+mod fleet;
+mod held_out;
 pub mod identify;
+mod input;
 pub mod observe;
 pub mod open_loop;
 pub mod replay;
 pub mod setup;
+mod watch;

@@ -1,7 +1,7 @@
 //! Friction of a model, with everything that was found, beside what was measured.
 
 use super::Replay;
-use crate::identify::friction_curve;
+use crate::input::curve::friction_curve;
 use cft_ident_core::effect::{Added, AugmentedModel};
 use cft_ident_core::friction::joint_estimate::FrictionCurvePoint;
 use cft_ident_core::motion::MotionError;

@@ -13,7 +13,10 @@ pub use poses::Poses;
 pub use residual::{ResidualEvidence, ResidualPair};
 pub use torque::{JointSeries, TorqueSeries};
 
-use crate::identify::{Compared, Diagnosed, InMemory, LoggedRobot};
+use crate::find::diagnose::Diagnosed;
+use crate::held_out::compare::Compared;
+use crate::input::in_memory::InMemory;
+use crate::input::logged_robot::LoggedRobot;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch};
 use cft_ident_files::config::ModelFile;

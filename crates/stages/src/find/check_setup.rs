@@ -1,0 +1,219 @@
+//! The check of a set-up before a fit: does the robot file say of signs, order, scales, zeros and gravity
+//! what the torques of the logs say?
+
+use crate::setup::{
+    Channels, Drive, KnownBeforehand, Problem, Sample, Searched, SetupReport, Thinner, search,
+};
+use cft_ident_core::motion::{self, FilterSettings};
+use cft_ident_core::robot::Robot;
+use cft_ident_core::robot::friction::sign;
+use cft_ident_logs::log::{DeclaredChannels as Logged, Layout};
+
+use super::setup_words;
+use crate::fit::gains;
+use crate::input::control::Control;
+use crate::input::dataset::Dataset;
+use crate::input::error::IdentifyError;
+use crate::input::log::Log;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::setup_file::Declared;
+use crate::input::unknowns::columns;
+use cft_ident_files::config::RobotFile;
+use cft_ident_files::config::correction::Edit;
+
+/// What the check found, and the robot file that is right by it.
+#[derive(Debug, Clone, Default)]
+pub struct CheckedSetup {
+    pub report: SetupReport,
+    /// The robot file with all that is sure put right; none where nothing is.
+    pub corrected: Option<RobotFile>,
+    /// What differs in it.
+    pub edits: Vec<Edit>,
+    /// The robot as it is declared, with the torques that its drives do not exceed; none where there are none.
+    pub limited: Option<LoggedRobot>,
+}
+
+/// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
+/// logs are passed over: they hold no rows to look at, and were checked when they were made.
+pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    if machine.as_declared {
+        return Ok(CheckedSetup::default());
+    }
+    let findings = gains::findings(machine);
+    if !findings.is_empty() {
+        // gains that differ look like signs, scales and loads
+        return Ok(CheckedSetup {
+            report: SetupReport {
+                findings,
+                ..SetupReport::default()
+            },
+            ..CheckedSetup::default()
+        });
+    }
+    let (channels, sample) = sampled(machine, logs, control)?;
+    let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {
+        let mut file = machine.file.clone();
+        file.robot.gravity = Some(gravity);
+        Some(file.robot())
+    };
+    let columns = columns(machine, None);
+    let problem = Problem::new(
+        &machine.robot,
+        (machine.file.declares_gravity())
+            .then_some(&in_gravity as &(dyn Fn([f64; 3]) -> Option<Robot> + Sync)),
+        (channels, &columns),
+        sample,
+        known(machine),
+    );
+    let searched = search(&problem, &|| control.stopped());
+    control.check()?;
+    let mut found = checked(machine, &problem, &searched);
+    // a limit that leaves too little to fit is not taken
+    if let Some(limited) = &found.limited
+        && sampled(limited, logs, control).is_err()
+    {
+        control.check()?;
+        found.limited = None;
+        found.report.torque_limits.clear();
+    }
+    Ok(found)
+}
+
+/// What the robot file knows beside its channels.
+fn known(machine: &LoggedRobot) -> KnownBeforehand {
+    let file = &machine.file;
+    let links = file.robot.link.iter();
+    let bodies: Vec<Option<[f64; 10]>> = links
+        .map(|link| Some(link.inertial.as_ref()?.body().standard()))
+        .collect();
+    let weighs = bodies.iter().any(Option::is_some);
+    let scales = |name: &String| {
+        let of = file.log.joint.get(name);
+        of.map_or([None; 2], |c| [c.position_scale, c.torque_scale])
+    };
+    let names = machine.robot.joint_names();
+    let gears = file.log.gears.iter().flatten().copied();
+    let written = names.iter().flat_map(scales).flatten().chain(gears);
+    let either = |x: f64| [x.abs(), x.abs().recip()];
+    KnownBeforehand {
+        torque: (names.iter())
+            .map(|name| file.limits.of.get(name).and_then(|limits| limits.torque))
+            .collect(),
+        position: (names.iter())
+            .map(|name| file.limits.of.get(name).and_then(|limits| limits.position))
+            .collect(),
+        ratios: (written.flat_map(either))
+            .filter(|x| x.is_finite() && *x > 1.0)
+            .collect(),
+        inertial: weighs.then(|| {
+            let mut standard = vec![0.0; machine.robot.standard_parameters()];
+            let of = (bodies.iter()).flat_map(|body| body.unwrap_or_default());
+            standard.iter_mut().zip(of).for_each(|(to, x)| *to = x);
+            machine.robot.base_of(&standard)
+        }),
+    }
+}
+
+/// A bounded number of rows of logs, as the robot file declares them.
+fn sampled(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    control: &Control,
+) -> Result<(Channels, Sample), IdentifyError> {
+    let n = machine.robot.joints();
+    let settings = FilterSettings {
+        // signs of the speed are off by half a sample at most, which is no matter here
+        thin: true,
+        ..machine.settings()
+    };
+    let _work = control.begin("checking the set-up", None);
+    let mut thinner = Thinner::new(n);
+    let mut channels: Option<Channels> = None;
+    let whole = logs.iter().filter(|log| log.reduced().is_none());
+    for (index, log) in whole.enumerate() {
+        let mut open = machine.open(log, control)?;
+        let of_log = channels_of(machine, log, open.layout());
+        if of_log.drive == Drive::Motors {
+            // positions that belong to no pose are what is looked for
+            open = machine.open_channels(log, control)?;
+        }
+        channels.get_or_insert(of_log);
+        let run = motion::run(
+            &mut |block| open.read(block),
+            n,
+            &settings,
+            None,
+            5 * n,
+            &|s, out| {
+                for (out, x) in out.chunks_exact_mut(n).zip([s.q, s.v, s.a, s.v, s.tau]) {
+                    out.copy_from_slice(x);
+                }
+                for x in &mut out[3 * n..4 * n] {
+                    *x = sign(*x);
+                }
+            },
+            &mut |row| thinner.add(index, row.t, row.filtered),
+        );
+        run.map_err(|error| open.ended(error))?;
+    }
+    Ok((channels.ok_or(IdentifyError::NoLog)?, thinner.finish()))
+}
+
+fn checked(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
+    let declared = Declared::new(&machine.file, problem.channels.drive == Drive::Motors);
+    let edits = searched.correction.as_ref().map(|by| declared.edits(by));
+    let edits = edits.unwrap_or_default();
+    // what no line mends is refused and not put right
+    let by = searched
+        .correction
+        .as_ref()
+        .filter(|by| by.begins.iter().all(Option::is_none));
+    let report = setup_words::report(machine, problem, searched);
+    let limited = (!report.torque_limits.is_empty()).then(|| {
+        let mut file = machine.file.clone();
+        for of in &report.torque_limits {
+            let own = file.log.joint.entry(of.joint.clone()).or_default();
+            own.torque_limit = Some(of.limit);
+        }
+        LoggedRobot::new(&machine.name, file)
+    });
+    CheckedSetup {
+        limited,
+        report,
+        corrected: by.map(|by| declared.corrected(&edits, by)),
+        edits,
+    }
+}
+
+/// The channels of a log as the robot file declares them.
+fn channels_of(machine: &LoggedRobot, log: &Log, layout: &Layout) -> Channels {
+    let n = machine.robot.joints();
+    if matches!(log, Log::Arrays(_)) {
+        return Channels::of_joints(n);
+    }
+    let gears = machine.file.gear_matrix();
+    let gears = gears.and_then(|r| Some((r.clone().try_inverse()?, r)));
+    let drive = match (layout.channels, gears) {
+        (Logged::Actuator, _) => Drive::Motors,
+        (Logged::Joint, Some((inverse, r))) => Drive::Gears(r, inverse),
+        (Logged::Joint, None) => Drive::Joints,
+    };
+    let joint = |name: &String| machine.file.log.joint.get(name);
+    let offsets = match drive {
+        // behind gears they belong to the joints
+        Drive::Gears(..) => machine
+            .robot
+            .joint_names()
+            .iter()
+            .map(|name| joint(name).and_then(|c| c.position_offset).unwrap_or(0.0))
+            .collect(),
+        _ => layout.positions.iter().map(|c| c.offset).collect(),
+    };
+    Channels {
+        drive,
+        position_gain: layout.positions.iter().map(|c| c.factor).collect(),
+        position_offset: offsets,
+        torque_gain: layout.torques.iter().map(|c| c.factor).collect(),
+    }
+}

@@ -1,0 +1,121 @@
+//! Stretches in which something pushes the robot, and rows that a fit hangs on.
+
+use crate::input::control::Control;
+use crate::input::error::IdentifyError;
+use crate::input::log::Log;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::passes::{Passes, PositionFilter};
+use crate::input::unknowns::{FittedUnknown, columns};
+use cft_ident_core::inertia::accumulate::BlockFactors;
+use cft_ident_core::inertia::columns::RegressorColumns;
+use cft_ident_core::inertia::jumps::Jump;
+use cft_ident_core::inertia::solve::{Weighting, fit};
+use cft_ident_core::number;
+use cft_ident_files::config::robot_file::FrictionLawKind;
+use cft_ident_logs::log::{RowFault, escape};
+
+/// Deviations by which rows move a parameter: twice as many miss doubtful fits, half as many report chance.
+const MOVED_DEVIATIONS: f64 = 4.0;
+/// Room on both sides of a stretch that is to be left out \[s\]: the filters carry it so far.
+const ROOM_S: f64 = 0.1;
+
+/// Stretches of these logs in which something pushes the robot, one sentence each.
+pub(crate) fn contacts(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    control: &Control,
+) -> Result<Vec<String>, IdentifyError> {
+    let linear = machine.file.friction_law() != FrictionLawKind::DoubleTanh;
+    if !linear || machine.robot.joints() < 2 || logs.iter().any(|log| log.reduced().is_some()) {
+        return Ok(Vec::new());
+    }
+    let own = machine.own_settings(logs, &[], control)?;
+    let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
+    passes.read(PositionFilter::Declared, &columns(machine, None), None)?;
+    passes.contacts()
+}
+
+impl Passes<'_> {
+    /// The stretches that the first reading found, one sentence each.
+    pub(crate) fn contacts(&self) -> Result<Vec<String>, IdentifyError> {
+        let shown = |(log, jump): &(usize, Jump)| {
+            let log = &self.logs[*log];
+            let first = self.machine.first_row(log, self.control)?;
+            Ok(sentence(self.machine, log, jump, first))
+        };
+        self.jumps.iter().map(shown).collect()
+    }
+}
+
+/// `first` is the time of the first row that is read, as the rows have it [s].
+fn sentence(machine: &LoggedRobot, log: &Log, jump: &Jump, first: f64) -> String {
+    let [from, to] = jump.span.map(|t| t - first);
+    let names = machine.robot.joint_names();
+    let joints: Vec<&str> = jump
+        .joints
+        .iter()
+        .map(|(j, _)| names[*j].as_str())
+        .collect();
+    let most = jump
+        .joints
+        .iter()
+        .map(|(_, ratio)| *ratio)
+        .fold(0.0, f64::max);
+    format!(
+        "{}: the residual of {} is up to {} times the usual from {from:.2} to {to:.2} s after its first row: contact? `--leave-out {:.2}..{:.2}s` fits without it",
+        escape(&log.name()),
+        joints.join(", "),
+        number::significant(most, 2),
+        (from - ROOM_S).max(0.0),
+        to + ROOM_S
+    )
+}
+
+/// What a fit says with the rows that were bridged as they were logged, where that is another thing.
+pub(crate) fn hangs_on_bridged(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    (linear, rows): (&RegressorColumns, &BlockFactors),
+    unknowns: &[FittedUnknown],
+    control: &Control,
+) -> Result<Option<String>, IdentifyError> {
+    if !machine.bridges(logs, control)? {
+        return Ok(None);
+    }
+    let kept = machine.keeping(RowFault::Spike);
+    let mut passes =
+        Passes::new(&kept, logs, control).each_by_itself(kept.own_settings(logs, &[], control)?);
+    let as_logged = passes.read(PositionFilter::Declared, linear, None)?;
+    let (Ok(now), Ok(other)) = (fit(rows, Weighting::Wls), fit(&as_logged, Weighting::Wls)) else {
+        return Ok(None);
+    };
+    let moved = unknowns.iter().enumerate().filter_map(|(i, unknown)| {
+        let std =
+            |fit: &cft_ident_core::inertia::solve::Fit| fit.covariance[(i, i)].max(0.0).sqrt();
+        let (a, b) = (now.theta.get(i)?, other.theta.get(i)?);
+        let both = std(&now).hypot(std(&other));
+        let known = now.determined[i] && other.determined[i];
+        (known && (a - b).abs() > MOVED_DEVIATIONS * both).then(|| {
+            let value = |x: f64, std: f64| {
+                format!(
+                    "{} +- {}",
+                    number::significant(x, 4),
+                    number::significant(std, 2)
+                )
+            };
+            format!(
+                "{} {} with and {} without",
+                unknown.key,
+                value(*a, std(&now)),
+                value(*b, std(&other))
+            )
+        })
+    });
+    let moved: Vec<String> = moved.collect();
+    Ok((!moved.is_empty()).then(|| {
+        format!(
+            "this fit hangs on the rows that are bridged as spikes: {} that bridge; where they are peaks of a motion, `keep = [\"spike\"]` in [log] of the robot file leaves them as they are",
+            moved.join(", ")
+        )
+    }))
+}

@@ -1,0 +1,448 @@
+//! The estimators of `lsq` on logs that are read once per pass.
+
+use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::known_friction::{of_joint, of_refinement, with_friction};
+use crate::input::error::IdentifyError;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::passes::{Passes, PositionFilter, SimulatedLoop};
+use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
+use cft_ident_core::inertia::add_processing;
+use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
+use cft_ident_core::inertia::departure;
+use cft_ident_core::inertia::encoder::{add_scatter, bias};
+use cft_ident_core::inertia::feasible::nearest;
+use cft_ident_core::inertia::instruments::{self, Instrumental};
+use cft_ident_core::inertia::late;
+use cft_ident_core::inertia::law_start;
+use cft_ident_core::inertia::refine::{self, RefinedFit};
+use cft_ident_core::inertia::robust::{self, Robust, Weigher};
+use cft_ident_core::inertia::solution::FitError;
+use cft_ident_core::inertia::solve::{self, Fit, fit};
+use cft_ident_core::inertia::standstill;
+use cft_ident_core::math::descent::Ending;
+use cft_ident_files::config::campaign::EstimatorKind;
+
+/// What an estimator says of its own work.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Account {
+    #[serde(rename = "name")]
+    pub estimator: EstimatorKind,
+    /// The estimator that was asked for cannot do without the refinement of the friction law.
+    pub law_refined: bool,
+    pub status: Ending,
+    /// Passes over the logs; 1 for least squares.
+    pub iterations: usize,
+    /// Joint by joint; nothing for least squares.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<JointAccount>,
+    /// The loop that was simulated.
+    #[serde(flatten)]
+    pub simulated: Option<SimulatedLoop>,
+}
+
+/// The same of one joint, as far as the estimator has it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct JointAccount {
+    pub joint: String,
+    /// Scale of the residual [N or Nm].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// Share of the rows of less than half weight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub down_weighted: Option<f64>,
+    /// Gain on the position in the loop that was simulated [N/m or Nm/rad].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proportional: Option<f64>,
+    /// Gain on the velocity [N s/m or Nm s/rad].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub derivative: Option<f64>,
+    /// Relative residual before a refinement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_error_before: Option<f64>,
+}
+
+impl Account {
+    fn of(estimator: EstimatorKind) -> Self {
+        Account {
+            estimator,
+            law_refined: false,
+            status: Ending::Converged,
+            iterations: 1,
+            joints: Vec::new(),
+            simulated: None,
+        }
+    }
+
+    /// Says something of every joint.
+    fn record(&mut self, machine: &LoggedRobot, of: impl Fn(usize) -> JointAccount) {
+        let names = machine.robot.joint_names().iter().enumerate();
+        self.joints = names
+            .map(|(j, joint)| JointAccount {
+                joint: joint.clone(),
+                ..of(j)
+            })
+            .collect();
+    }
+}
+
+/// A fit, the columns that its unknowns belong to, and how it came about.
+pub struct Estimated {
+    pub columns: RegressorColumns,
+    pub fit: Fit,
+    /// Covariance of the unknowns and of the known friction of each joint, in this order.
+    pub covariance: DMatrix<f64>,
+    /// What noise of the positions makes of the unknowns, where that is known.
+    pub bias: Option<DVector<f64>>,
+    pub basis: Basis,
+    pub account: Account,
+}
+
+/// The rows that the fit is about, reduced.
+pub struct Basis {
+    pub sums: BlockFactors,
+    /// The same in parts that can be left out; none where the fit is not linear in its rows.
+    pub parts: Vec<BlockFactor>,
+    /// What their solution lacks to the fit's parameters: a law that they are linear about.
+    pub shift: DVector<f64>,
+}
+
+impl Basis {
+    /// Rows that no law shifts, of so many unknowns.
+    fn in_one_block(sums: &BlockFactors, unknowns: usize) -> Self {
+        Basis {
+            sums: sums.in_one_block(),
+            parts: Vec::new(),
+            shift: DVector::zeros(unknowns),
+        }
+    }
+}
+
+/// What turns other readings of the logs into a fit of the same kind.
+enum Solver {
+    Linear(solve::Weighting),
+    Robust(Box<Weigher>),
+    Refined(Box<RefinedFit>),
+    /// The fit, and the parameters that were simulated.
+    Instrumental(Box<(Fit, DVector<f64>)>),
+}
+
+impl Solver {
+    /// Columns of the rows.
+    fn columns<'a>(&'a self, linear: &'a RegressorColumns) -> &'a RegressorColumns {
+        match self {
+            Solver::Refined(refined) => &refined.columns,
+            _ => linear,
+        }
+    }
+
+    fn weigher(&self) -> Option<Weigher> {
+        match self {
+            Solver::Robust(weigher) => Some(weigher.afresh()),
+            _ => None,
+        }
+    }
+
+    fn solve(&self, sums: BlockFactors, weigher: Option<&Weigher>) -> Result<Fit, FitError> {
+        match self {
+            Solver::Refined(refined) => refined.solve(sums),
+            Solver::Robust(own) => weigher.unwrap_or(own).solve(&sums),
+            Solver::Linear(estimator) => fit(&sums, *estimator),
+            // rows without instruments: what moves the plain fit moves this one
+            Solver::Instrumental(_) => fit(&sums, solve::Weighting::Wls),
+        }
+    }
+}
+
+/// A fit before its uncertainty is widened, its rows, and what makes fits of the same kind of other readings.
+type Found = (Fit, Basis, Solver);
+
+/// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
+/// (18), which is then refined.
+pub fn estimate(
+    passes: &mut Passes,
+    columns: RegressorColumns,
+    estimator: EstimatorKind,
+    law: bool,
+) -> Result<Estimated, IdentifyError> {
+    let mut account = Account::of(estimator);
+    let shown = &mut account;
+    let moves = columns.known.iter().flatten().any(KnownFriction::moves);
+    let mut columns = columns;
+    if moves && estimator != EstimatorKind::Oe {
+        let found = with_known_friction(passes, columns, shown)?;
+        if estimator == EstimatorKind::Wls {
+            return Ok(Estimated { account, ..found });
+        }
+        // rows weighted otherwise inform the inertias alone; the friction stays as it was refined
+        columns = found.columns;
+    }
+    let (mut fit, mut basis, solver) = match estimator {
+        EstimatorKind::Oe => refined(passes, &columns, law, shown)?,
+        EstimatorKind::Wls if law => refined(passes, &columns, law, shown)?,
+        EstimatorKind::Irls => {
+            first_reading(passes, &columns)?;
+            robust_regression(passes, &columns, shown)?
+        }
+        EstimatorKind::Iv => {
+            first_reading(passes, &columns)?;
+            instrumental(passes, &columns, shown)?
+        }
+        EstimatorKind::Ols => linear(passes, &columns, solve::Weighting::Ols)?,
+        EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,
+    };
+    let bias = widen(passes, &columns, &solver, &mut fit)?;
+    departure::widen_by_departure(&basis.sums, &mut fit);
+    let columns = match &solver {
+        Solver::Refined(refined) => {
+            basis.shift = refined.shift();
+            refined.columns.with_free_friction()
+        }
+        _ => columns,
+    };
+    Ok(Estimated {
+        covariance: with_friction(&columns, &fit),
+        columns,
+        fit,
+        bias,
+        basis,
+        account,
+    })
+}
+
+/// Refines the known friction with the inertias, drawn to it by its covariance; the fit left is of the inertias.
+fn with_known_friction(
+    passes: &mut Passes,
+    mut columns: RegressorColumns,
+    account: &mut Account,
+) -> Result<Estimated, IdentifyError> {
+    let refined = refinement(passes, columns.clone(), account)?;
+    let (mut fit, sums) = refined.without_laws()?;
+    let (laws, free) = (
+        refined.columns.known.clone(),
+        refined.columns.with_free_friction(),
+    );
+    let mut whole = refined.fit.clone();
+    widen(
+        passes,
+        &columns,
+        &Solver::Refined(Box::new(refined)),
+        &mut whole,
+    )?;
+    let covariance = of_refinement(&columns, &free, &whole.covariance, &columns.known);
+    let u = fit.theta.len();
+    fit.covariance = covariance.view((0, 0), (u, u)).into_owned();
+    let known = columns.known.iter_mut().flatten();
+    for (place, (known, law)) in known.zip(laws.into_iter().flatten()).enumerate() {
+        *known = KnownFriction {
+            law: law.law,
+            covariance: of_joint(&covariance, u + GRADIENT * place),
+            held: [true; GRADIENT],
+        };
+    }
+    Ok(Estimated {
+        columns,
+        fit,
+        covariance,
+        bias: None,
+        basis: Basis::in_one_block(&sums, u),
+        account: account.clone(),
+    })
+}
+
+/// Linear least squares, rows weighted or alike.
+fn linear(
+    passes: &mut Passes,
+    columns: &RegressorColumns,
+    estimator: solve::Weighting,
+) -> Result<Found, IdentifyError> {
+    let sums = first_reading(passes, columns)?;
+    let found = fit(&sums, estimator)?;
+    let basis = Basis {
+        parts: sums.in_parts(),
+        ..Basis::in_one_block(&sums, found.theta.len())
+    };
+    Ok((found, basis, Solver::Linear(estimator)))
+}
+
+/// Rows as the robot file says, with samples at standstill where they count.
+fn first_reading(
+    passes: &mut Passes,
+    columns: &RegressorColumns,
+) -> Result<BlockFactors, IdentifyError> {
+    let sums = passes.read(PositionFilter::Declared, columns, None)?;
+    if passes.plain {
+        return Ok(sums);
+    }
+    let without = fit(&sums, solve::Weighting::Wls)?;
+    let open = standstill::open_joints(columns, &without);
+    if open.is_empty() || !passes.count_rests(&open) {
+        return Ok(sums);
+    }
+    let all = passes.read(PositionFilter::Declared, columns, None)?;
+    let with = fit(&all, solve::Weighting::Wls)?;
+    let counted = standstill::counted(columns, open.clone(), [&without, &with]);
+    passes.count_rests(&counted);
+    match counted.len() {
+        0 => Ok(sums),
+        n if n == open.len() => Ok(all),
+        _ => passes.read(PositionFilter::Declared, columns, None),
+    }
+}
+
+/// The slopes of the friction law with all else.
+fn refined(
+    passes: &mut Passes,
+    columns: &RegressorColumns,
+    law: bool,
+    account: &mut Account,
+) -> Result<Found, IdentifyError> {
+    let start = match law {
+        true => law_start::begin(columns, &mut |columns| {
+            passes.read(PositionFilter::Declared, columns, None)
+        })?,
+        false => columns.clone(),
+    };
+    let refined = refinement(passes, start, account)?;
+    let basis = Basis::in_one_block(&refined.factors, refined.fit.theta.len());
+    Ok((
+        refined.fit.clone(),
+        basis,
+        Solver::Refined(Box::new(refined)),
+    ))
+}
+
+/// The refinement from a law of every joint.
+fn refinement(
+    passes: &mut Passes,
+    start: RegressorColumns,
+    account: &mut Account,
+) -> Result<RefinedFit, IdentifyError> {
+    passes.work.doing("friction law");
+    let refined = refine::refine(start, &mut |columns| {
+        passes.read(PositionFilter::Declared, columns, None)
+    })?;
+    account.law_refined = refined.columns.known.iter().any(Option::is_some);
+    account.status = refined.ending;
+    account.iterations = refined.iterations;
+    account.record(passes.machine, |j| JointAccount {
+        relative_error_before: Some(refined.before[j].all),
+        ..JointAccount::default()
+    });
+    Ok(refined)
+}
+
+/// Rows with large residuals count less.
+fn robust_regression(
+    passes: &mut Passes,
+    columns: &RegressorColumns,
+    account: &mut Account,
+) -> Result<Found, IdentifyError> {
+    passes.work.doing("robust regression");
+    let Robust {
+        fit,
+        factors: sums,
+        weigher,
+        ending: status,
+        iterations,
+        scale,
+        down_weighted,
+    } = robust::irls(&mut |weigher| passes.read(PositionFilter::Declared, columns, weigher))?;
+    account.status = status;
+    account.iterations = iterations;
+    account.record(passes.machine, |j| JointAccount {
+        scale: Some(scale[j]),
+        down_weighted: Some(down_weighted[j]),
+        ..JointAccount::default()
+    });
+    let basis = Basis::in_one_block(&sums, fit.theta.len());
+    Ok((fit, basis, Solver::Robust(Box::new(weigher))))
+}
+
+/// The regressor along simulated positions as instruments.
+fn instrumental(
+    passes: &mut Passes,
+    columns: &RegressorColumns,
+    account: &mut Account,
+) -> Result<Found, IdentifyError> {
+    passes.work.doing("instrumental variables");
+    let sums = passes.read(PositionFilter::Declared, columns, None)?;
+    let plain = fit(&sums, solve::Weighting::Wls)?;
+    let map = passes.machine.robot.standard_map();
+    let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
+    let effective = plain.effective_rows / plain.rows as f64;
+    let mut simulate_by = plain.theta.clone();
+    let Instrumental {
+        fit,
+        ending: status,
+        iterations,
+    } = instruments::iterate(columns, &plain, &mut |theta| {
+        simulate_by = nearest(&map, &whole, effective, theta)?;
+        let (sums, simulated) =
+            passes.read_instruments(PositionFilter::Declared, columns, &simulate_by)?;
+        account.simulated = Some(simulated);
+        Ok::<_, IdentifyError>(sums)
+    })?;
+    if let Some(SimulatedLoop { gains, .. }) = account.simulated.clone() {
+        account.record(passes.machine, |j| JointAccount {
+            proportional: gains.proportional.get(j).copied(),
+            derivative: gains.derivative.get(j).copied(),
+            ..JointAccount::default()
+        });
+    }
+    account.status = status;
+    account.iterations = iterations;
+    let solver = Solver::Instrumental(Box::new((fit.clone(), simulate_by)));
+    let basis = Basis::in_one_block(&sums, fit.theta.len());
+    Ok((fit, basis, solver))
+}
+
+/// Adds to the uncertainty of a fit what a narrower position filter and the encoders' grid move; and what noise of the
+/// positions makes of it, where that is known.
+fn widen(
+    passes: &mut Passes,
+    columns: &RegressorColumns,
+    solver: &Solver,
+    fit: &mut Fit,
+) -> Result<Option<DVector<f64>>, IdentifyError> {
+    passes.work.doing("uncertainty");
+    let read = solver.columns(columns);
+    let mut weigher = solver.weigher();
+    let again = match solver {
+        Solver::Instrumental(found) => {
+            let (found, simulated) = &**found;
+            let (sums, _) = passes.read_instruments(PositionFilter::Narrower, read, simulated)?;
+            instruments::again(read, found, &sums)?
+        }
+        Solver::Linear(_) if passes.have_torque_rates() => {
+            let rates = read.with_torque_rates();
+            let sums = passes.read(PositionFilter::Narrower, &rates, None)?;
+            late::widen_by_delay(&sums, passes.shortest_step(), fit);
+            solver.solve(late::without_rates(&sums), None)?
+        }
+        _ => {
+            let sums = passes.read(PositionFilter::Narrower, read, weigher.as_mut())?;
+            solver.solve(sums, weigher.as_ref())?
+        }
+    };
+    add_processing(fit, &again);
+    let grids = passes.machine.robot.transmission().encoder_steps();
+    let wls = matches!(solver, Solver::Linear(solve::Weighting::Wls));
+    if grids.is_none() && !wls {
+        return Ok(None);
+    }
+    let mut again = Vec::new();
+    for grid in 0..passes.readings_again() {
+        let mut weigher = solver.weigher();
+        if let Some(sums) = passes.read_shifted(read, grid, weigher.as_mut())? {
+            again.push(solver.solve(sums, weigher.as_ref())?);
+        }
+    }
+    if grids.is_none() {
+        return Ok(bias(fit, &again));
+    }
+    add_scatter(fit, &again);
+    Ok(None)
+}

@@ -1,0 +1,467 @@
+//! The friction of single joints from one-joint logs, by the Kalman filter.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::input::control::Control;
+use crate::input::dataset::Dataset;
+use crate::input::error::IdentifyError;
+use crate::input::log::Log;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::model::new_model;
+use crate::input::one_joint::{self, OneJointLog};
+use crate::input::repeated::each_row_once;
+use crate::setup::Finding;
+use cft_ident_core::friction::estimate::{JointEstimate, Nis, Options, estimate};
+use cft_ident_core::friction::excitation::{FrictionError, moving_joint};
+use cft_ident_core::friction::inputs::Inputs;
+use cft_ident_core::friction::passes::GivenNoise;
+use cft_ident_core::friction::prepare::{SensorModel, SmoothedMotion, prepare, resolution};
+use cft_ident_core::math::descent::Ending;
+use cft_ident_core::number;
+use cft_ident_core::robot::friction::DoubleTanh;
+use cft_ident_core::verdict::Verdict;
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::identified::{friction_meaning, friction_unit};
+use cft_ident_files::config::model_file::{FrictionPrior, Parameter};
+use cft_ident_logs::log::Provenance;
+
+/// How friction is estimated.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FrictionSettings {
+    /// The joint that the logs move; found from the data where absent.
+    pub joint: Option<String>,
+}
+
+/// Friction of every joint that the logs move.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct IdentifiedFriction {
+    /// In joint order.
+    pub joints: Vec<FrictionOfJoint>,
+    /// What the check of the set-up found, where it was made.
+    pub setup: Vec<Finding>,
+    #[serde(skip)]
+    pub inputs: Vec<Provenance>,
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+/// Friction of one joint.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct FrictionOfJoint {
+    pub joint: String,
+    /// Place of the joint in the robot.
+    #[serde(skip)]
+    pub index: usize,
+    /// The logs that moved it.
+    #[serde(skip)]
+    pub logs: Vec<Provenance>,
+    pub converged: bool,
+    pub parameters: LawParameters,
+    #[serde(flatten)]
+    pub estimate: JointEstimate,
+}
+
+/// Parameters of the double-tanh law (18); slope_1 is the steeper one.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LawParameters {
+    pub viscous: LawParameter,
+    pub coulomb_1: LawParameter,
+    pub coulomb_2: LawParameter,
+    pub slope_1: LawParameter,
+    pub slope_2: LawParameter,
+}
+
+/// One parameter of a law.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LawParameter {
+    /// Estimate \[unit\]; a lower bound where the verdict says so, null where nothing determines it.
+    pub value: Option<f64>,
+    /// Its standard deviation \[unit\].
+    pub std: Option<f64>,
+    pub unit: String,
+    /// Number in the report's Table 4, where it has one.
+    pub theta: Option<u32>,
+    pub verdict: Verdict,
+}
+
+impl LawParameters {
+    /// Names and parameters, in the order of the law.
+    pub fn each(&self) -> [(&'static str, &LawParameter); 5] {
+        let all = [
+            &self.viscous,
+            &self.coulomb_1,
+            &self.coulomb_2,
+            &self.slope_1,
+            &self.slope_2,
+        ];
+        std::array::from_fn(|k| (DoubleTanh::NAMES[k], all[k]))
+    }
+}
+
+impl FrictionOfJoint {
+    fn of(
+        machine: &LoggedRobot,
+        index: usize,
+        logs: Vec<Provenance>,
+        estimate: JointEstimate,
+    ) -> Self {
+        let parameter = |k: usize| {
+            let v = &estimate.values[k];
+            let known = v.verdict != Verdict::NotIdentifiable;
+            let (name, torque) = (DoubleTanh::NAMES[k], machine.file.torque_unit(index));
+            LawParameter {
+                value: known.then_some(v.value),
+                std: known.then_some(v.std),
+                unit: friction_unit(&machine.robot, index, name, torque),
+                theta: machine.robot.friction_theta(index, k),
+                verdict: v.verdict,
+            }
+        };
+        FrictionOfJoint {
+            joint: machine.robot.joint_names()[index].clone(),
+            index,
+            logs,
+            converged: estimate.ending == Ending::Converged,
+            parameters: LawParameters {
+                viscous: parameter(0),
+                coulomb_1: parameter(1),
+                coulomb_2: parameter(2),
+                slope_1: parameter(3),
+                slope_2: parameter(4),
+            },
+            estimate,
+        }
+    }
+}
+
+/// Estimates the friction from one-joint logs; several logs of one joint are used together.
+///
+/// # Errors
+/// Logs that cannot be used, and logs that do not move one joint through zero speed.
+pub fn friction(
+    data: &Dataset,
+    settings: &FrictionSettings,
+    control: &Control,
+) -> Result<IdentifiedFriction, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    machine.check_gains()?;
+    each_row_once(machine, &[("fit", logs)])?;
+    let (groups, inputs, found) = by_joint(machine, logs, settings, control)?;
+    let mut warnings = [machine.file.notes.0.clone(), found].concat();
+    let work = control.begin("friction filter", Some(groups.len() as u64));
+    let parameters = machine.robot.parameters().iter();
+    let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();
+    // joints do not know of one another: they run in parallel, and are collected in joint order
+    let found: Vec<Result<FrictionOfJoint, IdentifyError>> = groups
+        .into_par_iter()
+        .map(|(j, group)| {
+            control.check()?;
+            let estimate = one_joint(machine, j, &group, &parameter_names)?;
+            work.advance(1);
+            Ok(FrictionOfJoint::of(machine, j, group.inputs, estimate))
+        })
+        .collect();
+    let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
+    control.check()?;
+    warnings.extend(joints.iter().flat_map(joint_warnings));
+    Ok(IdentifiedFriction {
+        joints,
+        setup: Vec::new(),
+        inputs,
+        warnings,
+    })
+}
+
+/// Logs by the joint that they move, with their inputs and warnings.
+type Grouped = (BTreeMap<usize, Group>, Vec<Provenance>, Vec<String>);
+
+fn by_joint(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    settings: &FrictionSettings,
+    control: &Control,
+) -> Result<Grouped, IdentifyError> {
+    let names = machine.robot.joint_names();
+    let place = |name: &String| {
+        let found = names.iter().position(|n| n == name);
+        found.ok_or_else(|| IdentifyError::NoJoint {
+            joint: name.clone(),
+            known: names.join(", "),
+        })
+    };
+    let named = settings.joint.as_ref().map(place).transpose()?;
+    let _work = control.begin("reading logs", None);
+    let ranges = machine.ranges();
+    let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
+    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
+    for log in logs {
+        let OneJointLog {
+            motions,
+            narrower,
+            zero_order_hold,
+            provenance,
+            warnings: found,
+        } = one_joint::read(machine, log, control)?;
+        inputs.push(provenance.clone());
+        warnings.extend(found);
+        let moving = match named {
+            Some(j) => j,
+            None => {
+                moving_joint(names, &motions, &ranges).map_err(|error| IdentifyError::Friction {
+                    logs: log.name(),
+                    error,
+                })?
+            }
+        };
+        let group = groups.entry(moving).or_default();
+        group.zero_order_hold |= zero_order_hold;
+        group.motions.extend(motions);
+        group.narrower.extend(narrower);
+        group.logs.push(log.name());
+        group.inputs.push(provenance);
+    }
+    Ok((groups, inputs, warnings))
+}
+
+/// Logs of one joint.
+#[derive(Default)]
+struct Group {
+    motions: Vec<SmoothedMotion>,
+    narrower: Vec<SmoothedMotion>,
+    zero_order_hold: bool,
+    logs: Vec<String>,
+    inputs: Vec<Provenance>,
+}
+
+fn one_joint(
+    machine: &LoggedRobot,
+    j: usize,
+    group: &Group,
+    parameter_names: &[String],
+) -> Result<JointEstimate, IdentifyError> {
+    let name = &machine.robot.joint_names()[j];
+    let place = group.logs.join(", ");
+    let undetermined = |error: FrictionError| IdentifyError::Friction {
+        logs: place.clone(),
+        error,
+    };
+    let noise = machine.file.noise.joint.get(name);
+    let given = noise.and_then(|n| n.position_resolution);
+    let resolution = given.unwrap_or_else(|| resolution(&group.motions, machine.robot.joints(), j));
+    let variance = |q: &[f64]| -> f64 {
+        let known = match given {
+            Some(_) => None,
+            None => machine.robot.transmission().encoder_variance(j, q),
+        };
+        known.unwrap_or(resolution * resolution / 12.0)
+    };
+    let sensors = SensorModel {
+        variance: &variance,
+        zero_order_hold: group.zero_order_hold,
+    };
+    let prepared = prepare(&machine.robot, j, &group.motions, &sensors).ok_or_else(|| {
+        undetermined(FrictionError::StandsStill {
+            joint: name.clone(),
+        })
+    })?;
+    let options = Options {
+        start: start_of(machine, name),
+        noise: GivenNoise {
+            torque: noise.and_then(|n| n.torque_std),
+            position_factor: None,
+        },
+        ..Options::default()
+    };
+    let inputs = Inputs {
+        robot: &machine.robot,
+        joint: j,
+        motions: &group.motions,
+        narrower: &group.narrower,
+        sensors: &sensors,
+    };
+    estimate(name, parameter_names, &prepared, Some(&inputs), &options).map_err(undetermined)
+}
+
+/// The user's starting values, where all five are given.
+fn start_of(machine: &LoggedRobot, joint: &str) -> Option<DoubleTanh> {
+    let s = machine.file.friction.joint.get(joint)?;
+    Some(DoubleTanh {
+        viscous: s.viscous?,
+        coulomb_1: s.coulomb_1?,
+        coulomb_2: s.coulomb_2?,
+        slope_1: s.slope_1?,
+        slope_2: s.slope_2?,
+    })
+}
+
+/// What a reader of the estimate should know.
+fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
+    let (joint, e) = (&found.joint, &found.estimate);
+    let mut out = Vec::new();
+    if e.ending != Ending::Converged {
+        out.push(format!(
+            "{joint}: the search ended without converging ({}): none of its parameters is identified",
+            match e.ending {
+                Ending::IterationLimit => "at the limit of iterations",
+                _ => "it diverged",
+            }
+        ));
+    }
+    if let Some(speed) = e.drives_at() {
+        out.push(format!(
+            "{joint}: at a speed of {} the friction law drives the joint, which no friction does: do not use it there",
+            number::significant(speed, 2)
+        ));
+    }
+    let Nis {
+        mean,
+        lower_95,
+        upper_95,
+        ..
+    } = e.nis;
+    if mean > upper_95 {
+        out.push(format!(
+            "{joint}: mean NIS {mean:.2} is above its bounds {lower_95:.2}..{upper_95:.2}: the innovations are alike for many samples, so something acts that the model lacks"
+        ));
+    } else if mean < lower_95 {
+        out.push(format!(
+            "{joint}: mean NIS {mean:.2} is below its bounds {lower_95:.2}..{upper_95:.2}: innovations cancel over many samples, as where positions are finer than the encoder's step^2/12 or were filtered before they were logged"
+        ));
+    }
+    if e.widening > 1.5 {
+        out.push(format!(
+            "{joint}: the innovations are coloured, so the model lacks something; the standard deviations hold a factor {:.1} for it",
+            e.widening.sqrt()
+        ));
+    }
+    if e.coulomb_terms == 1 {
+        out.push(format!(
+            "{joint}: one Coulomb term does; coulomb_2 and slope_2 are not determined, for a second term makes \
+             these data no likelier"
+        ));
+    } else if e.cancels() {
+        out.push(format!(
+            "{joint}: coulomb_1 {} and coulomb_2 {} cancel, for their slopes are hardly apart: use the friction \
+             curve, which is known to {}, and none of the two by itself",
+            number::significant(e.law.coulomb_1, 3),
+            number::significant(e.law.coulomb_2, 3),
+            number::percent(e.curve_uncertainty()),
+        ));
+    }
+    out.extend(missed_plateaus(found));
+    let settled = e.ending == Ending::Converged;
+    for (k, value) in e.values.iter().enumerate() {
+        match value.verdict {
+            Verdict::LowerBound => out.push(format!(
+                "{joint}: {} is only known to be above {} (95 %): these data do not pass slowly enough through zero speed to bound it from above",
+                DoubleTanh::NAMES[k],
+                number::significant(value.value, 3)
+            )),
+            Verdict::NotIdentifiable if settled && !e.one_term_lacks(k) => out.push(format!(
+                "{joint}: these data cannot determine {}; log slower reversals and more speeds",
+                DoubleTanh::NAMES[k]
+            )),
+            Verdict::NotIdentifiable | Verdict::Identified | Verdict::Weak => {}
+        }
+    }
+    out
+}
+
+/// The speeds at which the mean torque at constant speed, which took no part in the fit, contradicts the curve.
+fn missed_plateaus(found: &FrictionOfJoint) -> Option<String> {
+    const NAMED: usize = 4;
+    let missed = found.estimate.missed_plateaus();
+    let worst = missed.iter().take(NAMED).map(|m| {
+        format!(
+            "{} at {} (curve {})",
+            number::significant(m.torque, 3),
+            number::significant(m.v, 2),
+            number::significant(m.curve, 3)
+        )
+    });
+    let worst: Vec<String> = worst.collect();
+    let more = match missed.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        n => format!(" and {n} more speeds"),
+    };
+    (!missed.is_empty()).then(|| {
+        format!(
+            "{}: the friction curve misses the mean torque at constant speed: {}{more}; do not use it at these \
+             speeds: the law cannot follow this joint there, its friction depends on more than speed, or it \
+             changed between the logs",
+            found.joint,
+            worst.join(", ")
+        )
+    })
+}
+
+/// The parameters of a joint as a model file holds them; a slope with a bound keeps its likeliest value.
+fn file_parameters(found: &FrictionOfJoint) -> Vec<Parameter> {
+    let e = &found.estimate;
+    let law = e.law.parameters();
+    let each = found.parameters.each().into_iter().enumerate();
+    each.map(|(k, (name, p))| {
+        let v = &e.values[k];
+        let mut meaning = friction_meaning(name).to_owned();
+        if v.verdict == Verdict::LowerBound {
+            meaning += &format!(
+                "; only known to be above {} (95 %)",
+                number::significant(v.value, 3)
+            );
+        }
+        Parameter {
+            name: name.to_owned(),
+            theta: p.theta,
+            joint: Some(found.joint.clone()),
+            value: law[k],
+            consistent: None,
+            std: v.std.is_finite().then_some(v.std),
+            unit: p.unit.clone(),
+            meaning,
+            verdict: Some(v.verdict),
+        }
+    })
+    .collect()
+}
+
+impl IdentifiedFriction {
+    /// The model of these joints, with all that `old` has of the others and their inertias, where there is one.
+    pub fn model(&self, machine: &LoggedRobot, old: Option<&ModelFile>) -> ModelFile {
+        let mut model = new_model(machine, "friction", &self.inputs);
+        if let Some(old) = old {
+            model.parameters.clone_from(&old.parameters);
+            model.covariance.clone_from(&old.covariance);
+            model.residual_std.clone_from(&old.residual_std);
+            model.friction_prior.clone_from(&old.friction_prior);
+            model.effects.clone_from(&old.effects);
+        }
+        self.write_into(&mut model);
+        model
+    }
+
+    /// Writes the estimates into a model, in place of what it has of these joints.
+    pub fn write_into(&self, model: &mut ModelFile) {
+        for found in &self.joints {
+            let joint = &found.joint;
+            model.replace_joint(joint, file_parameters(found));
+            let keys: Vec<String> = DoubleTanh::NAMES
+                .iter()
+                .map(|n| format!("{n}:{joint}"))
+                .collect();
+            model.replace_covariance(&keys, &|a, b| found.estimate.covariance[a][b]);
+            model.friction_prior.retain(|prior| prior.joint != *joint);
+            model.friction_prior.push(FrictionPrior {
+                joint: joint.clone(),
+                speeds_covered: Some(found.estimate.speeds.covered),
+                values: None,
+                covariance: None,
+                logs: found.logs.clone(),
+                refined_by: Vec::new(),
+            });
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! Friction that is known before a fit: what of it the fit may move, and what it made of it.
+
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+use crate::input::control::Control;
+use crate::input::error::IdentifyError;
+use crate::input::log::Log;
+use crate::input::logged_robot::LoggedRobot;
+use cft_ident_core::friction::estimate::curve_std;
+use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
+use cft_ident_core::inertia::solve::Fit;
+use cft_ident_core::number;
+use cft_ident_core::robot::friction::DoubleTanh;
+use cft_ident_core::verdict::{Verdict, WEAK, verdict_of};
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::campaign::EstimatorKind;
+use cft_ident_files::config::identified::friction_unit;
+use cft_ident_files::config::model_file::FrictionPrior;
+use cft_ident_files::config::robot_file::FrictionLawKind;
+use cft_ident_logs::log::Provenance;
+
+/// The friction of a joint before and after a fit.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct FrictionOfFit {
+    pub joint: String,
+    /// By the keys of the law (18).
+    pub parameters: BTreeMap<String, FrictionParameter>,
+}
+
+/// A friction parameter before and after a fit.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct FrictionParameter {
+    /// Value after the fit \[unit\].
+    pub value: f64,
+    /// Its standard deviation \[unit\]; null where it was taken as exact.
+    pub std: Option<f64>,
+    pub unit: String,
+    /// Value before the fit \[unit\].
+    pub prior: f64,
+    /// Its standard deviation \[unit\]; null where none was known, or the logs that gave it are fitted here.
+    pub prior_std: Option<f64>,
+    /// The fit left it where it was.
+    pub held: bool,
+    #[serde(skip)]
+    pub verdict: Option<Verdict>,
+}
+
+/// What is known of the friction of every joint, and which logs determine it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FrictionBefore {
+    pub known: Vec<KnownFriction>,
+    /// As a model file of the fit keeps it.
+    pub priors: Vec<FrictionPrior>,
+    /// Logs of the fit that gave a joint's prior, which is left out there.
+    left_out: Vec<bool>,
+}
+
+fn any_shared(a: &[Provenance], b: &[Provenance]) -> bool {
+    let mut made = b.iter().filter(|b| b.made());
+    made.any(|b| a.iter().any(|a| a.shares_rows(b)))
+}
+
+impl FrictionBefore {
+    /// What the model `file`, called `name`, knows of the friction before `logs` are fitted: its own values, or where
+    /// these logs made them those of before. With `hold` they are the file's own, and a fit moves none of them.
+    ///
+    /// # Errors
+    /// A model without a joint's friction, and logs that cannot be read.
+    pub fn of(
+        machine: &LoggedRobot,
+        (name, file): (&str, &ModelFile),
+        logs: &[Log],
+        (estimator, hold): (EstimatorKind, bool),
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
+        let known = logs.iter().filter(|_| !hold);
+        let known = known.map(|log| match log {
+            Log::Reduced(part) => Ok(part.provenance.clone()),
+            log => machine.open(log, control)?.provenance(),
+        });
+        let given = known.collect::<Result<Vec<_>, _>>()?;
+        let mut before = FrictionBefore {
+            known: Vec::new(),
+            priors: Vec::new(),
+            left_out: Vec::new(),
+        };
+        for joint in machine.robot.joint_names() {
+            let prior = prior_of((name, file), joint, &given)?;
+            let law = file.double_tanh(name, joint)?;
+            let (values, mut covariance) = (
+                prior.values.unwrap_or(law.parameters()),
+                prior.covariance.unwrap_or_default(),
+            );
+            // a log of this joint alone, not one of all joints that a whole model was made from
+            let left_out = any_shared(&given, &prior.logs);
+            let bound = |k: usize| {
+                let parameter = file.find(DoubleTanh::NAMES[k], Some(joint));
+                k >= 3 && parameter.is_some_and(|p| p.verdict == Some(Verdict::LowerBound))
+            };
+            // `oe` moves what it knows nothing of, too
+            let free = estimator == EstimatorKind::Oe && !hold;
+            let held = |k: usize| hold || !free && (covariance[k][k] <= 0.0 || bound(k));
+            let held = std::array::from_fn(held);
+            if left_out {
+                covariance = [[0.0; GRADIENT]; GRADIENT];
+            }
+            before.known.push(KnownFriction {
+                law: DoubleTanh::from_parameters(values),
+                covariance,
+                held,
+            });
+            before.left_out.push(left_out);
+            before.priors.push(prior);
+        }
+        Ok(before)
+    }
+
+    /// As a model file keeps it after a fit of the logs `inputs` that took it from `file`.
+    pub fn kept(&self, file: &ModelFile, inputs: &[Provenance]) -> Vec<FrictionPrior> {
+        match self.known.iter().any(KnownFriction::moves) {
+            true => refined_by(self.priors.clone(), inputs),
+            false => file.friction_prior.clone(),
+        }
+    }
+
+    /// The friction of every joint as a fit leaves it in `columns`; `all` is the covariance of unknowns and friction.
+    pub fn after(
+        &self,
+        machine: &LoggedRobot,
+        columns: &RegressorColumns,
+        all: &DMatrix<f64>,
+    ) -> Vec<FrictionOfFit> {
+        let first = all.nrows() - GRADIENT * self.known.len();
+        let joints = machine.robot.joint_names().iter().enumerate();
+        let of = |(j, joint): (usize, &String)| {
+            let before = &self.known[j];
+            let now = columns.known[j].as_ref().unwrap_or(before).law.parameters();
+            let old = before.law.parameters();
+            let parameter = |k: usize| {
+                let variance = |v: f64| (v > 0.0).then(|| v.sqrt());
+                let at = first + GRADIENT * j + k;
+                let std = variance(all[(at, at)]);
+                let held = before.held[k];
+                let unit = friction_unit(
+                    &machine.robot,
+                    j,
+                    DoubleTanh::NAMES[k],
+                    machine.file.torque_unit(j),
+                );
+                FrictionParameter {
+                    value: now[k],
+                    std,
+                    unit,
+                    prior: old[k],
+                    prior_std: variance(before.covariance[k][k]),
+                    held,
+                    verdict: std.filter(|_| !held).map(|std| verdict_of(now[k], std)),
+                }
+            };
+            let named = |k: usize| (DoubleTanh::NAMES[k].to_owned(), parameter(k));
+            FrictionOfFit {
+                joint: joint.clone(),
+                parameters: (0..GRADIENT).map(named).collect(),
+            }
+        };
+        joints.map(of).collect()
+    }
+
+    /// Joints that move faster here than in their one-joint logs, as warnings with what it costs; `fastest` is the
+    /// greatest speed of each joint.
+    pub fn beyond(
+        &self,
+        machine: &LoggedRobot,
+        columns: &RegressorColumns,
+        all: &DMatrix<f64>,
+        fastest: &[f64],
+    ) -> Vec<String> {
+        let first = all.nrows() - GRADIENT * self.known.len();
+        let mut out = Vec::new();
+        for (j, joint) in machine.robot.joint_names().iter().enumerate() {
+            let (Some(covered), speed) = (self.priors[j].speeds_covered, fastest[j]) else {
+                continue;
+            };
+            if speed <= MAX_SPEED_RATIO * covered[1] || self.left_out[j] {
+                continue;
+            }
+            let law = columns.known[j]
+                .as_ref()
+                .map_or(self.known[j].law, |k| k.law);
+            let covariance = of_joint(all, first + GRADIENT * j);
+            let (torque, std) = (law.torque(speed), curve_std(&law, &covariance, speed));
+            let position = machine.robot.joint_kind(j).position_unit();
+            let shown = |x: f64| number::significant(x, 3);
+            let described = match 2.0 * std > WEAK * torque.abs() {
+                true => "cannot be told from these logs",
+                // its deviation is that of the law, which nobody has seen there
+                false => "is continued by its law",
+            };
+            out.push(format!(
+                "{joint}: moves at up to {} {position}/s, but its one-joint logs at up to {}; its friction beyond {described}: log the joint alone as fast as it is used",
+                shown(speed),
+                shown(covered[1]),
+            ));
+        }
+        out
+    }
+}
+
+/// Covariance of one joint's friction, which begins at row `at` of that of all.
+pub(crate) fn of_joint(all: &DMatrix<f64>, at: usize) -> [[f64; GRADIENT]; GRADIENT] {
+    std::array::from_fn(|a| std::array::from_fn(|b| all[(at + a, at + b)]))
+}
+
+/// A joint's friction without the logs `given`: the file's own, or where these logs refined it that of before.
+fn prior_of(
+    (name, file): (&str, &ModelFile),
+    joint: &str,
+    given: &[Provenance],
+) -> Result<FrictionPrior, IdentifyError> {
+    let entry = file.friction_prior.iter().find(|p| p.joint == joint);
+    let again = entry.filter(|e| e.values.is_some() && any_shared(given, &e.refined_by));
+    if let Some(again) = again {
+        return Ok(again.clone());
+    }
+    let keys = DoubleTanh::NAMES.map(|key| format!("{key}:{joint}"));
+    let flat = file.covariance_of(&keys);
+    let mut prior = entry.cloned().unwrap_or_default();
+    match entry {
+        Some(entry) => prior.logs.extend(entry.refined_by.iter().cloned()),
+        None => prior.logs.clone_from(&file.provenance.inputs),
+    }
+    Ok(FrictionPrior {
+        joint: joint.to_owned(),
+        values: Some(file.double_tanh(name, joint)?.parameters()),
+        covariance: Some(std::array::from_fn(|a| {
+            std::array::from_fn(|b| flat[a * GRADIENT + b])
+        })),
+        refined_by: Vec::new(),
+        ..prior
+    })
+}
+
+fn refined_by(mut priors: Vec<FrictionPrior>, inputs: &[Provenance]) -> Vec<FrictionPrior> {
+    for prior in &mut priors {
+        prior.refined_by = inputs.to_vec();
+    }
+    priors
+}
+
+/// The model with the friction that is known without the logs `given`, and what a refined model keeps of it.
+pub(crate) fn before_these(
+    (name, file): (&str, &ModelFile),
+    given: &[Provenance],
+) -> Result<(ModelFile, Vec<FrictionPrior>), IdentifyError> {
+    let mut model = file.clone();
+    let mut priors = Vec::new();
+    if file.robot.friction_law() != FrictionLawKind::DoubleTanh {
+        return Ok((model, priors));
+    }
+    for joint in file.robot.joint_names() {
+        let prior = prior_of((name, file), &joint, given)?;
+        let keys = DoubleTanh::NAMES.map(|key| format!("{key}:{joint}"));
+        let changed = file.double_tanh(name, &joint)?.parameters();
+        if let (Some(values), Some(covariance)) = (prior.values, prior.covariance)
+            && values != changed
+        {
+            model.replace_covariance(&keys, &|a, b| covariance[a][b]);
+            for parameter in &mut model.parameters {
+                if let Some(k) = keys.iter().position(|key| *key == parameter.key()) {
+                    parameter.value = values[k];
+                    parameter.std = Some(covariance[k][k].max(0.0).sqrt());
+                }
+            }
+        }
+        priors.push(prior);
+    }
+    Ok((model, refined_by(priors, given)))
+}
+
+/// A speed over the greatest of the one-joint logs up to which their law is not continued.
+const MAX_SPEED_RATIO: f64 = 1.1;
+
+/// Covariance of unknowns and known friction: cov(theta, theta_f) = S Sigma_f, with S = d theta / d theta_f.
+pub(crate) fn with_friction(columns: &RegressorColumns, fit: &Fit) -> DMatrix<f64> {
+    let u = fit.theta.len();
+    let known = columns.known.iter().flatten().count();
+    let mut all = DMatrix::zeros(u + GRADIENT * known, u + GRADIENT * known);
+    all.view_mut((0, 0), (u, u)).copy_from(&fit.covariance);
+    let joints = columns.known.iter().enumerate();
+    let joints = joints.filter_map(|(j, known)| Some((j, known.as_ref()?)));
+    for (place, (j, known)) in joints.enumerate() {
+        let at = u + GRADIENT * place;
+        let own = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| known.covariance[a][b]);
+        if let Some(sensitivity) = &fit.friction_sensitivity[j] {
+            let cross = sensitivity * &own;
+            all.view_mut((0, at), (u, GRADIENT)).copy_from(&cross);
+            all.view_mut((at, 0), (GRADIENT, u))
+                .copy_from(&cross.transpose());
+        }
+        all.view_mut((at, at), (GRADIENT, GRADIENT)).copy_from(&own);
+    }
+    all
+}
+
+/// The same from `whole`, the covariance of a refinement with columns `free`; held friction keeps its variance.
+pub(crate) fn of_refinement(
+    columns: &RegressorColumns,
+    free: &RegressorColumns,
+    whole: &DMatrix<f64>,
+    held: &[Option<KnownFriction>],
+) -> DMatrix<f64> {
+    let mut places: Vec<Option<usize>> = (0..columns.shared).map(Some).collect();
+    for (j, own) in columns.own.iter().enumerate() {
+        places.extend((0..own.len()).map(|k| Some(free.first_own(j) + k)));
+    }
+    let mut fixed = vec![0.0; places.len()];
+    for (j, known) in held.iter().enumerate() {
+        let Some(known) = known else { continue };
+        let mut of_law = [None; GRADIENT];
+        free.law_unknowns(j)
+            .for_each(|(at, k)| of_law[k] = Some(at));
+        places.extend(of_law);
+        fixed.extend((0..GRADIENT).map(|k| known.covariance[k][k]));
+    }
+    DMatrix::from_fn(places.len(), places.len(), |a, b| {
+        match (places[a], places[b]) {
+            (Some(a), Some(b)) => whole[(a, b)],
+            (None, None) if a == b => fixed[a],
+            _ => 0.0,
+        }
+    })
+}

@@ -1,0 +1,142 @@
+//! The declared numbers beside effects, fitted as the given model was: by `lsq` on the same logs, with the torques of
+//! the effects taken off. With no effect it gives back the given model.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::consistent::project_by;
+use super::lsq::{LsqSettings, lsq};
+use crate::input::control::Control;
+use crate::input::dataset::{Dataset, GivenModel};
+use crate::input::error::IdentifyError;
+use crate::input::held_torque::HeldTorque;
+use crate::input::log::Log;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::unknown_key::key_of;
+use cft_ident_core::diagnose::{ModelProposal, Unknown, value_of};
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::motion::Stretch;
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::robot_file::FrictionLawKind;
+use cft_ident_logs::log::Provenance;
+
+/// How the declared numbers of a proposal are fitted.
+pub(crate) struct OwnRefit<'a> {
+    pub machine: &'a LoggedRobot,
+    pub given: &'a GivenModel,
+    /// The logs that are fitted.
+    pub logs: &'a [Log],
+    pub stretches: &'a [Stretch],
+    pub unknowns: &'a [Unknown],
+    /// The friction of the given model stays as it is.
+    pub hold_friction: bool,
+    /// The fit that made the given model; none where other logs made it, or another way.
+    pub own: Option<OwnFit>,
+    pub control: Control,
+}
+
+/// A fit by `lsq` that made a model.
+pub(crate) struct OwnFit {
+    /// The model with the friction as it was known before, where it was.
+    friction: Option<GivenModel>,
+    hold_friction: bool,
+}
+
+impl OwnFit {
+    /// The fit of the logs `inputs` that made the given model, where one did; `before` is the model with the friction
+    /// that is known without them.
+    pub fn of(
+        (given, before): (&GivenModel, &ModelFile),
+        inputs: &[Provenance],
+        (keep, hold_friction): (bool, bool),
+    ) -> Option<Self> {
+        let made = &given.file.provenance;
+        let same = |a: &Provenance, b: &Provenance| {
+            (&a.sha256, &a.span, a.samples) == (&b.sha256, &b.span, b.samples)
+        };
+        let fitted: Vec<&Provenance> = made.inputs.iter().filter(|input| input.made()).collect();
+        let by_these = fitted.len() == inputs.len()
+            && inputs.iter().all(|b| fitted.iter().any(|a| same(a, b)));
+        let by_lsq = made.command == "lsq" && made.estimator.is_none();
+        let known = given.file.robot.friction_law() == FrictionLawKind::DoubleTanh
+            && !given.file.friction_prior.is_empty();
+        (by_these && by_lsq && !keep).then(|| OwnFit {
+            friction: known.then(|| GivenModel {
+                file: before.clone(),
+                ..given.clone()
+            }),
+            hold_friction,
+        })
+    }
+}
+
+impl OwnRefit<'_> {
+    /// The model file of a proposal, without its effects.
+    pub fn file(&self, proposal: &ModelProposal) -> Result<ModelFile, IdentifyError> {
+        match &self.own {
+            Some(own) => self.by_lsq(own, proposal.model),
+            None => Ok(self.by_sums(proposal)),
+        }
+    }
+
+    /// `lsq` on the logs less the torques of the effects.
+    fn by_lsq(&self, own: &OwnFit, model: &AugmentedModel) -> Result<ModelFile, IdentifyError> {
+        let settings = LsqSettings {
+            consistent: self.given.file.is_consistent(),
+            friction: own.friction.as_ref(),
+            hold_friction: own.hold_friction,
+            ..LsqSettings::default()
+        };
+        let data = Dataset::new(&self.holding(model), self.logs);
+        let found = lsq(&data, &settings, &self.control.quiet())?;
+        Ok(found.model(self.machine, own.friction.as_ref().map(|given| &given.file)))
+    }
+
+    /// The robot, the torques of a model's effects taken off its logs.
+    fn holding(&self, model: &AugmentedModel) -> LoggedRobot {
+        let plain = AugmentedModel::plain(model.model.clone());
+        let mut held = vec![HeldTorque::default(); self.logs.len()];
+        for stretch in self.stretches {
+            let Some(held) = held.get_mut(stretch.log) else {
+                continue;
+            };
+            let (mut torque, alone) = (model.reconstruct(stretch), plain.reconstruct(stretch));
+            for (torque, alone) in torque.iter_mut().zip(&alone) {
+                torque.iter_mut().zip(alone).for_each(|(x, y)| *x -= y);
+            }
+            held.push(stretch, torque);
+        }
+        let keys = self.logs.iter().map(Log::key);
+        let held: BTreeMap<String, HeldTorque> = keys.zip(held).collect();
+        LoggedRobot {
+            held: Arc::new(held),
+            ..self.machine.clone()
+        }
+    }
+
+    /// The given model with the declared numbers by the judge's sums, consistent ones nearest to them in their metric.
+    fn by_sums(&self, proposal: &ModelProposal) -> ModelFile {
+        let mut file = self.given.file.clone();
+        let held = |u: &&Unknown| self.hold_friction && matches!(u, Unknown::Friction { .. });
+        for unknown in self.unknowns.iter().filter(|u| !held(u)) {
+            let (name, joint) = key_of(proposal.model, *unknown);
+            let own = file.parameters.iter_mut();
+            for p in own.filter(|p| p.name == name && p.joint == joint) {
+                p.value = value_of(proposal.model, *unknown);
+            }
+        }
+        // inertial parameters that are kept are as consistent as they were
+        let kept = !self.unknowns.iter().any(|u| matches!(u, Unknown::Theta(_)));
+        if !kept && file.is_consistent() {
+            let key = |unknown: &Unknown| match key_of(proposal.model, *unknown) {
+                (name, Some(joint)) => format!("{name}:{joint}"),
+                (name, None) => name,
+            };
+            let keys: Vec<String> = self.unknowns.iter().map(key).collect();
+            if project_by(&mut file, &keys, proposal.information).is_err() {
+                file.forget_consistent();
+            }
+        }
+        file
+    }
+}

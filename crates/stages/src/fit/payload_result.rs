@@ -1,0 +1,173 @@
+//! What `payload` found, what it says of a body, and the model with it.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use cft_ident_core::robot::standard::{Body, STANDARD};
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
+use cft_ident_logs::log::Provenance;
+
+/// Standard deviations by which two readings contradict each other: as many as a change between logs needs.
+const CONTRADICTION_DEVIATIONS: f64 = 3.0;
+
+/// What a log says of the mass on the last link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PayloadVerdict {
+    /// The interval lies above zero, whatever the gains of the torques are.
+    Seen,
+    /// It does with the gains of the model; with a gain error of each joint it holds both that mass and zero.
+    NotApartFromGains,
+    /// It does with the gains of the model; with a gain error of each joint it does not hold that mass.
+    GainsContradict,
+    /// The interval holds zero with the gains of the model.
+    NoneSeen,
+    /// The log holds nothing on the mass.
+    NotDetermined,
+}
+
+/// A number with its 95 % confidence interval; null where the log does not determine it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Number95 {
+    pub value: Option<f64>,
+    pub std: Option<f64>,
+    pub interval_95: Option<[f64; 2]>,
+    pub unit: String,
+}
+
+/// A gain error of a joint's torque channel: what was logged over what the model's channel would show, less 1.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct GainOff {
+    pub joint: String,
+    pub error: Number95,
+}
+
+/// The torque error of a joint.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LeftOfJoint {
+    pub joint: String,
+    /// Relative error of the model as given.
+    pub before: f64,
+    /// The same with body, friction and offset (and gains) of this reading.
+    pub after: f64,
+    /// Whether the body that suits all joints together makes this joint's error larger than chance does.
+    pub worse: bool,
+}
+
+/// The body by one reading of the torque channels.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PayloadReading {
+    /// Whether gain errors were free.
+    pub gains_free: bool,
+    pub mass: Number95,
+    /// Centre of gravity in the frame of the link \[m\].
+    pub centre: [Number95; 3],
+    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity \[kg m^2\].
+    pub inertia: [Number95; 6],
+    pub gains: Vec<GainOff>,
+    pub joints: Vec<LeftOfJoint>,
+    /// Standard parameters of the body.
+    #[serde(skip)]
+    pub body: [f64; STANDARD],
+}
+
+/// What `payload` found.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Payload {
+    /// Link that carries the body, in whose frame it is reported.
+    pub link: String,
+    pub verdict: PayloadVerdict,
+    /// With the gains of the model, then with free ones.
+    pub readings: Vec<PayloadReading>,
+    pub samples: u64,
+    #[serde(skip)]
+    pub inputs: Vec<Provenance>,
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+impl Number95 {
+    /// Whether the interval lies above zero; false where there is none.
+    fn is_above_zero(&self) -> bool {
+        self.interval_95.is_some_and(|[low, _]| low > 0.0)
+    }
+
+    /// Whether a value is far from it; false where there is none.
+    fn is_far_from(&self, value: f64) -> bool {
+        let [Some(own), Some(std)] = [self.value, self.std] else {
+            return false;
+        };
+        (value - own).abs() > CONTRADICTION_DEVIATIONS * std
+    }
+}
+
+impl PayloadVerdict {
+    pub(crate) fn of(readings: &[PayloadReading]) -> Self {
+        let [held, free] = readings else {
+            return Self::NotDetermined;
+        };
+        match held.mass.value {
+            None => Self::NotDetermined,
+            Some(_) if !held.mass.is_above_zero() => Self::NoneSeen,
+            Some(mass) if free.mass.is_far_from(mass) => Self::GainsContradict,
+            Some(_) if free.mass.is_above_zero() => Self::Seen,
+            Some(_) => Self::NotApartFromGains,
+        }
+    }
+}
+
+impl PayloadReading {
+    /// Joints whose error this reading makes larger.
+    pub fn worse(&self) -> impl Iterator<Item = &LeftOfJoint> {
+        self.joints.iter().filter(|joint| joint.worse)
+    }
+
+    /// The body as an effect of a model: its inertia is the same about every axis there.
+    fn effect(&self) -> EffectSection {
+        let body = Body::of(&self.body);
+        let parameter = |value: f64, std: Option<f64>, unit: &str| EffectParameter {
+            value,
+            std,
+            unit: unit.to_owned(),
+            bound: false,
+        };
+        let [xx, _, _, yy, _, zz] = body.inertia;
+        let mut parameters = BTreeMap::from([
+            ("mass".to_owned(), parameter(body.mass, self.mass.std, "kg")),
+            (
+                "inertia".to_owned(),
+                parameter((xx + yy + zz) / 3.0, None, "kg m^2"),
+            ),
+        ]);
+        for (i, key) in ["mx", "my", "mz"].into_iter().enumerate() {
+            parameters.insert(key.to_owned(), parameter(self.body[6 + i], None, "kg m"));
+        }
+        EffectSection {
+            shrinkage: None,
+            accepted_by_user: false,
+            name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
+            joint: None,
+            parameters,
+        }
+    }
+}
+
+impl Payload {
+    /// The model with the body of the reading without gain errors, as an effect; none where no body is seen, where free
+    /// gains contradict it, or where it makes the error of a joint larger.
+    pub fn loaded(&self, file: &ModelFile) -> Option<ModelFile> {
+        use PayloadVerdict::{NotApartFromGains, Seen};
+        let reading = self.readings.first()?;
+        if !matches!(self.verdict, Seen | NotApartFromGains) || reading.worse().next().is_some() {
+            return None;
+        }
+        let mut model = file.clone();
+        model.effects.push(reading.effect());
+        model.provenance.command = "payload".to_owned();
+        model.provenance.inputs.extend(self.inputs.iter().cloned());
+        Some(model)
+    }
+}

@@ -1,0 +1,98 @@
+//! Motions simulated from the torques of logs.
+
+use super::hold_out::read_pieces;
+use crate::input::control::Control;
+use crate::input::error::IdentifyError;
+use crate::input::in_memory::read_each;
+use crate::input::log::Log;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::position_cutoff::known;
+use crate::open_loop::{self, FreeRun, OpenLoop, RunSpan, WindowLength, along};
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::motion::{FilterSettings, Stretch};
+use cft_ident_core::number;
+use cft_ident_logs::log::Provenance;
+
+/// Length of the windows of robots that have more than one axis \[s\].
+const WINDOW_S: f64 = 0.25;
+
+/// Simulates the motion of logs from their torques, in windows that begin at measured states.
+pub(crate) fn open_loop(
+    machine: &LoggedRobot,
+    refined: &AugmentedModel,
+    logs: &[Log],
+    window: Option<f64>,
+    control: &Control,
+) -> Result<OpenLoop, IdentifyError> {
+    let machine = &machine.with_position_cutoffs(logs, &known(&refined.model), control)?;
+    let settings = FilterSettings {
+        q_trim_s: Some(0.0),
+        trim_s: Some(0.0),
+        ..machine.settings()
+    };
+    let whole = read_each(machine, &vec![settings; logs.len()], logs, control)?;
+    machine.check_temperatures(refined, logs, &whole.stretches)?;
+    let length = match window {
+        Some(s) => WindowLength::Seconds(s),
+        None if machine.robot.joints() == 1 => WindowLength::Whole,
+        None => WindowLength::Seconds(WINDOW_S),
+    };
+    let _work = control.begin("open loop", None);
+    Ok(along(refined, &whole.stretches, length))
+}
+
+/// The free run of a model on logs that were read as `inputs`, where units and length allow one.
+pub(crate) fn free_run(
+    machine: &LoggedRobot,
+    refined: &AugmentedModel,
+    (logs, inputs): (&[Log], &[Provenance]),
+    control: &Control,
+) -> Result<Option<FreeRun>, IdentifyError> {
+    if !is_in_si(machine) || logs.iter().any(|log| log.reduced().is_some()) {
+        return Ok(None);
+    }
+    let machine = &machine.with_position_cutoffs(logs, &known(&refined.model), control)?;
+    let settings = FilterSettings {
+        trim_s: Some(0.0),
+        ..machine.settings()
+    };
+    let stretches = read_pieces(machine, &settings, refined, (logs, inputs), control)?;
+    let _work = control.begin("free run", None);
+    let spans = whole(&stretches);
+    Ok(open_loop::free_run(refined, None, &stretches, &spans))
+}
+
+/// Whether every torque is in N or N m: of several joints in other units no motion follows.
+pub(crate) fn is_in_si(machine: &LoggedRobot) -> bool {
+    let robot = &machine.robot;
+    let unit = |j: usize| machine.file.torque_unit(j) == robot.joint_kind(j).torque_unit();
+    machine.file.without_gains().is_empty() && (0..robot.joints()).all(unit)
+}
+
+/// Every stretch from its begin to its end.
+pub(crate) fn whole(stretches: &[Stretch]) -> Vec<RunSpan> {
+    let each = stretches.iter().enumerate();
+    each.map(|(s, stretch)| (s, 0, stretch.len())).collect()
+}
+
+/// What a free run says against the model after, as a warning.
+pub(crate) fn spoiled(found: &FreeRun) -> Option<String> {
+    let worse = found.worse().filter_map(|joint| {
+        let after = joint.after.as_ref()?;
+        Some(format!(
+            "{} from {} to {} {}",
+            joint.joint,
+            number::significant(joint.given.rms, 3),
+            number::significant(after.rms, 3),
+            joint.unit
+        ))
+    });
+    let worse: Vec<String> = worse.collect();
+    (!worse.is_empty()).then(|| {
+        format!(
+            "free run: driven by the measured torques, the refined model leaves the measured positions faster than the model given (rms in windows of {} s: {}); take it for feed-forward and the given one to simulate",
+            number::significant(found.window_s, 2),
+            worse.join(", ")
+        )
+    })
+}

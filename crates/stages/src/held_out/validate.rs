@@ -1,0 +1,437 @@
+//! The torque of logs that were not used, reconstructed by a model.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::open_loop::{free_run, open_loop};
+use crate::band::{Band, NO_BAND, Reach};
+use crate::input::control::Control;
+use crate::input::dataset::{Dataset, GivenModel};
+use crate::input::error::IdentifyError;
+use crate::input::in_memory::read_whole;
+use crate::input::log::Log;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::model::refined;
+use crate::input::of_robot::{Beyond, Places};
+use crate::input::position_cutoff::known;
+use crate::input::reduced::error::ReducedError;
+use crate::input::reduced::reduced_log::ReducedLog;
+use crate::input::repeated::repeated_rows;
+use crate::input::unknowns::columns;
+use crate::open_loop::{FreeRun, OpenLoop};
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::inertia::columns::Own;
+use cft_ident_core::number;
+use cft_ident_core::robot::model::JointFriction;
+use cft_ident_core::validate::{
+    HalfWidths, JointError, Reconstructed, Reconstruction, SummedRows, TorqueErrors, Validation,
+};
+use cft_ident_files::config::ModelFile;
+use cft_ident_logs::log::{DataRole, Instant, Provenance};
+
+/// What `validate` found.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Validated {
+    #[serde(flatten)]
+    pub validation: Validation,
+    /// The same errors apart, where the model was made from some of the logs and not from others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_use: Option<ErrorsByUse>,
+    /// Positions that the model makes of the measured torques, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub open_loop: Option<OpenLoop>,
+    /// The motion that the model makes of the measured torques in windows; null where the logs do not allow it.
+    pub free_run: Option<FreeRun>,
+    #[serde(skip)]
+    pub inputs: Vec<Provenance>,
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+/// Errors on logs that had no part in the model, and on those that it was made from.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ErrorsByUse {
+    pub unseen: ErrorsOfLogs,
+    /// Fitted, or a judge of what was added.
+    pub used: ErrorsOfLogs,
+}
+
+/// Errors over some logs.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ErrorsOfLogs {
+    /// Their names, with their spans.
+    pub logs: Vec<String>,
+    #[serde(flatten)]
+    pub errors: TorqueErrors,
+}
+
+impl Validated {
+    /// The errors that judge the model: of unseen logs where there are any, else of all.
+    pub fn judged(&self) -> &TorqueErrors {
+        match &self.by_use {
+            Some(by_use) => &by_use.unseen.errors,
+            None => &self.validation.errors,
+        }
+    }
+
+    /// All errors, and those of parts of the logs.
+    fn every(&mut self) -> impl Iterator<Item = &mut TorqueErrors> {
+        let parts = self.by_use.iter_mut();
+        let parts = parts.flat_map(|by| [&mut by.unseen.errors, &mut by.used.errors]);
+        std::iter::once(&mut self.validation.errors).chain(parts)
+    }
+}
+
+/// Which inputs hold rows that a model was made from.
+///
+/// By checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
+/// model was fitted to into an unseen one.
+pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
+    let held_out = |made: &Provenance| made.role == Some(DataRole::HeldOut);
+    let made_from = || (file.provenance.inputs.iter()).filter(|input| !held_out(input));
+    let used = |input: &Provenance| made_from().any(|made| made.shares_rows(input));
+    inputs.iter().map(used).collect()
+}
+
+/// What a model is tried by.
+#[derive(Debug, Clone, Copy)]
+pub struct ValidateSettings<'a> {
+    pub model: &'a GivenModel,
+    /// Simulate the motion from the measured torques in short windows too.
+    pub free_run: bool,
+    /// Simulate the motion in windows of so many seconds that begin at measured states; without a length single axes
+    /// run from begin to end, and other robots in windows of 0.25 s.
+    pub open_loop: Option<Option<f64>>,
+}
+
+impl<'a> ValidateSettings<'a> {
+    /// The errors of torques alone.
+    pub fn of(model: &'a GivenModel) -> Self {
+        ValidateSettings {
+            model,
+            free_run: false,
+            open_loop: None,
+        }
+    }
+}
+
+/// Reconstructs the torque of logs, with a band where the model file holds what it takes; `row` gets every raw
+/// sample, and the instant from which its time is counted.
+///
+/// Band and rows are of positions that came through the filter by which the band was found: where these logs call for
+/// another, they are read again.
+///
+/// # Errors
+/// Logs or a model that cannot be used, and positions where a joint of this robot cannot stand.
+pub fn validate(
+    data: &Dataset,
+    settings: &ValidateSettings,
+    control: &Control,
+    row: &mut dyn FnMut(&Reconstructed, Instant),
+) -> Result<Validated, IdentifyError> {
+    let logs = data.logs.as_slice();
+    let refined = &settings.model.numbers()?;
+    let mut found = errors_of(data, (refined, &settings.model.file), control, row)?;
+    if settings.free_run {
+        found.free_run = free_run(&data.machine, refined, (logs, &found.inputs), control)?;
+    }
+    if let Some(window) = settings.open_loop {
+        let simulated = open_loop(&data.machine, refined, logs, window, control)?;
+        if simulated.astray > 0 {
+            found.warnings.push(format!(
+                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit again without --unconstrained",
+                simulated.astray, simulated.windows
+            ));
+        }
+        found.open_loop = Some(simulated);
+    }
+    Ok(found)
+}
+
+/// The errors of a model on the logs that it was fitted to, as [`validate`] gives them.
+pub(crate) fn errors_on_fitted(
+    machine: &LoggedRobot,
+    file: &ModelFile,
+    logs: &[Log],
+    control: &Control,
+) -> Result<TorqueErrors, IdentifyError> {
+    let model = refined(file, &machine.name)?;
+    let whole = not_reduced(logs);
+    let machine = match whole.is_empty() {
+        true => machine.clone(),
+        false => machine.with_position_cutoffs(&whole, &known(&model.model), control)?,
+    };
+    let found = reconstruct(
+        &machine,
+        (&model, file),
+        None,
+        logs,
+        control,
+        &mut |_, _| {},
+    )?;
+    Ok(found.validation.errors)
+}
+
+fn errors_of(
+    data: &Dataset,
+    (refined, file): (&AugmentedModel, &ModelFile),
+    control: &Control,
+    row: &mut dyn FnMut(&Reconstructed, Instant),
+) -> Result<Validated, IdentifyError> {
+    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let whole = not_reduced(logs);
+    let machine = match whole.is_empty() {
+        true => machine.clone(),
+        false => machine.with_position_cutoffs(&whole, &known(&refined.model), control)?,
+    };
+    smoothed_alike(&machine, logs)?;
+    let of_model = (refined, file);
+    // a band is of single rows, which a reduced log has not
+    let rows = whole.len() == logs.len();
+    let band = Band::new(file, &refined.model).filter(|_| rows);
+    let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
+    let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
+    let mut places = Places::new(&machine);
+    let mut beyond = Beyond::new(machine.robot.joints());
+    let mut seen = |r: &Reconstructed, origin: Instant| {
+        places.take(r.q);
+        beyond.take(r, origin);
+        if let Some(reach) = &mut reach {
+            reach.take(r.q, r.v, r.reconstructed);
+        }
+        row(r, origin);
+    };
+    let mut found = match &as_held {
+        None => reconstruct(&machine, of_model, band.as_ref(), logs, control, &mut seen)?,
+        Some(as_held) => {
+            let mut found = reconstruct(&machine, of_model, None, logs, control, &mut |_, _| {})?;
+            let mut second =
+                reconstruct(as_held, of_model, band.as_ref(), logs, control, &mut seen)?;
+            for (errors, by_band) in found.every().zip(second.every()) {
+                for (joint, by_band) in errors.joints.iter_mut().zip(&by_band.joints) {
+                    joint.coverage_95 = by_band.coverage_95;
+                    joint.half_width = by_band.half_width;
+                }
+            }
+            found
+        }
+    };
+    if let Some(other) = places.refused(&machine) {
+        return Err(other);
+    }
+    if let Some(error) = beyond.impossible(found.judged(), &machine, logs) {
+        found.warnings.insert(0, error.to_string());
+    }
+    if let Some(text) = not_a_validation(found.judged()) {
+        found.warnings.insert(0, text);
+    }
+    match &reach {
+        Some(reach) => found.warnings.extend(reach.in_words()),
+        None if rows => found.warnings.push(NO_BAND.to_owned()),
+        None => {}
+    }
+    Ok(found)
+}
+
+/// The word about errors as large as the torque, where a joint moves.
+pub fn not_a_validation(errors: &TorqueErrors) -> Option<String> {
+    let moving = |e: &&JointError| e.relative_error_moving.is_some_and(|error| error > 1.0);
+    let worst = errors.joints.iter().filter(moving);
+    let worst = worst.max_by(|a, b| a.headline().total_cmp(&b.headline()))?;
+    Some(format!(
+        "this is no validation of {}, whose torque is off by {} of itself: a log of another robot, unit, sign or order of joints, or a joint whose torque the model does not have (`cft-ident inspect` with the robot file looks for the former, `diagnose` for the latter)",
+        worst.joint,
+        number::percent(worst.headline())
+    ))
+}
+
+/// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
+fn smoothed_alike(machine: &LoggedRobot, logs: &[Log]) -> Result<(), IdentifyError> {
+    let parts: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
+    let Some(first) = parts.first().filter(|_| machine.finds_cutoffs()) else {
+        return Ok(());
+    };
+    let together = match parts.len() == logs.len() {
+        true => &first.own.cutoffs_hz,
+        false => &*machine.position_cutoffs_hz,
+    };
+    for part in &parts {
+        let own = &part.own.cutoffs_hz;
+        let differs = |(_, (a, b)): &(usize, (&f64, &f64))| a != b;
+        let joint = own.iter().zip(together).enumerate().find(differs);
+        if let Some((j, (own, other))) = joint {
+            return Err(ReducedError::NeedsLog {
+                log: part.name().to_owned(),
+                what: format!(
+                    "{} as smoothed as the other logs (by {} Hz, and they by {} Hz): its own rows chose it",
+                    machine.robot.joint_names()[j],
+                    number::significant(*own, 3),
+                    number::significant(*other, 3),
+                ),
+                remedy: "declare `position_cutoff_hz` in [filter] and reduce again, validate them one by one, or give the logs themselves",
+            }
+            .into());
+        }
+    }
+    Ok(())
+}
+
+/// The logs whose rows are there.
+fn not_reduced(logs: &[Log]) -> Vec<Log> {
+    let whole = logs.iter().filter(|log| log.reduced().is_none());
+    whole.cloned().collect()
+}
+
+fn reconstruct(
+    machine: &LoggedRobot,
+    (refined, file): (&AugmentedModel, &ModelFile),
+    band: Option<&Band>,
+    logs: &[Log],
+    control: &Control,
+    row: &mut dyn FnMut(&Reconstructed, Instant),
+) -> Result<Validated, IdentifyError> {
+    let work = control.begin("reconstruction", Some(logs.len() as u64));
+    let widths = band.map(|band| {
+        |motion: [&[f64]; 3], tau: &[f64], out: &mut [f64]| band.half_widths(motion, tau, out)
+    });
+    let widths: Option<HalfWidths> = widths.as_ref().map(|widths| widths as HalfWidths);
+    let speeds = machine.rest_speeds(&not_reduced(logs), control)?;
+    let mut all = Reconstruction::new(&refined.model, &speeds, widths);
+    let (mut inputs, mut last) = (Vec::new(), None);
+    let mut warnings = repeated_rows(logs, Some(&machine.file.layout()));
+    let settings = machine.settings();
+    let mut segments = 0;
+    for log in logs {
+        if let Some(part) = log.reduced() {
+            add_reduced(&mut all, machine, refined, part)?;
+            warnings.extend(part.warnings.iter().cloned());
+            inputs.push(part.provenance.clone());
+            last = Some(part.summary.clone());
+            all.end_log();
+            work.advance(1);
+            continue;
+        }
+        if refined.effects.is_empty() {
+            let mut open = machine.open(log, control)?;
+            let origin = open.origin();
+            all.count_from(origin.seconds());
+            let summary = all
+                .add(&settings, &mut |block| open.read(block), &mut |r| {
+                    row(r, origin)
+                })
+                .map_err(|e| open.ended(e))?;
+            warnings.extend(open.in_words(&summary));
+            inputs.push(open.provenance()?);
+            last = Some(summary);
+        } else {
+            // effects remember: they need a stretch from its begin
+            let one = std::slice::from_ref(log);
+            let whole = read_whole(machine, one, control)?;
+            machine.check_temperatures(refined, one, &whole.stretches)?;
+            all.count_from(whole.origin.seconds());
+            for stretch in &whole.stretches {
+                let hat = refined.reconstruct(stretch);
+                let mut described = |r: &Reconstructed| row(r, whole.origin);
+                all.add_stretch(&settings, segments, stretch, &hat, &mut described)
+                    .map_err(|e| IdentifyError::motion(&log.name(), e))?;
+                segments += 1;
+            }
+            warnings.extend(whole.warnings);
+            inputs.extend(whole.inputs);
+            last = Some(whole.summary);
+        }
+        all.end_log();
+        work.advance(1);
+    }
+    if let Some(part) = logs.iter().find_map(Log::reduced) {
+        warnings.push(format!(
+            "{} is a reduced log: the errors of single rows (the largest, R2, those before the filter) are not known of it",
+            part.name()
+        ));
+    }
+    let summary = last.ok_or(IdentifyError::NoLog)?;
+    let used = used_for(file, &inputs);
+    let part = |of_use: bool| ErrorsOfLogs {
+        logs: (logs.iter().zip(&used).filter(|(_, used)| **used == of_use))
+            .map(|(log, _)| log.name())
+            .collect(),
+        errors: all.errors_of(|log| used.get(log) == Some(&of_use)),
+    };
+    let apart = used.contains(&true) && used.contains(&false);
+    let by_use = apart.then(|| ErrorsByUse {
+        unseen: part(false),
+        used: part(true),
+    });
+    let mut found = Validated {
+        by_use,
+        open_loop: None,
+        free_run: None,
+        validation: all.finish(summary),
+        inputs,
+        warnings,
+    };
+    found.every().for_each(|errors| machine.name_units(errors));
+    Ok(found)
+}
+
+/// Adds the errors of a model that is linear in the columns of a reduced log.
+fn add_reduced(
+    all: &mut Reconstruction,
+    machine: &LoggedRobot,
+    refined: &AugmentedModel,
+    part: &ReducedLog,
+) -> Result<(), IdentifyError> {
+    let needs = |what: &str, remedy| ReducedError::NeedsLog {
+        log: part.name().to_owned(),
+        what: what.to_owned(),
+        remedy,
+    };
+    let model = &refined.model;
+    if !refined.effects.is_empty() {
+        let what = "the rows that effects are computed along";
+        return Err(needs(what, "give the log itself, or a model without effects").into());
+    }
+    part.belongs_to_robot(&machine.file)?;
+    let known = part.known_friction();
+    let columns = columns(machine, known.as_deref());
+    for (j, friction) in model.friction.iter().enumerate() {
+        let same = match (friction, columns.known[j].as_ref()) {
+            (JointFriction::DoubleTanh(law), Some(known)) => {
+                law.parameters() == known.law.parameters()
+            }
+            (JointFriction::ViscousCoulomb(_) | JointFriction::None, None) => true,
+            _ => false,
+        };
+        if !same {
+            let what = "the friction of this model: its columns were made with another";
+            let remedy = "reduce the log again with `-m` and this model, or give the log itself";
+            return Err(needs(what, remedy).into());
+        }
+    }
+    let mut theta = model.theta.clone();
+    for (j, own) in columns.own.iter().enumerate() {
+        let viscous_coulomb = match &model.friction[j] {
+            JointFriction::ViscousCoulomb(law) => [law.viscous, law.coulomb],
+            _ => [0.0, 0.0],
+        };
+        theta.extend(own.iter().map(|own| match own {
+            Own::Viscous => viscous_coulomb[0],
+            Own::Coulomb => viscous_coulomb[1],
+            Own::Offset => model.offset[j],
+            Own::Saturating(_) | Own::Law(_) | Own::TorqueRate | Own::TorqueBend => 0.0,
+        }));
+    }
+    let rows = part.rows(columns)?;
+    for (j, sums) in rows.squares(&theta.into()).into_iter().enumerate() {
+        let [moving, resting] = [rows.moving[j], rows.resting[j]];
+        all.add_sums(
+            j,
+            &SummedRows {
+                error: sums,
+                torque: [moving.torque_square, resting.torque_square],
+                rows: [moving.count, resting.count],
+            },
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,96 @@
+//! Logs read whole, as stretches in memory: for what looks at them many times.
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use cft_ident_core::motion::{FilterSettings, Stretch, Summary, stretches};
+use cft_ident_logs::log::{Instant, Provenance};
+
+/// Most samples that are taken into memory, over all logs: 2 GB for a robot of seven joints.
+const MOST_SAMPLES: usize = 9_000_000;
+
+/// Logs in memory, as stretches at full rate.
+pub struct InMemory {
+    pub stretches: Vec<Stretch>,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+    pub summary: Summary,
+    /// Instant from which the times of the first log are counted.
+    pub origin: Instant,
+    /// Torques are means of two rows: they come from a zero-order hold.
+    pub averaged: bool,
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub rest_speed: Vec<f64>,
+}
+
+/// Reads logs whole, smoothed as the model declares.
+///
+/// # Errors
+/// A log that cannot be read, or more samples than memory is meant to hold.
+pub fn read_whole(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    control: &Control,
+) -> Result<InMemory, IdentifyError> {
+    read_each(
+        machine,
+        &vec![machine.settings(); logs.len()],
+        logs,
+        control,
+    )
+}
+
+/// The same as [`read_whole`], each log with the settings in its place.
+pub(crate) fn read_each(
+    machine: &LoggedRobot,
+    settings: &[FilterSettings],
+    logs: &[Log],
+    control: &Control,
+) -> Result<InMemory, IdentifyError> {
+    let n = machine.robot.joints();
+    let work = control.begin("reading", Some(logs.len() as u64));
+    let (mut all, mut inputs, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    let mut last: Option<Summary> = None;
+    let mut origin = None;
+    let mut samples = 0;
+    let mut averaged = false;
+    for (index, (log, settings)) in logs.iter().zip(settings).enumerate() {
+        let name = log.name();
+        let mut open = machine.open(log, control)?;
+        origin = origin.or_else(|| Some(open.origin()));
+        averaged |= open.is_centred();
+        let (mut found, summary) = stretches(index, n, settings, &mut |block| open.read(block))
+            .map_err(|e| IdentifyError::of_run(&name, e))?;
+        open.count_run_time(&mut found);
+        for stretch in &mut found {
+            stretch.zero = open.origin().seconds();
+        }
+        samples += found.iter().map(Stretch::len).sum::<usize>();
+        if samples > MOST_SAMPLES {
+            return Err(IdentifyError::TooManySamples {
+                log: name,
+                samples,
+                most: MOST_SAMPLES,
+            });
+        }
+        warnings.extend(open.in_words(&summary));
+        warnings.extend(machine.put_temperatures(log, open.origin(), &mut found)?);
+        inputs.push(open.provenance()?);
+        all.extend(found);
+        last = Some(summary);
+        work.advance(1);
+    }
+    let (Some(summary), Some(origin)) = (last, origin) else {
+        return Err(IdentifyError::NoLog);
+    };
+    Ok(InMemory {
+        stretches: all,
+        inputs,
+        warnings,
+        summary,
+        origin,
+        averaged,
+        rest_speed: machine.rest_speeds(logs, control)?,
+    })
+}

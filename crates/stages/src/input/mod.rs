@@ -1,0 +1,31 @@
+//! What every stage is given: a dataset of a robot and its logs, a model, callbacks; its rows as they are read; what can go wrong.
+
+pub(crate) mod control;
+pub(crate) mod curve;
+pub(crate) mod dataset;
+pub(crate) mod error;
+pub(crate) mod error_kind;
+pub(crate) mod first_look;
+pub(crate) mod free_swing;
+pub(crate) mod gain_error;
+pub(crate) mod held_torque;
+pub(crate) mod in_memory;
+pub(crate) mod in_use;
+pub(crate) mod log;
+pub(crate) mod logged_robot;
+pub(crate) mod model;
+pub(crate) mod of_robot;
+pub(crate) mod one_joint;
+pub(crate) mod open_log;
+pub(crate) mod own_settings;
+pub(crate) mod passes;
+pub(crate) mod position_cutoff;
+pub(crate) mod reduced;
+pub(crate) mod reference;
+pub(crate) mod repeated;
+pub(crate) mod setup_file;
+pub(crate) mod speeds;
+pub(crate) mod temperatures;
+pub(crate) mod track_error;
+pub(crate) mod unknown_key;
+pub(crate) mod unknowns;

@@ -1,0 +1,105 @@
+//! One log given twice: rows that count twice make deviations too small, and what was fitted is no holdout.
+
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use cft_ident_logs::log::{Layout, Provenance, escape, sha256, shares_rows};
+
+/// Logs by what they are used for.
+pub(crate) type Role<'a> = (&'static str, &'a [Log]);
+
+/// Refuses two logs with the same rows, within a role and between roles.
+pub(crate) fn each_row_once(machine: &LoggedRobot, roles: &[Role]) -> Result<(), IdentifyError> {
+    let all: Vec<(&str, &Log)> = roles
+        .iter()
+        .flat_map(|(role, logs)| logs.iter().map(|log| (*role, log)))
+        .collect();
+    let layout = machine.file.layout();
+    let logs: Vec<&Log> = all.iter().map(|(_, log)| *log).collect();
+    match pairs(&logs, Some(&layout)).next() {
+        None => Ok(()),
+        Some((i, k)) => Err(IdentifyError::SameRows {
+            first: all[i].1.shown(),
+            first_role: all[i].0,
+            second: all[k].1.shown(),
+            second_role: all[k].0,
+        }),
+    }
+}
+
+/// Logs of the list that share no row with one of the others.
+pub(crate) fn without_rows_of(machine: &LoggedRobot, logs: &[Log], others: &[Log]) -> Vec<Log> {
+    let layout = machine.file.layout();
+    let fresh = |log: &&Log| {
+        !others
+            .iter()
+            .any(|other| same_rows(log, other, Some(&layout)))
+    };
+    logs.iter().filter(fresh).cloned().collect()
+}
+
+/// A sentence for each two logs with the same rows, for commands that only look; `layout` names the time column
+/// where a robot is known.
+pub fn repeated_rows(logs: &[Log], layout: Option<&Layout>) -> Vec<String> {
+    let all: Vec<&Log> = logs.iter().collect();
+    pairs(&all, layout)
+        .map(|(i, k)| {
+            let (first, second) = (all[i].shown(), all[k].shown());
+            format!("{second} holds rows that {first} holds: they count twice")
+        })
+        .collect()
+}
+
+fn pairs<'a>(
+    logs: &'a [&'a Log],
+    layout: Option<&'a Layout>,
+) -> impl Iterator<Item = (usize, usize)> + 'a {
+    let places = (0..logs.len()).flat_map(|k| (0..k).map(move |i| (i, k)));
+    places.filter(move |(i, k)| same_rows(logs[*i], logs[*k], layout))
+}
+
+fn same_rows(a: &Log, b: &Log, layout: Option<&Layout>) -> bool {
+    match (a, b) {
+        (Log::File(a), Log::File(b)) => shares_rows(a, b, layout),
+        (Log::Arrays(a), Log::Arrays(b)) => a.sha256() == b.sha256(),
+        (Log::Reduced(a), Log::Reduced(b)) => a.shares_rows(b),
+        (Log::Reduced(part), log) | (log, Log::Reduced(part)) => log
+            .provenance()
+            .is_some_and(|p| p.shares_rows(&part.provenance)),
+        _ => false,
+    }
+}
+
+impl Log {
+    /// Name and span, for messages.
+    fn shown(&self) -> String {
+        match self {
+            Self::File(spec) => match spec.part() {
+                Some(span) => format!("{}@{span}", escape(&spec.name())),
+                None => escape(&spec.name()),
+            },
+            Self::Arrays(arrays) => escape(arrays.name()),
+            Self::Reduced(part) => match &part.provenance.span {
+                Some(span) => format!("{}@{span}", escape(part.name())),
+                None => escape(part.name()),
+            },
+        }
+    }
+
+    /// What distinguishes its rows from others, where it can be read.
+    fn provenance(&self) -> Option<Provenance> {
+        let (span, sha256) = match self {
+            Self::File(spec) => (spec.part(), sha256(&spec.path).ok()?),
+            Self::Arrays(arrays) => (None, arrays.sha256().to_owned()),
+            Self::Reduced(part) => return Some(part.provenance.clone()),
+        };
+        Some(Provenance {
+            name: self.name(),
+            span,
+            sha256,
+            samples: 0,
+            duration_s: 0.0,
+            role: None,
+        })
+    }
+}

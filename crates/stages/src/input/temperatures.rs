@@ -1,0 +1,159 @@
+//! Temperatures of logs: read where the robot file names their columns, and asked for where a formula takes them.
+
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use cft_ident_core::effect::{AugmentedModel, Law};
+use cft_ident_core::explain::{ErrorText, Explain};
+use cft_ident_core::motion::Stretch;
+use cft_ident_logs::log::{Instant, LogError, Temperatures};
+
+/// A temperature that an effect takes.
+pub(crate) struct Taken {
+    effect: String,
+    joint: usize,
+}
+
+/// Those that the effects of a model take.
+pub(crate) fn of_model(model: &AugmentedModel) -> Vec<Taken> {
+    let effects = model.effects.iter().flat_map(|effect| {
+        let title = effect.title(&model.model.robot);
+        let joints = effect.temperatures().into_iter();
+        joints.map(move |joint| Taken {
+            effect: title.clone(),
+            joint,
+        })
+    });
+    effects.collect()
+}
+
+/// Those that effects of the user's own take at any joint where they are tried.
+pub(crate) fn of_laws(laws: &[&Law]) -> Vec<Taken> {
+    let all = laws.iter().filter_map(|law| Some((law, law.formula?)));
+    let taken = all.flat_map(|(law, formula)| {
+        let joints = formula.joints().iter();
+        joints.flat_map(|j| {
+            let taken = formula.temperatures(*j).into_iter();
+            taken.map(|joint| Taken {
+                effect: law.entry.name.to_owned(),
+                joint,
+            })
+        })
+    });
+    taken.collect()
+}
+
+/// Why rows of a stream are refused for a model that takes temperatures.
+pub(crate) fn none_on(stream: &str, model: &AugmentedModel) -> IdentifyError {
+    let first = of_model(model).into_iter().next();
+    let (effect, joint) = first.map_or((String::new(), 0), |t| (t.effect, t.joint));
+    IdentifyError::NoTemperature {
+        log: stream.to_owned(),
+        effect,
+        joint: model.model.robot.joint_names()[joint].clone(),
+        why: Box::new(
+            ErrorText::new("rows that arrive on a stream carry none")
+                .remedy("watch the log as a file"),
+        ),
+    }
+}
+
+impl LoggedRobot {
+    /// Temperatures of a log whose times count from `origin`; none where nothing names their columns.
+    ///
+    /// # Errors
+    /// A log that lacks a column that is named, or a temperature that is no number.
+    pub fn temperatures(&self, log: &Log, origin: Instant) -> Result<Temperatures, LogError> {
+        match (log, self.file.temperature_layout()) {
+            (Log::File(spec), Some((joints, layout))) => {
+                Temperatures::read(spec, (&joints, &layout), origin)
+            }
+            (Log::Arrays(arrays), _) => Ok(arrays.temperatures()),
+            _ => Ok(Temperatures::default()),
+        }
+    }
+
+    /// Puts the temperatures of a log beside its stretches; a column that it lacks is a warning.
+    pub(crate) fn put_temperatures(
+        &self,
+        log: &Log,
+        origin: Instant,
+        stretches: &mut [Stretch],
+    ) -> Result<Option<String>, LogError> {
+        match self.temperatures(log, origin) {
+            Ok(found) => {
+                for stretch in stretches {
+                    stretch.temperature = found.along(&stretch.t, self.robot.joints());
+                }
+                Ok(None)
+            }
+            Err(error @ (LogError::MissingColumn { .. } | LogError::Topic { .. })) => {
+                Ok(Some(format!("{error}; no temperature of this log is used")))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Refuses logs, read as these stretches, without the temperatures that the effects of a model take.
+    pub fn check_temperatures(
+        &self,
+        model: &AugmentedModel,
+        logs: &[Log],
+        stretches: &[Stretch],
+    ) -> Result<(), IdentifyError> {
+        self.check_taken(&of_model(model), logs, stretches)
+    }
+
+    /// The same of effects in any place.
+    pub(crate) fn check_taken(
+        &self,
+        taken: &[Taken],
+        logs: &[Log],
+        stretches: &[Stretch],
+    ) -> Result<(), IdentifyError> {
+        for Taken { effect, joint } in taken {
+            let lacking = stretches.iter().find(|s| !s.has_temperature(*joint));
+            if let Some(log) = lacking.and_then(|s| logs.get(s.log)) {
+                return Err(self.no_temperature(log, effect, *joint));
+            }
+        }
+        Ok(())
+    }
+
+    /// The temperatures of a log for a model that takes some, without its rows.
+    pub(crate) fn temperatures_for(
+        &self,
+        model: &AugmentedModel,
+        log: &Log,
+        origin: Instant,
+    ) -> Result<Temperatures, IdentifyError> {
+        let taken = of_model(model);
+        if taken.is_empty() {
+            return Ok(Temperatures::default());
+        }
+        let found = self.temperatures(log, origin).unwrap_or_default();
+        match taken.iter().find(|t| found.at(t.joint, 0.0).is_none()) {
+            Some(Taken { effect, joint }) => Err(self.no_temperature(log, effect, *joint)),
+            None => Ok(found),
+        }
+    }
+
+    fn no_temperature(&self, log: &Log, effect: &str, joint: usize) -> IdentifyError {
+        let name = &self.robot.joint_names()[joint];
+        let why = match (self.temperatures(log, Instant::default()), log) {
+            (Err(error), _) => error.explanation(),
+            (Ok(_), Log::Arrays(_)) => "give it with the log's other arrays".into(),
+            (Ok(_), _) => format!(
+                "name its column, `[log.joint.{name}] temperature = \"COLUMN\"` in the robot or model file, or leave {name} \
+                 out of the formula and of the `joints` of its [[candidate]] table"
+            )
+            .into(),
+        };
+        IdentifyError::NoTemperature {
+            log: log.name(),
+            effect: effect.to_owned(),
+            joint: name.clone(),
+            why: Box::new(why),
+        }
+    }
+}
