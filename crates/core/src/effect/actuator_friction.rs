@@ -1,6 +1,7 @@
 //! `actuator-friction`: friction in the actuator coordinates, tau = J' F(J v). On the CFT robot it
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
+use crate::math::hyperbolic::tanh;
 use super::{Entry, Family, Key, Ladder, Law, Places, Search, ShapeSpan, Unit};
 use crate::robot::cft::pantograph::reference_jacobian;
 
@@ -46,7 +47,7 @@ pub static LAW: Law = Law {
             let speed = jacobian[r][0] * v[2] + jacobian[r][1] * v[3];
             let share = jacobian[r][at.joint - 2];
             out[0] += share * speed;
-            out[1] += share * (at.shape[0] * speed).tanh();
+            out[1] += share * tanh(at.shape[0] * speed);
         }
     })
 };

@@ -1,6 +1,7 @@
 //! `load-friction`: friction that grows with the load, (mu_c + mu_v |v|) |tau_l| tanh(w v)
 //! (Hamon, Gautier and Garrec 2010).
 
+use crate::math::hyperbolic::tanh;
 use super::{CurveSignal, Entry, Family, Key, Law, Limit, Number, Rule, Search, ShapeSpan, Unit};
 use crate::number;
 
@@ -58,7 +59,7 @@ pub static LAW: Law = Law {
         ));
     }),
     ..Law::linear(&ENTRY, &["mu_c", "mu_v"], |at, _, out| {
-        out[0] = at.load().abs() * (at.shape[0] * at.v()).tanh();
+        out[0] = at.load().abs() * tanh(at.shape[0] * at.v());
         out[1] = at.v().abs() * out[0];
     })
 };

@@ -1,6 +1,7 @@
 //! `smooth-coulomb`: friction that does not jump at rest. In place of the declared fc sgn(v) stands
 //! fc tanh(v/vs) (Andersson, Soderberg and Bjorklund 2007, eq. 2).
 
+use crate::math::hyperbolic::tanh;
 use super::{
     CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit,
     jumps_or_is_none,
@@ -55,7 +56,7 @@ pub static LAW: Law = Law {
         let top = cover.at(place).fastest();
         vec![ShapeSpan::of(1e-3 * top, 0.5 * top)]
     },
-    direction: Some(|shape, v| (v / shape[0]).tanh()),
+    direction: Some(|shape, v| tanh(v / shape[0])),
     code: Some(|to| {
         let v = to.v();
         to.friction(format!(
@@ -65,6 +66,6 @@ pub static LAW: Law = Law {
         ));
     }),
     ..Law::linear(&ENTRY, &["fc"], |at, _, out| {
-        out[0] = (at.v() / at.shape[0]).tanh() - sign(at.v());
+        out[0] = tanh(at.v() / at.shape[0]) - sign(at.v());
     })
 };

@@ -5,6 +5,7 @@
 //! polished. Torque and columns are averaged over short windows, a parallel filter that is the
 //! same for both sides.
 
+use crate::math::hyperbolic::tanh;
 use nalgebra::{DMatrix, DVector};
 
 use super::prepare::Prepared;
@@ -82,7 +83,7 @@ impl WindowAverages {
     /// Averages of tanh(w v) over the windows.
     fn tanh(&self, slope: f64) -> Vec<f64> {
         let of = |&(k, n): &(usize, usize)| {
-            let each = self.velocity[k..k + n].iter().map(|v| (slope * v).tanh());
+            let each = self.velocity[k..k + n].iter().map(|v| tanh(slope * v));
             self.torque_scale * each.sum::<f64>()
         };
         self.spans.iter().map(of).collect()

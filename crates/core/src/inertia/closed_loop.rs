@@ -7,6 +7,7 @@
 //! as the robot does, not to be exact.
 
 use super::columns::{Own, RegressorColumns};
+use crate::math::hyperbolic::tanh;
 use crate::robot::Robot;
 use crate::robot::tree::MOST_JOINTS;
 
@@ -125,7 +126,7 @@ impl<'a> ClosedLoop<'a> {
                     sum[1] += size;
                 }
                 Own::Coulomb => {
-                    let t = (v / width).tanh();
+                    let t = tanh(v / width);
                     sum[0] += size * t;
                     sum[1] += size * (1.0 - t * t) / width;
                 }

@@ -1,6 +1,7 @@
 //! Which columns a joint's rows have: shared inertial parameters, its own linear terms, the
 //! gradient of its known friction, and the target.
 
+use crate::math::hyperbolic::tanh;
 use nalgebra::DVector;
 
 use crate::motion::{FilterSettings, MotionSample, rest};
@@ -47,7 +48,7 @@ impl Own {
             Own::Viscous => v,
             Own::Coulomb => sign(v),
             Own::Offset => 1.0,
-            Own::Saturating(slope) => (slope * v).tanh(),
+            Own::Saturating(slope) => tanh(slope * v),
             Own::Law(_) | Own::TorqueRate | Own::TorqueBend => 0.0,
         }
     }

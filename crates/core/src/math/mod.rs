@@ -8,6 +8,7 @@ pub mod covariance;
 pub mod descent;
 pub mod formula;
 pub mod gram;
+pub mod hyperbolic;
 pub mod jacobi;
 pub mod kept;
 pub mod lanes;

@@ -13,8 +13,10 @@ use nalgebra::DMatrix;
 use super::MathError;
 use super::lanes::{LaneWork, Simd, widest};
 
-/// Rows folded at once: the block of 13 columns stays in a first-level cache of 32 KiB.
-const BLOCK_ROWS: usize = 256;
+/// Numbers of a block: what a first-level cache of 32 KiB holds.
+const BLOCK: usize = 4096;
+/// Fewest and most rows folded at once: vectors want some, and more of them save nothing.
+const BLOCK_ROWS: [usize; 2] = [32, 256];
 
 /// A column whose squares sum to less counts as zero, as the tails of filters do: a reflector would divide by underflow.
 const TINY: f64 = 1e-280;
@@ -29,20 +31,27 @@ pub struct RFactor {
     rows: u64,
     /// Upper triangle, row-major, `columns x columns`; below the diagonal zeros.
     triangle: Vec<f64>,
-    /// Rows that are not yet folded, column-major with stride `BLOCK_ROWS`.
+    /// Rows that are not yet folded, column-major.
     block: Vec<f64>,
-    pending: usize,
+    /// Rows that the block holds: its stride.
+    stride: usize,
+    /// Place of the first number of each row that waits which is not zero: rows of a triangle are folded in a third of
+    /// the time.
+    first: Vec<usize>,
 }
 
 impl RFactor {
     /// An empty factor (R = 0, no rows) of `columns` columns.
     pub fn new(columns: usize) -> Self {
+        let [fewest, most] = BLOCK_ROWS;
+        let stride = (BLOCK / columns.max(1)).clamp(fewest, most) / 8 * 8;
         Self {
             columns,
             rows: 0,
             triangle: vec![0.0; columns * columns],
-            block: vec![0.0; columns * BLOCK_ROWS],
-            pending: 0,
+            block: vec![0.0; columns * stride],
+            stride,
+            first: Vec::new(),
         }
     }
 
@@ -94,9 +103,9 @@ impl RFactor {
             }
         }
         let mut row = vec![0.0; n];
-        for k in 0..other.pending {
+        for k in 0..other.first.len() {
             for (j, x) in row.iter_mut().enumerate() {
-                *x = other.block[j * BLOCK_ROWS + k];
+                *x = other.block[j * other.stride + k];
             }
             self.push(&row);
         }
@@ -106,22 +115,29 @@ impl RFactor {
 
     /// Folds the rows that wait in the block.
     pub fn flush(&mut self) {
-        if self.pending > 0 {
-            let size = [self.columns, self.pending, BLOCK_ROWS];
-            reduce(size, &mut self.triangle, &mut self.block);
-            self.pending = 0;
+        if !self.first.is_empty() {
+            in_order(&mut self.first, &mut self.block, self.stride);
+            reduce(
+                &self.first,
+                self.stride,
+                &mut self.triangle,
+                &mut self.block,
+            );
+            self.first.clear();
         }
     }
 
     /// R, `columns x columns`, upper triangular, of all rows added so far. Signs of its rows are
     /// not normalised.
     pub fn r(&self) -> DMatrix<f64> {
-        let (n, k) = (self.columns, self.pending);
+        let (n, k) = (self.columns, self.first.len());
         let mut triangle = self.triangle.clone();
         if k > 0 {
-            let columns = self.block.chunks_exact(BLOCK_ROWS);
+            let columns = self.block.chunks_exact(self.stride);
             let mut waiting: Vec<f64> = columns.flat_map(|x| &x[..k]).copied().collect();
-            reduce([n, k, k], &mut triangle, &mut waiting);
+            let mut first = self.first.clone();
+            in_order(&mut first, &mut waiting, k);
+            reduce(&first, k, &mut triangle, &mut waiting);
         }
         DMatrix::from_row_slice(n, n, &triangle)
     }
@@ -129,10 +145,11 @@ impl RFactor {
     /// The rows themselves while they are fewer than the columns, `k x columns`, otherwise R: either has the products
     /// of the stacked matrix, and few rows need no reflection.
     pub fn short(&self) -> DMatrix<f64> {
-        let few = self.rows == self.pending as u64 && self.pending < self.columns;
+        let waiting = self.first.len();
+        let few = self.rows == waiting as u64 && waiting < self.columns;
         match few {
-            true => DMatrix::from_fn(self.pending, self.columns, |k, j| {
-                self.block[j * BLOCK_ROWS + k]
+            true => DMatrix::from_fn(waiting, self.columns, |k, j| {
+                self.block[j * self.stride + k]
             }),
             false => self.r(),
         }
@@ -140,33 +157,54 @@ impl RFactor {
 
     pub fn clear(&mut self) {
         self.triangle.fill(0.0);
-        self.pending = 0;
+        self.first.clear();
         self.rows = 0;
     }
 
     fn push(&mut self, row: &[f64]) {
-        for (column, &x) in self.block.chunks_exact_mut(BLOCK_ROWS).zip(row) {
-            column[self.pending] = x;
+        let pending = self.first.len();
+        for (column, &x) in self.block.chunks_exact_mut(self.stride).zip(row) {
+            column[pending] = x;
         }
-        self.pending += 1;
-        if self.pending == BLOCK_ROWS {
+        let first = row.iter().position(|x| *x != 0.0);
+        self.first.push(first.unwrap_or(row.len()));
+        if self.first.len() == self.stride {
             self.flush();
         }
     }
 }
 
-/// Annihilates k rows of the column-major `block`, whose n columns begin `stride` apart, under the row-major `triangle`.
-fn reduce(size: [usize; 3], triangle: &mut [f64], block: &mut [f64]) {
+/// Puts the rows of a column-major block in the order of their first numbers that are not zero.
+fn in_order(first: &mut [usize], block: &mut [f64], stride: usize) {
+    if first.is_sorted() {
+        return;
+    }
+    let mut order: Vec<usize> = (0..first.len()).collect();
+    order.sort_by_key(|k| first[*k]);
+    first.sort_unstable();
+    let mut sorted = vec![0.0; first.len()];
+    for column in block.chunks_exact_mut(stride) {
+        for (to, k) in sorted.iter_mut().zip(&order) {
+            *to = column[*k];
+        }
+        column[..sorted.len()].copy_from_slice(&sorted);
+    }
+}
+
+/// Annihilates rows of the column-major `block`, whose columns begin `stride` apart, under the row-major `triangle`.
+/// Left of `first`, which goes up, the rows are zero.
+fn reduce(first: &[usize], stride: usize, triangle: &mut [f64], block: &mut [f64]) {
     widest(Reduction {
-        size,
+        first,
+        stride,
         triangle,
         block,
     });
 }
 
 struct Reduction<'a> {
-    /// n, k and the stride.
-    size: [usize; 3],
+    first: &'a [usize],
+    stride: usize,
     triangle: &'a mut [f64],
     block: &'a mut [f64],
 }
@@ -177,11 +215,15 @@ impl LaneWork for Reduction<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let Self {
-            size: [n, k, stride],
+            first,
+            stride,
             triangle,
             block,
         } = self;
+        let n = block.len() / stride;
+        let mut k = 0;
         for j in 0..n {
+            k += first[k..].iter().take_while(|first| **first <= j).count();
             let (left, right) = block.split_at_mut((j + 1) * stride);
             let u = &left[j * stride..j * stride + k];
             let below = dot(u, u);
@@ -335,6 +377,23 @@ mod tests {
                 let r = factor.r();
                 assert_eq!(r, r.upper_triangle());
             }
+        }
+    }
+
+    #[test]
+    fn rows_that_begin_with_zeros_count_in_any_order() {
+        for columns in [1, 2, 5, 9, 40, 150] {
+            let mut data = random_rows(700, columns, 11);
+            for (k, row) in data.chunks_exact_mut(columns).enumerate() {
+                row[..(k * 7919) % (columns + 1)].fill(0.0);
+            }
+            let mut factor = RFactor::new(columns);
+            factor.fold(&data);
+            assert!(gram_error(&factor, &data) < 1e-14, "{columns}");
+            let mut twice = RFactor::of_triangle(columns, factor.r().transpose().as_slice().into());
+            twice.merge(&factor).expect("same width");
+            let both = [data.clone(), data].concat();
+            assert!(gram_error(&twice, &both) < 1e-14, "{columns}");
         }
     }
 

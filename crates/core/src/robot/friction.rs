@@ -3,6 +3,7 @@
 //! The sign is that of eq. (60): tau = Y theta + F(v), so that friction takes torque from the
 //! motor (the report's (4), (10), (11) have it the other way round).
 
+use crate::math::hyperbolic::tanh;
 use serde::{Deserialize, Serialize};
 
 /// Viscous friction and two saturating parts, law (18) of the report:
@@ -30,14 +31,14 @@ impl DoubleTanh {
     #[inline]
     pub fn torque(&self, v: f64) -> f64 {
         self.viscous * v
-            + self.coulomb_1 * (self.slope_1 * v).tanh()
-            + self.coulomb_2 * (self.slope_2 * v).tanh()
+            + self.coulomb_1 * tanh(self.slope_1 * v)
+            + self.coulomb_2 * tanh(self.slope_2 * v)
     }
 
     /// dF/dv in N s/m or N m s/rad.
     #[inline]
     pub fn slope(&self, v: f64) -> f64 {
-        let (t1, t2) = ((self.slope_1 * v).tanh(), (self.slope_2 * v).tanh());
+        let (t1, t2) = (tanh(self.slope_1 * v), tanh(self.slope_2 * v));
         self.viscous
             + self.coulomb_1 * self.slope_1 * (1.0 - t1 * t1)
             + self.coulomb_2 * self.slope_2 * (1.0 - t2 * t2)
@@ -46,7 +47,7 @@ impl DoubleTanh {
     /// dF/d(viscous, coulomb_1, coulomb_2, slope_1, slope_2) at v.
     #[inline]
     pub fn gradient(&self, v: f64) -> [f64; 5] {
-        let (t1, t2) = ((self.slope_1 * v).tanh(), (self.slope_2 * v).tanh());
+        let (t1, t2) = (tanh(self.slope_1 * v), tanh(self.slope_2 * v));
         [
             v,
             t1,

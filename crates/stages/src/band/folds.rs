@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use cft_ident_core::effect::{Added, AugmentedModel, Role, Scene};
+use cft_ident_core::math::gram::{gram, stride};
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch, rest};
 use cft_ident_core::robot::model::JointFriction;
 
@@ -114,7 +115,7 @@ pub fn without_each(
 ) -> Result<Vec<AugmentedModel>, MotionError> {
     let layout = Layout::of(model, free);
     let (n, u) = (model.model.robot.joints(), layout.count);
-    let mut sums = vec![vec![Sums::new(u); n]; folds.count()];
+    let mut sums = vec![vec![JointProducts::default(); n]; folds.count()];
     for stretch in stretches {
         let into = (folds, &mut sums[..]);
         add(model, &layout, stretch, filters, rest_speed, into)?;
@@ -122,17 +123,16 @@ pub fn without_each(
     // one weight a joint, that of its residual in all blocks
     let weight = |j: usize| {
         let (square, rows) = sums.iter().fold((0.0, 0.0), |(s, r), fold| {
-            (s + fold[j].square, r + fold[j].rows)
+            (s + fold[j].residual_square(), r + fold[j].rows)
         });
         if square > 0.0 { rows / square } else { 0.0 }
     };
     let weights: Vec<f64> = (0..n).map(weight).collect();
-    let joined = |fold: &Vec<Sums>| {
+    let joined = |fold: &Vec<JointProducts>| {
         let mut h = DMatrix::zeros(u, u);
         let mut g = DVector::zeros(u);
         for (sums, w) in fold.iter().zip(&weights) {
-            h += &sums.normal * *w;
-            g += &sums.gradient * *w;
+            sums.add_to(*w, &mut h, &mut g);
         }
         (h, g)
     };
@@ -165,34 +165,41 @@ pub fn without_each(
     Ok(models.collect())
 }
 
-/// Normal equations of one joint in one block.
-#[derive(Clone)]
-struct Sums {
-    normal: DMatrix<f64>,
-    gradient: DVector<f64>,
-    square: f64,
+/// Products of the rows of one joint in one block: of its own columns, and of its residual behind them.
+#[derive(Clone, Default)]
+struct JointProducts {
+    /// Where its columns stand among all unknowns.
+    places: Vec<usize>,
+    /// `(columns + 1) x (columns + 1)`; empty where there are no rows.
+    gram: DMatrix<f64>,
     rows: f64,
 }
 
-impl Sums {
-    fn new(u: usize) -> Self {
-        Sums {
-            normal: DMatrix::zeros(u, u),
-            gradient: DVector::zeros(u),
-            square: 0.0,
-            rows: 0.0,
+impl JointProducts {
+    /// Adds rows as [`gram`] takes them.
+    fn add(&mut self, places: &[usize], rows: &[f64]) {
+        let columns = places.len() + 1;
+        let more = gram(rows, columns);
+        self.rows += (rows.len() / stride(columns)) as f64;
+        match self.gram.is_empty() {
+            true => (self.places, self.gram) = (places.to_vec(), more),
+            false => self.gram += more,
         }
     }
 
-    /// Adds a row whose entries stand at `places`; all others are 0.
-    fn add(&mut self, places: &[usize], columns: &[f64], error: f64) {
-        self.square += error * error;
-        self.rows += 1.0;
-        for (i, x) in places.iter().zip(columns) {
-            self.gradient[*i] += x * error;
-            let mut normal = self.normal.column_mut(*i);
-            for (k, y) in places.iter().zip(columns) {
-                normal[*k] += x * y;
+    fn residual_square(&self) -> f64 {
+        let last = self.places.len();
+        self.gram.get((last, last)).copied().unwrap_or(0.0)
+    }
+
+    /// Adds them, weighed, to the normal equations of all unknowns.
+    fn add_to(&self, weight: f64, h: &mut DMatrix<f64>, g: &mut DVector<f64>) {
+        let last = self.places.len();
+        for (b, k) in self.places.iter().enumerate() {
+            g[*k] += weight * self.gram[(b, last)];
+            let mut to = h.column_mut(*k);
+            for (a, i) in self.places.iter().enumerate() {
+                to[*i] += weight * self.gram[(a, b)];
             }
         }
     }
@@ -205,7 +212,7 @@ fn add(
     stretch: &Stretch,
     filters: &ParallelFilters,
     rest_speed: &[f64],
-    (folds, sums): (&Folds, &mut [Vec<Sums>]),
+    (folds, sums): (&Folds, &mut [Vec<JointProducts>]),
 ) -> Result<(), MotionError> {
     let n = model.model.robot.joints();
     let filter = filters.of(stretch);
@@ -276,17 +283,22 @@ fn add(
             let u = of.places.len();
             let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
             let rows = filter.run(&channels)?;
-            let mut columns = vec![0.0; u];
-            for i in 0..filter.rows(piece.len()) {
-                if rest::rests(rows[u + 1][i]) {
-                    continue;
-                }
-                for (x, row) in columns.iter_mut().zip(&rows) {
-                    *x = row[i];
-                }
+            let moves = |i: &usize| !rest::rests(rows[u + 1][*i]);
+            let moving: Vec<usize> = (0..filter.rows(piece.len())).filter(moves).collect();
+            let fold = |i: usize| {
                 let t = stretch.t[piece.start + filter.sample_of(i)];
-                let fold = folds.of_time(stretch.log, t);
-                sums[fold][j].add(&of.places, &columns, rows[u][i]);
+                folds.of_time(stretch.log, t)
+            };
+            let mut data = Vec::new();
+            for part in moving.chunk_by(|a, b| fold(*a) == fold(*b)) {
+                data.clear();
+                data.resize(part.len() * stride(u + 1), 0.0);
+                for (to, i) in data.chunks_exact_mut(stride(u + 1)).zip(part) {
+                    to.iter_mut()
+                        .zip(&rows[..=u])
+                        .for_each(|(to, row)| *to = row[*i]);
+                }
+                sums[fold(part[0])][j].add(&of.places, &data);
             }
         }
     }

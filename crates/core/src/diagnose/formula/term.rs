@@ -1,6 +1,7 @@
 //! What a formula is made of: products of functions of signals, with their units and what becomes of them where the
 //! motion is reversed.
 
+use crate::math::hyperbolic::tanh;
 use std::collections::BTreeMap;
 
 use crate::effect::Scene;
@@ -151,7 +152,7 @@ impl Function {
             Self::Cube => x * x * x,
             Self::Abs => x.abs(),
             Self::Signed => x * x.abs(),
-            Self::Tanh(w) => (x / w).tanh(),
+            Self::Tanh(w) => tanh(x / w),
             Self::Decay(w) => (-x.abs() / w).exp(),
             Self::Bell(w) => (-(x / w) * (x / w)).exp(),
         }
