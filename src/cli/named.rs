@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use super::example::{self, ExampleMachine};
 use super::{CliError, Context};
 use cft_ident_files::config::{Campaign, RobotFile};
-use cft_ident_logs::log::{DOCUMENT, LogSpec, begins_with};
+use cft_ident_logs::log::{DOCUMENT, LogError, LogSection, LogSpec, RawReader, begins_with};
 
 /// What `identify` works on.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +38,7 @@ pub(super) fn named(
         ([], []) => Ok(Named::BuiltIn),
         ([], [first, ..]) => {
             let name = first.name();
+            is_a_log(first)?;
             if begins_with(&first.path, DOCUMENT) {
                 let problem = format!("{name}: is a JSON document of this program, not a log");
                 return Err(CliError::usage(problem).hint("give the log that it is of"));
@@ -59,6 +60,19 @@ pub(super) fn named(
             second.display()
         ))
         .hint("name one robot (URDF or robot file) and its logs")),
+    }
+}
+
+/// Refuses what no robot file makes a log of: no file, a folder without a recording, a picture.
+fn is_a_log(file: &LogSpec) -> Result<(), CliError> {
+    match RawReader::open_plain(file, &LogSection::default()) {
+        Err(
+            error @ (LogError::Read { .. }
+            | LogError::Format { .. }
+            | LogError::Folder { .. }
+            | LogError::Empty { .. }),
+        ) => Err(error.into()),
+        _ => Ok(()),
     }
 }
 

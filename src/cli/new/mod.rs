@@ -107,6 +107,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let text = format!("{} is there already", target.display());
         return Err(CliError::output(text).hint("choose another name, or delete the file"));
     }
+    if args.name != target && args.name.is_file() {
+        let name = args.name.display();
+        let text = format!("{name} is a file, where the name of a new robot is asked for");
+        return Err(CliError::usage(text).hint(format!(
+            "name the robot, and its files by options: cft-ident new NAME --urdf ROBOT.urdf --log {name}"
+        )));
+    }
     let log = args.log.as_ref().map(|l| &*l.path);
     let inputs = args.urdf.as_deref().into_iter().chain(log);
     context.check_outputs(inputs, [&*target])?;

@@ -7,8 +7,10 @@ use cft_ident_core::math::gram::{gram, stride};
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch, rest};
 use cft_ident_core::robot::model::JointFriction;
 
-/// Samples that are looked at together.
-const PIECE: usize = 16_384;
+/// Samples that are looked at together, and the fewest where a robot has many columns.
+const PIECE: [usize; 2] = [16_384, 2_048];
+/// Numbers of a piece: 64 MB. Arms of seven joints have a quarter.
+const PIECE_NUMBERS: usize = 8 << 20;
 /// Share of all blocks' information that holds a model to itself: without a block no direction is left free.
 const HOLD_SHARE: f64 = 0.01;
 
@@ -249,9 +251,12 @@ fn add(
         .iter()
         .map(|of| vec![Vec::new(); of.places.len() + 2]);
     let mut channels: Vec<Vec<Vec<f64>>> = channels.collect();
+    let width = channels.iter().map(Vec::len).sum::<usize>().max(1);
+    let [usual, fewest] = PIECE;
+    let together = (PIECE_NUMBERS / width).clamp(fewest, usual);
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    for from in (0..stretch.len()).step_by(PIECE) {
-        let piece = from..(from + PIECE).min(stretch.len());
+    for from in (0..stretch.len()).step_by(together) {
+        let piece = from..(from + together).min(stretch.len());
         if filter.rows(piece.len()) < 2 {
             continue;
         }
