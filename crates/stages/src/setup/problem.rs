@@ -1,7 +1,6 @@
 //! Sums of products of a sample under a correction, by block of time and joint.
 
 use std::ops::Range;
-use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
@@ -50,9 +49,8 @@ pub(super) struct Rows {
     /// Over all rows.
     pub total: Vec<DMatrix<f64>>,
     joints: Vec<JointRows>,
-    of_blocks: Vec<Range<usize>>,
-    /// Sums of each block, once they are asked for: most hypotheses are seen to be no better before.
-    blocks: OnceLock<Vec<Vec<DMatrix<f64>>>>,
+    /// Of each block, by joint.
+    blocks: Vec<Vec<DMatrix<f64>>>,
 }
 
 /// Shares of all rows after which it is looked whether the others need to be made.
@@ -73,9 +71,9 @@ impl RowsSoFar {
         }
     }
 
-    fn add(&mut self, joints: &[JointRows], rows: Range<usize>) {
-        for (sums, joint) in self.sums.iter_mut().zip(joints) {
-            *sums += joint.products(rows.clone());
+    fn add(&mut self, block: &[DMatrix<f64>]) {
+        for (sums, of_joint) in self.sums.iter_mut().zip(block) {
+            *sums += of_joint;
         }
     }
 }
@@ -149,18 +147,12 @@ impl Rows {
 
     /// Sums of products of a block, by joint.
     pub fn block(&self, b: usize) -> &[DMatrix<f64>] {
-        let of = |rows: &Range<usize>| {
-            let joints = self.joints.iter();
-            joints.map(|joint| joint.products(rows.clone())).collect()
-        };
-        &self
-            .blocks
-            .get_or_init(|| self.of_blocks.iter().map(of).collect())[b]
+        &self.blocks[b]
     }
 
     /// Number of blocks.
     pub fn blocks(&self) -> usize {
-        self.of_blocks.len()
+        self.blocks.len()
     }
 }
 
@@ -279,9 +271,9 @@ impl<'a> Problem<'a> {
         let mut joints: Vec<JointRows> = places.iter().zip(&self.moving).map(no_rows).collect();
         let mut carried = Carried::new(n);
         let mut y = vec![0.0; n * p];
-        let mut of_blocks = vec![0..0; self.blocks.list.len()];
+        let mut blocks = vec![Vec::new(); self.blocks.list.len()];
         let (mut good, mut all) = (0, 0);
-        let (mut summed, mut part) = (0, RowsSoFar::none(&terms, &joints));
+        let mut part = RowsSoFar::none(&terms, &joints);
         let mut shares = LOOKS.iter().peekable();
         for &b in order {
             let first = good;
@@ -315,26 +307,19 @@ impl<'a> Problem<'a> {
                     torques[..n].copy_from_slice(&carried.tau[j * n..(j + 1) * n]);
                 }
             }
-            of_blocks[b] = first..good;
-            if shares
-                .next_if(|share| good as f64 >= *share * most as f64)
-                .is_some()
-            {
-                part.add(&joints, summed..good);
-                summed = good;
-                if is_hopeless(&part) {
-                    return None;
-                }
+            blocks[b] = joints.iter().map(|of| of.products(first..good)).collect();
+            part.add(&blocks[b]);
+            let look = shares.next_if(|share| good as f64 >= *share * most as f64);
+            if look.is_some() && is_hopeless(&part) {
+                return None;
             }
         }
-        part.add(&joints, summed..good);
         (good > 0 && 2 * good >= all).then(|| Rows {
             count: good,
             total: part.sums,
             terms,
             joints,
-            of_blocks,
-            blocks: OnceLock::new(),
+            blocks,
         })
     }
 }
