@@ -10,7 +10,7 @@ use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::table::{Align, Table};
 use cft_ident_report::report::{Figure, FoundLine, Headline, Report, Tone};
 use cft_ident_stages::identify::{
-    self, Dataset, Number95, Payload, PayloadReading, PayloadVerdict,
+    self, Dataset, IntervalNumber, Payload, PayloadReading, PayloadVerdict,
 };
 use cft_ident_tool::tool::{CarriedBody, RobotController};
 
@@ -78,7 +78,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 }
 
 /// A gain error as percent; nothing is known of one whose interval holds a gain of zero.
-fn gain(x: &Number95) -> String {
+fn gain(x: &IntervalNumber) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) if low > -1.0 => {
             let [value, low, high] = [value, low, high].map(|x| format!("{:+.1}", 100.0 * x));
@@ -89,7 +89,7 @@ fn gain(x: &Number95) -> String {
 }
 
 /// A number with its interval.
-fn shown(x: &Number95) -> String {
+fn shown(x: &IntervalNumber) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
             // digits as far as the interval says something
@@ -248,7 +248,7 @@ fn tables(found: &Payload, logs: &str) -> [Table; 2] {
     ])
     .caption(&caption);
     if let [as_given, free] = &found.readings[..] {
-        let mut row = |name: &str, a: &Number95, b: &Number95| {
+        let mut row = |name: &str, a: &IntervalNumber, b: &IntervalNumber| {
             table.row([name, &shown(a), &shown(b), &a.unit]);
         };
         row("mass", &as_given.mass, &free.mass);

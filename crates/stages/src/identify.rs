@@ -41,7 +41,7 @@ pub use crate::fit::lsq::{LsqSettings, lsq};
 pub use crate::fit::motion_fit::MotionFit;
 pub use crate::fit::payload::payload;
 pub use crate::fit::payload_result::{
-    GainOff, LeftOfJoint, Number95, Payload, PayloadReading, PayloadVerdict,
+    GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
 };
 pub use crate::fit::weakest::WeakestPart;
 pub use crate::fleet::reduce::reduce;

@@ -36,7 +36,7 @@ const FORMULAS: [[&str; 3]; 6] = [
     ],
 ];
 
-fn own_formulas(robot: &Robot) -> Vec<Added> {
+fn own_formulas(robot: &Robot) -> Vec<ModelEffect> {
     let definition = Definition {
         name: "all-functions".to_owned(),
         coefficients: FORMULAS.iter().map(|c| c.map(str::to_owned)).collect(),
@@ -50,7 +50,7 @@ fn own_formulas(robot: &Robot) -> Vec<Added> {
     let law = own::law(&definition, robot).unwrap();
     let at = |j: usize, w: f64| {
         let linear = (0..law.linear.len()).map(|i| 0.9 - 0.27 * i as f64);
-        Added::new(law, Place::Joint(j), vec![w], linear.collect())
+        ModelEffect::new(law, Place::Joint(j), vec![w], linear.collect())
     };
     vec![at(0, 12.0), at(3, 70.0)]
 }
@@ -70,7 +70,12 @@ fn warm(robot: &Robot, name: &str, formula: &str) -> Case {
     Case {
         name: name.to_owned(),
         model: AugmentedModel {
-            effects: vec![Added::new(law, Place::Joint(1), Vec::new(), vec![0.7])],
+            effects: vec![ModelEffect::new(
+                law,
+                Place::Joint(1),
+                Vec::new(),
+                vec![0.7],
+            )],
             model: model(robot.clone()),
         },
         along,

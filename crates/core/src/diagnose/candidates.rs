@@ -3,15 +3,15 @@
 use super::problem::case::Case;
 pub use super::problem::pass::Candidate;
 use crate::effect::{
-    Added, AugmentedModel, Cover, Family, LAWS, Law, Number, Place, Role, Rule, Search, Seen,
+    AugmentedModel, Cover, Family, LAWS, Law, ModelEffect, Number, Place, Role, Rule, Search, Seen,
     ShapeSpan,
 };
 use crate::judge::Bound;
 use crate::number;
 
 /// Whether two effects may not both be added: one shape per family and place, and one wave per order.
-pub fn exclude(a: &Added, b: &Added) -> bool {
-    let waves = |e: &Added| e.law.entry.search == Search::Orders;
+pub fn exclude(a: &ModelEffect, b: &ModelEffect) -> bool {
+    let waves = |e: &ModelEffect| e.law.entry.search == Search::Orders;
     match a.place == b.place && a.family() == b.family() {
         true if waves(a) && waves(b) => a.name() == b.name() && close(&a.shape, &b.shape),
         same => same,
@@ -27,7 +27,7 @@ fn close(a: &[f64], b: &[f64]) -> bool {
 }
 
 /// Whether an effect is of a joint's declared friction law: its shape, or what stands beside it.
-pub fn is_friction_law(effect: &Added) -> bool {
+pub fn is_friction_law(effect: &ModelEffect) -> bool {
     let joint = matches!(effect.place, Place::Joint(_));
     joint && matches!(effect.family(), Family::Velocity | Family::Offset)
 }
@@ -99,7 +99,7 @@ fn known(model: &AugmentedModel, law: &Law, place: Place) -> bool {
 }
 
 fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> Option<Candidate> {
-    let effect = Added::new(law, place, shape, vec![1.0; law.linear.len()]);
+    let effect = ModelEffect::new(law, place, shape, vec![1.0; law.linear.len()]);
     // what hangs on coefficients is a bound of the fit, what hangs on the shape alone a limit of the grid
     let twice = vec![2.0; law.linear.len()];
     let value = |linear: &[f64], key: &str| {
@@ -118,7 +118,7 @@ fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> O
     let bounds = bounds.collect();
     let linear = vec![0.0; law.linear.len()];
     broken.is_none().then_some(Candidate {
-        effect: Added { linear, ..effect },
+        effect: ModelEffect { linear, ..effect },
         bounds,
         slopes: Vec::new(),
     })
@@ -129,7 +129,7 @@ pub fn refined_shapes(
     model: &AugmentedModel,
     case: &Case,
     cover: &Cover,
-    effect: &Added,
+    effect: &ModelEffect,
 ) -> Vec<(usize, Bound)> {
     let ranges = shape_ranges(model, case, cover, effect).into_iter();
     let of = |(k, range): (usize, ShapeSpan)| {
@@ -148,7 +148,7 @@ fn shape_ranges(
     model: &AugmentedModel,
     case: &Case,
     cover: &Cover,
-    effect: &Added,
+    effect: &ModelEffect,
 ) -> Vec<ShapeSpan> {
     let law = effect.law;
     let seen = seen(model, cover, case, effect.place);
@@ -166,7 +166,7 @@ pub fn no_finding(
     model: &AugmentedModel,
     case: &Case,
     cover: &Cover,
-    effect: &Added,
+    effect: &ModelEffect,
 ) -> Option<String> {
     let law = effect.law;
     if effect.linear.iter().all(|x| *x == 0.0) || !effect.can_be() {
@@ -190,7 +190,7 @@ pub fn no_finding(
 }
 
 /// Values that a coefficient can have.
-fn bound(effect: &Added, key: &str, seen: &Seen) -> Bound {
+fn bound(effect: &ModelEffect, key: &str, seen: &Seen) -> Bound {
     let mut bound = Bound::NONE;
     for rule in effect.law.entry.must {
         match rule.of {

@@ -11,7 +11,7 @@ use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::{Errors, JointChange};
 use super::unexplained::signal::Signal;
 use crate::effect::formula::Definition;
-use crate::effect::{Added, AugmentedModel, Law, Place};
+use crate::effect::{AugmentedModel, Law, ModelEffect, Place};
 use crate::judge::ErrorGain;
 use crate::robot::FormulaSignal;
 
@@ -45,7 +45,7 @@ pub enum NotWritten {
 #[derive(Debug, Clone)]
 pub struct FoundEffect {
     /// With the amplitude of the joint fit of all effects that stand; of one that does not, of the fit of these and it.
-    pub estimate: Added,
+    pub estimate: ModelEffect,
     /// Covariance of its (shape, linear), row-major; a shape that is not free has none.
     pub covariance: Vec<f64>,
     /// Its place in the effects of the model that is written.
@@ -68,7 +68,7 @@ pub struct FoundEffect {
     /// Part of the squared error of these blocks that it takes off.
     pub share: f64,
     /// Effects that these data do not separate from it, best first.
-    pub alternatives: Vec<Added>,
+    pub alternatives: Vec<ModelEffect>,
     /// Mean relative error on held-out data without and with it.
     pub holdout: Option<[f64; 2]>,
     /// The same joint by joint.
@@ -92,7 +92,7 @@ pub struct LeftCandidate {
     pub law: &'static Law,
     pub place: Place,
     /// In its best shape; none where it was not tried.
-    pub effect: Option<Added>,
+    pub effect: Option<ModelEffect>,
     /// Part of the squared error of blocks left out that it would take off.
     pub score: Option<f64>,
     pub reason: String,
@@ -153,7 +153,7 @@ pub struct FoundFormula {
     /// Root mean square of the residual without and with it within 0.1 s of a reversal, on the same data.
     pub at_reversals: Option<[f64; 2]>,
     /// Effects of the catalogue at the joint in whose place it stands.
-    pub in_place_of: Vec<Added>,
+    pub in_place_of: Vec<ModelEffect>,
 }
 
 /// Parts of what a formula adds, by its terms' squares.

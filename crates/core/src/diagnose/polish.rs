@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use super::candidates::{Candidate, refined_shapes};
 use super::prepared::{PreparedCase, Summed, moved};
 use super::search::Chosen;
-use crate::effect::{Added, AugmentedModel};
+use crate::effect::{AugmentedModel, ModelEffect};
 use crate::judge::Term;
 use crate::motion::MotionError;
 
@@ -34,7 +34,7 @@ impl PreparedCase<'_> {
         candidates: &mut [Candidate],
         summed: &Summed,
         chosen: &[Chosen],
-        directions: &[Added],
+        directions: &[ModelEffect],
     ) -> Result<Summed, MotionError> {
         let field = self.field(candidates, summed);
         let values = field.terms(chosen).fit(&field.total(), &[]).values;
@@ -73,7 +73,7 @@ impl PreparedCase<'_> {
         &self,
         from: &Point,
         chosen: &[Chosen],
-        directions: &[Added],
+        directions: &[ModelEffect],
     ) -> Result<Option<Point>, MotionError> {
         let about = moved(&from.summed.about, &self.unknowns, &from.values);
         let mut part = 1.0;
@@ -117,17 +117,17 @@ impl PreparedCase<'_> {
         &self,
         about: AugmentedModel,
         candidates: Vec<Candidate>,
-        (chosen, directions): (&[Chosen], &[Added]),
+        (chosen, directions): (&[Chosen], &[ModelEffect]),
     ) -> Result<Point, MotionError> {
         // a law that is chosen gives the direction in its present shape
-        let present = |d: &Added| {
+        let present = |d: &ModelEffect| {
             let mut own = chosen.iter().map(|c| &candidates[c.candidate].effect);
             let own = own.find(|e| e.name() == d.name() && e.place == d.place);
             let mut direction = own.unwrap_or(d).clone();
             direction.linear.fill(0.0);
             direction
         };
-        let directions: Vec<Added> = directions.iter().map(present).collect();
+        let directions: Vec<ModelEffect> = directions.iter().map(present).collect();
         let summed = self.summed(about, &candidates, &directions)?;
         let field = self.field(&candidates, &summed);
         let (total, terms) = (field.total(), field.terms(chosen));

@@ -16,7 +16,7 @@ use super::problem::pass::{ColumnLayout, Data};
 use super::problem::unknowns::{Unknowns, step};
 use super::refit::ModelRefit;
 use super::unexplained::errors::Errors;
-use crate::effect::{Added, AugmentedModel, Cover};
+use crate::effect::{AugmentedModel, Cover, ModelEffect};
 use crate::judge::{BlockSums, Blocks, BlocksLeftOut, LogRows, Term, Terms, compare, divide};
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
@@ -40,7 +40,7 @@ pub struct Summed {
     /// The declared model that they are about.
     pub about: AugmentedModel,
     /// Friction laws by whose direction friction goes.
-    pub directions: Vec<Added>,
+    pub directions: Vec<ModelEffect>,
     pub layout: ColumnLayout,
     pub sums: BlockSums,
     pub declared: Terms,
@@ -124,7 +124,7 @@ impl<'a> PreparedCase<'a> {
             return Ok(f64::INFINITY);
         };
         let mut with = moved(model, &self.unknowns, &values);
-        with.effects.push(Added {
+        with.effects.push(ModelEffect {
             linear: values.as_slice()[self.unknowns.len()..].to_vec(),
             ..candidate.effect.clone()
         });

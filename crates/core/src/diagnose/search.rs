@@ -7,7 +7,7 @@ use super::candidates::{Candidate, exclude, is_friction_law};
 use super::error::DiagnoseError;
 use super::prepared::{PreparedCase, Summed};
 use super::watch::Watch;
-use crate::effect::{Added, Place};
+use crate::effect::{ModelEffect, Place};
 use crate::judge::{BlocksLeftOut, ErrorGain, Numbers, Term, Terms};
 
 /// Candidates by their sums of products.
@@ -45,7 +45,7 @@ impl<'a> Field<'a> {
         &self.prepared.case.numbers
     }
 
-    pub fn effect(&self, chosen: &Chosen) -> &'a Added {
+    pub fn effect(&self, chosen: &Chosen) -> &'a ModelEffect {
         &self.candidates[chosen.candidate].effect
     }
 
@@ -63,7 +63,7 @@ impl<'a> Field<'a> {
         loop {
             let terms = self.terms(&chosen);
             let left_out = self.left_out(&terms)?;
-            let taken: Vec<&Added> = chosen.iter().map(|c| self.effect(c)).collect();
+            let taken: Vec<&ModelEffect> = chosen.iter().map(|c| self.effect(c)).collect();
             let excluded = |i: usize| {
                 let effect = &self.candidates[i].effect;
                 taken.iter().any(|t| exclude(t, effect))
@@ -80,7 +80,7 @@ impl<'a> Field<'a> {
             drop(part);
             // at most a friction law for each joint, and so many effects besides
             let laws = taken.iter().filter(|e| is_friction_law(e)).count();
-            let room = |effect: &Added| match is_friction_law(effect) {
+            let room = |effect: &ModelEffect| match is_friction_law(effect) {
                 true => laws < terms.weights.len(),
                 false => taken.len() - laws < self.numbers().effects,
             };
@@ -119,7 +119,7 @@ impl<'a> Field<'a> {
     }
 
     /// The greatest admissible gain, or what says the same with fewer numbers.
-    fn best(&self, looked: &[Looked], room: &dyn Fn(&Added) -> bool) -> Option<Chosen> {
+    fn best(&self, looked: &[Looked], room: &dyn Fn(&ModelEffect) -> bool) -> Option<Chosen> {
         let effect = |l: &Looked| &self.candidates[l.candidate].effect;
         let Numbers { screen, same, .. } = *self.numbers();
         let beyond = |l: &&Looked| l.gain.is_beyond(screen, own_joint(effect(l).place));

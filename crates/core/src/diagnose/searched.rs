@@ -12,7 +12,7 @@ use super::problem::pass::{ColumnLayout, Data, pass};
 use super::search::{Chosen, Field, Looked};
 use super::tables::Estimates;
 use super::watch::Watch;
-use crate::effect::{Added, AugmentedModel};
+use crate::effect::{AugmentedModel, ModelEffect};
 use crate::explain::ErrorText;
 use crate::judge::{BlockSums, compare, weighted};
 use crate::motion::{MotionError, Stretch};
@@ -30,7 +30,7 @@ pub struct SearchedCase {
     /// The sums with as much noise again in the positions; none where nothing was chosen.
     pub noisier: Option<BlockSums>,
     /// Friction laws by whose direction friction goes.
-    pub directions: Vec<Added>,
+    pub directions: Vec<ModelEffect>,
     /// Whether the declared model explains more of blocks left out than no torque does.
     pub determined: bool,
 }
@@ -41,7 +41,7 @@ impl PreparedCase<'_> {
         &self,
         about: AugmentedModel,
         candidates: &[Candidate],
-        directions: &[Added],
+        directions: &[ModelEffect],
     ) -> Result<Summed, MotionError> {
         let layout = ColumnLayout::of(&self.unknowns, candidates);
         let mut declared = declared_terms(self.case, &self.unknowns, &layout, &about);
@@ -160,7 +160,7 @@ impl PreparedCase<'_> {
         candidates: &mut [Candidate],
         summed: &Summed,
         laws: &[Chosen],
-    ) -> Result<Vec<Added>, DiagnoseError> {
+    ) -> Result<Vec<ModelEffect>, DiagnoseError> {
         if laws.is_empty() {
             return Ok(Vec::new());
         }

@@ -14,7 +14,7 @@ use super::refit::ModelProposal;
 use super::search::{Chosen, Field};
 use super::searched::SearchedCase;
 use super::tables::{self, Estimates, Verified};
-use crate::effect::{Added, AugmentedModel};
+use crate::effect::{AugmentedModel, ModelEffect};
 
 /// What is made of the effects that were chosen.
 #[derive(Clone)]
@@ -54,7 +54,7 @@ struct Way {
 struct Found {
     verified: Verified,
     /// With its coefficients there.
-    effect: Added,
+    effect: ModelEffect,
     /// Of its (shape, linear), row-major.
     covariance: Vec<f64>,
 }
@@ -104,11 +104,11 @@ impl Judging<'_> {
     /// The effects that were chosen, and those that the user wants.
     fn ways(&self, searched: &SearchedCase) -> Vec<Way> {
         let case = self.prepared.case;
-        let named = |effect: &Added| {
+        let named = |effect: &ModelEffect| {
             let mut wanted = case.wishes.accepted.iter();
             wanted.any(|w| case.is_named(effect, w))
         };
-        let formula_wanted = |effect: &Added| {
+        let formula_wanted = |effect: &ModelEffect| {
             let joint = effect.place.name(&case.given.model.robot);
             let own = |name: &String| effect.name().starts_with(name);
             joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))

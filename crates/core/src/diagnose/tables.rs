@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::error::DiagnoseError;
 use super::prepared::moved;
 use super::search::{Chosen, Field, own_joint};
-use crate::effect::{Added, AugmentedModel};
+use crate::effect::{AugmentedModel, ModelEffect};
 use crate::judge::{EffectAmplitude, EffectTerms, ErrorGain, JointFit, Terms};
 
 /// What the blocks say of an effect.
@@ -84,14 +84,14 @@ impl Estimates {
     }
 
     /// An effect of the fit with its coefficients.
-    pub fn effect(&self, field: &Field, chosen: &Chosen, at: usize) -> Added {
+    pub fn effect(&self, field: &Field, chosen: &Chosen, at: usize) -> ModelEffect {
         let own = self.places[at].terms.coefficients.clone();
         let linear: Vec<f64> = own.map(|i| self.fit.values[i]).collect();
         effect(field, chosen, &linear)
     }
 
     /// Covariance of (shape, linear) of an effect, row-major; a shape that is not free has none.
-    pub fn covariance_of(&self, effect: &Added, at: usize) -> Vec<f64> {
+    pub fn covariance_of(&self, effect: &ModelEffect, at: usize) -> Vec<f64> {
         let all = &self.covariance;
         let (count, size) = (effect.shape.len(), effect.parameters());
         let TermPlaces { terms, shapes } = &self.places[at];
@@ -208,8 +208,8 @@ pub fn model(field: &Field, effects: &[(&Chosen, Vec<f64>)]) -> AugmentedModel {
 }
 
 /// An effect with its amplitudes.
-pub fn effect(field: &Field, chosen: &Chosen, linear: &[f64]) -> Added {
-    Added {
+pub fn effect(field: &Field, chosen: &Chosen, linear: &[f64]) -> ModelEffect {
+    ModelEffect {
         linear: linear.to_vec(),
         ..field.effect(chosen).clone()
     }

@@ -14,9 +14,9 @@ pub struct EffectNumber {
     pub bound: bool,
 }
 
-/// An effect in a model.
+/// An effect in a model: its law, its place and the numbers of both.
 #[derive(Debug, Clone)]
-pub struct Added {
+pub struct ModelEffect {
     pub law: &'static Law,
     pub place: Place,
     pub shape: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct Added {
     pub held: Vec<bool>,
 }
 
-impl PartialEq for Added {
+impl PartialEq for ModelEffect {
     fn eq(&self, other: &Self) -> bool {
         self.name() == other.name()
             && self.place == other.place
@@ -34,10 +34,10 @@ impl PartialEq for Added {
     }
 }
 
-impl Added {
+impl ModelEffect {
     /// An effect with its numbers, all of them open to a fit.
     pub fn new(law: &'static Law, place: Place, shape: Vec<f64>, linear: Vec<f64>) -> Self {
-        Added {
+        ModelEffect {
             held: vec![false; shape.len() + linear.len()],
             law,
             place,

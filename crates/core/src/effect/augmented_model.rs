@@ -1,7 +1,7 @@
 //! A model with effects: what torque it reconstructs along whole stretches.
 
 use super::scene::{Scene, TiltTorques};
-use super::{Added, Place};
+use super::{ModelEffect, Place};
 use crate::motion::Stretch;
 use crate::robot::model::Model;
 
@@ -9,7 +9,7 @@ use crate::robot::model::Model;
 #[derive(Debug, Clone, PartialEq)]
 pub struct AugmentedModel {
     pub model: Model,
-    pub effects: Vec<Added>,
+    pub effects: Vec<ModelEffect>,
 }
 
 /// Torques along one stretch, `[joint][sample]`.

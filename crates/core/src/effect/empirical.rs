@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use super::signal::{CurveSignal, SIGNALS};
-use super::{Added, CodeSite, Entry, Family, Key, Law, Role, Scene, Search, Unit, exact};
+use super::{ModelEffect, CodeSite, Entry, Family, Key, Law, Role, Scene, Search, Unit, exact};
 use crate::number;
 
 /// Knots of the spline.
@@ -204,7 +204,7 @@ fn cubes(values: &[f64]) -> Vec<f64> {
     out
 }
 
-impl Added {
+impl ModelEffect {
     /// Signal and greatest torque of a curve in place of a law; none of a named effect.
     pub fn curve(&self) -> Option<(CurveSignal, f64)> {
         if self.law.entry.role != Role::StandIn {

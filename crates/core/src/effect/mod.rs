@@ -29,7 +29,7 @@ mod values;
 
 use std::collections::BTreeMap;
 
-pub use added::{Added, EffectNumber};
+pub use added::{EffectNumber, ModelEffect};
 pub use augmented_model::{AugmentedModel, Torques, shifted};
 pub use cover::{Cover, JointCover, stationary_joints};
 pub use entry::{Entry, Family, Key, Ladder, Range, Role, Search};
@@ -141,7 +141,7 @@ pub fn read(
     name: &str,
     joint: Option<&str>,
     given: &BTreeMap<String, f64>,
-) -> Result<Added, EffectError> {
+) -> Result<ModelEffect, EffectError> {
     let law = law(robot, name).ok_or_else(|| EffectError::Unknown {
         name: name.to_owned(),
         known: names().collect::<Vec<_>>().join(", "),
@@ -158,7 +158,7 @@ pub fn read_as(
     robot: &Robot,
     joint: Option<&str>,
     given: &BTreeMap<String, f64>,
-) -> Result<Added, EffectError> {
+) -> Result<ModelEffect, EffectError> {
     let values = Values {
         effect: law.entry.name,
         known: &law.key_names(),
@@ -166,7 +166,7 @@ pub fn read_as(
     };
     let place = law.entry.places.named(robot, joint, &values)?;
     let [shape, linear] = law.of_keys(&values)?;
-    Ok(Added::new(law, place, shape, linear))
+    Ok(ModelEffect::new(law, place, shape, linear))
 }
 
 #[cfg(test)]

@@ -123,7 +123,7 @@ impl Law {
 #[cfg(test)]
 mod tests {
     use super::super::formula::Shape;
-    use super::super::{Added, Scene};
+    use super::super::{ModelEffect, Scene};
     use super::*;
     use crate::motion::Stretch;
     use crate::robot::JointKind;
@@ -173,7 +173,7 @@ mod tests {
             direction: &[Vec::new()],
             tilt: None,
         };
-        let own = Added::new(law, Place::Joint(0), vec![3.0], vec![1.0]);
+        let own = ModelEffect::new(law, Place::Joint(0), vec![3.0], vec![1.0]);
         for (k, x) in own.columns(&scene, 0)[0].iter().enumerate() {
             let t = 0.1 * k as f64;
             let wanted = t.sin().cos() * (3.0 * t.cos()).tanh() + t.sin().powi(2) - t;

@@ -129,11 +129,11 @@ fn saturating(law: &JointFriction, v: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::LAW;
-    use crate::effect::{Added, Place};
+    use crate::effect::{ModelEffect, Place};
 
     #[test]
     fn bristles_that_carry_nothing_cannot_be() {
-        let of = |fc| Added::new(&LAW, Place::Joint(0), vec![50.0], vec![fc, 0.3]).can_be();
+        let of = |fc| ModelEffect::new(&LAW, Place::Joint(0), vec![50.0], vec![fc, 0.3]).can_be();
         assert!(of(1.0) && !of(0.0));
     }
 }

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Added, LAWS, Law, Place, Scene};
+use super::{LAWS, Law, ModelEffect, Place, Scene};
 use crate::motion::Stretch;
 use crate::robot::double_pendulum::double_pendulum;
 use crate::robot::friction::ViscousCoulomb;
@@ -77,7 +77,7 @@ impl Bench {
             direction: &nothing,
             tilt: None,
         };
-        let effect = Added::new(law, place, shape.to_vec(), vec![1.0; law.linear.len()]);
+        let effect = ModelEffect::new(law, place, shape.to_vec(), vec![1.0; law.linear.len()]);
         let mut columns = effect.columns(&scene, 0);
         let own = columns.len();
         let v = &self.stretch.v[0];
@@ -264,7 +264,7 @@ fn a_load_that_flies_across_its_play_is_found_with_its_inertia_and_the_width() {
     };
     let wanted = smooth(&torque);
     let left = |gap: f64| {
-        let effect = Added::new(law, ALONE, vec![gap], vec![1.0]);
+        let effect = ModelEffect::new(law, ALONE, vec![gap], vec![1.0]);
         let column = smooth(&effect.columns(&scene, 0)[0]);
         let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
         let inertia = dot(&column, &wanted) / dot(&column, &column);

@@ -117,14 +117,14 @@ impl Sampled {
 mod tests {
     use super::*;
     use crate::effect;
-    use crate::effect::Added;
+    use crate::effect::ModelEffect;
     use crate::effect::formula::{Definition, Shape};
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
     use crate::robot::{JointKind, Robot};
 
     /// A formula of the user's own in all that hangs on the way before.
-    fn remembers(robot: &Robot) -> Added {
+    fn remembers(robot: &Robot) -> ModelEffect {
         let of = |name: &str, unit: &str, text: &str| [name, unit, text].map(str::to_owned);
         let scale = |name: &str| Shape {
             name: name.to_owned(),
@@ -142,7 +142,7 @@ mod tests {
         };
         let law = effect::own::law(&definition, robot).unwrap();
         let place = effect::Place::Joint(0);
-        Added::new(law, place, vec![0.05, 0.1], vec![0.3, 0.2])
+        ModelEffect::new(law, place, vec![0.05, 0.1], vec![0.3, 0.2])
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use cft_ident_core::effect::{Added, AugmentedModel, Role, Scene};
+use cft_ident_core::effect::{AugmentedModel, ModelEffect, Role, Scene};
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch, rest};
 use cft_ident_core::robot::model::JointFriction;
 
@@ -318,7 +318,7 @@ impl OfJoint {
         places.extend(first..first + friction);
         places.extend(layout.offset[j]);
         let mut added = Vec::new();
-        let here = |effect: &Added| is_linear(effect) && effect.place.touches(j);
+        let here = |effect: &ModelEffect| is_linear(effect) && effect.place.touches(j);
         let effects = model.effects.iter().zip(&layout.effects);
         for (effect, first) in effects.filter(|(effect, _)| here(effect)) {
             let columns = effect.columns(scene, j);
@@ -335,7 +335,7 @@ impl OfJoint {
     }
 }
 
-fn is_linear(effect: &Added) -> bool {
+fn is_linear(effect: &ModelEffect) -> bool {
     effect.law.entry.role != Role::Shift
 }
 

@@ -29,7 +29,7 @@ use cft_ident_core::diagnose::{
     self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ModelProposal,
     ParameterPrior, Watch, Wishes,
 };
-use cft_ident_core::effect::{self, Added, AugmentedModel};
+use cft_ident_core::effect::{self, AugmentedModel, ModelEffect};
 use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::motion::ParallelFilters;
 use cft_ident_core::robot::drive::JointDrive;
@@ -231,7 +231,7 @@ pub fn diagnose(
         own,
         control: control.clone(),
     };
-    let files: Mutex<Vec<(Vec<Added>, ModelFile)>> = Mutex::default();
+    let files: Mutex<Vec<(Vec<ModelEffect>, ModelFile)>> = Mutex::default();
     let failed: Mutex<Option<IdentifyError>> = Mutex::default();
     let refit = |proposal: &ModelProposal| {
         let made = refitting.file(proposal).and_then(|file| {

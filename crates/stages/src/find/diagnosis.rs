@@ -18,7 +18,7 @@ use cft_ident_core::diagnose::{
     Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
     SplitErrors, StepStatus,
 };
-use cft_ident_core::effect::Added;
+use cft_ident_core::effect::ModelEffect;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::robot::Robot;
 
@@ -420,7 +420,7 @@ fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult
 }
 
 /// The option of `diagnose` that writes an effect.
-pub fn accept_option(effect: &Added, robot: &Robot) -> String {
+pub fn accept_option(effect: &ModelEffect, robot: &Robot) -> String {
     match effect.place.name(robot) {
         Some(joint) => format!("--accept {}:{joint}", effect.name()),
         None => format!("--accept {}", effect.name()),

@@ -1,7 +1,7 @@
 //! The next motion to record, as a command to type: one that narrows what is weak in a model, or separates an effect
 //! from its like.
 
-use cft_ident_core::effect::{Added, Place};
+use cft_ident_core::effect::{ModelEffect, Place};
 use cft_ident_core::number;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::verdict::Verdict;
@@ -10,7 +10,7 @@ use cft_ident_files::config::model_file::Parameter;
 
 /// A motion of one joint alone, both ways at several speeds, where such a motion separates the effect; none where it
 /// takes a payload, a standstill, a motor alone or other sensors. `model` is the path as a shell takes it.
-pub fn separating_command(effect: &Added, robot: &Robot, model: &str) -> Option<String> {
+pub fn separating_command(effect: &ModelEffect, robot: &Robot, model: &str) -> Option<String> {
     effect.law.entry.ladder?;
     let joint = match effect.place {
         // the other joint alone
@@ -65,7 +65,7 @@ mod tests {
         let of = |name: &str, place: Place| {
             let law = law(&robot, name).unwrap();
             let (shape, linear) = (vec![0.0; law.shape.len()], vec![0.0; law.linear.len()]);
-            let effect = Added::new(law, place, shape, linear);
+            let effect = ModelEffect::new(law, place, shape, linear);
             separating_command(&effect, &robot, "m.toml")
         };
         let coupling = of("coupling", Place::Pair { on: 1, of: 3 }).unwrap();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::error::IdentifyError;
 use super::logged_robot::LoggedRobot;
-use cft_ident_core::effect::{self, Added, AugmentedModel, EffectNumber, Law, formula, own};
+use cft_ident_core::effect::{self, AugmentedModel, EffectNumber, Law, ModelEffect, formula, own};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::model::Model;
 use cft_ident_files::config::ModelFile;
@@ -81,7 +81,7 @@ pub(crate) fn own_laws(
 
 /// An effect as a model file holds it.
 pub(crate) fn in_file(
-    effect: &Added,
+    effect: &ModelEffect,
     machine: &LoggedRobot,
     numbers: &[EffectNumber],
 ) -> EffectSection {

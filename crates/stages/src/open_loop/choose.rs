@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::fit::{Fitted, POSITIONS, RunSpan, apart, errors, fit, rms, windows};
 use super::numbers::{Columns, columns, numbers};
 use cft_ident_core::effect::{
-    Added, AugmentedModel, Cover, Family, LAWS, Law, Place, Role, Search,
+    AugmentedModel, Cover, Family, LAWS, Law, ModelEffect, Place, Role, Search,
 };
 use cft_ident_core::math::descent::Ending;
 use cft_ident_core::motion::Stretch;
@@ -127,7 +127,7 @@ pub fn fit_axis(
     loop {
         let mut best: Option<(Chosen, AugmentedModel)> = None;
         for rival in trial.rivals(&model) {
-            let effect = rival.effects.last().map(Added::name);
+            let effect = rival.effects.last().map(ModelEffect::name);
             let found = trial.tried((&rival, &rival), (chosen.length, effect), &mut tried)?;
             let least = best.as_ref().map(|(best, _)| best.error);
             let better = |found: &Chosen| least.is_none_or(|least| found.error < least);
@@ -332,7 +332,8 @@ impl Trial<'_> {
             let with = starts.into_iter().map(|shape| {
                 let mut with = model.clone();
                 let linear = vec![0.0; law.linear.len()];
-                with.effects.push(Added::new(law, place, shape, linear));
+                with.effects
+                    .push(ModelEffect::new(law, place, shape, linear));
                 let left = self.columns(&with).left;
                 (with, left)
             });

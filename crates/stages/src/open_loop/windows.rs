@@ -49,7 +49,7 @@ pub struct OpenLoop {
 }
 
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct WindowSums {
     square: f64,
     moved: f64,
     samples: u64,
@@ -61,7 +61,7 @@ struct Sums {
 /// Simulates stretches of logs window after window.
 pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength) -> OpenLoop {
     let robot = &model.model.robot;
-    let mut sums = vec![Sums::default(); robot.joints()];
+    let mut sums = vec![WindowSums::default(); robot.joints()];
     let (mut windows, mut astray) = (0, 0);
     for stretch in stretches {
         let size = match length {

@@ -2,7 +2,7 @@
 
 use super::Replay;
 use crate::input::curve::friction_curve;
-use cft_ident_core::effect::{Added, AugmentedModel};
+use cft_ident_core::effect::{AugmentedModel, ModelEffect};
 use cft_ident_core::friction::joint_estimate::FrictionCurvePoint;
 use cft_ident_core::motion::MotionError;
 use cft_ident_core::robot::model::JointFriction;
@@ -54,7 +54,7 @@ pub(super) fn friction(
     Ok(joints.filter_map(of_joint).collect())
 }
 
-fn is_friction(effect: &Added) -> bool {
+fn is_friction(effect: &ModelEffect) -> bool {
     effect.law.entry.friction
 }
 

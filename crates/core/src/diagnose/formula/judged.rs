@@ -15,7 +15,7 @@ use crate::diagnose::searched::SearchedCase;
 use crate::diagnose::steps::{Judged, judge};
 use crate::diagnose::tables::beside_the_others;
 use crate::effect::formula::{Definition, Shape};
-use crate::effect::{Added, Place, own};
+use crate::effect::{ModelEffect, Place, own};
 use crate::judge::Bound;
 use crate::robot::FormulaSignal;
 
@@ -128,7 +128,7 @@ impl PreparedCase<'_> {
         let shapes = named(&of.terms, &self.names(of.joint));
         let shape = shapes.iter().map(|s| s.value).collect();
         let linear = vec![0.0; law.linear.len()];
-        let effect = Added::new(law, Place::Joint(of.joint), shape, linear);
+        let effect = ModelEffect::new(law, Place::Joint(of.joint), shape, linear);
         Ok(Candidate {
             bounds: vec![Bound::NONE; law.linear.len()],
             slopes: refined_shapes(&self.fitted.model, self.case, &self.cover, &effect),

@@ -6,7 +6,7 @@ use super::data_split::{DataSplit, LogRole};
 use super::formula_numbers::FormulaNumbers;
 use super::prior::ParameterPrior;
 use super::unknowns::{FreeParameters, Unknowns};
-use crate::effect::{Added, AugmentedModel, Law};
+use crate::effect::{AugmentedModel, Law, ModelEffect};
 use crate::judge::Numbers;
 use crate::motion::{ParallelFilters, Stretch};
 use crate::robot::drive::JointDrive;
@@ -96,7 +96,7 @@ impl Case {
     /// Whether an effect is the one that is named, at the joint that is named.
     pub(crate) fn is_named(
         &self,
-        effect: &Added,
+        effect: &ModelEffect,
         (name, joint): &(String, Option<String>),
     ) -> bool {
         effect.name() == name && effect.place.name(&self.given.model.robot) == *joint

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::data_split::DataSplit;
 use super::unknowns::{Unknown, Unknowns};
-use crate::effect::{Added, AugmentedModel, Scene, Torques, shifted};
+use crate::effect::{AugmentedModel, ModelEffect, Scene, Torques, shifted};
 use crate::judge::{BlockSums, Bound, Term, TimeBlock};
 use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
 use crate::robot::model::JointFriction;
@@ -41,7 +41,7 @@ pub struct Data<'a> {
 /// An effect at a place in one shape, with bounds of its coefficients; without any it has no columns.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    pub effect: Added,
+    pub effect: ModelEffect,
     pub bounds: Vec<Bound>,
     /// Shape parameters whose slopes of its torque are columns too, with bounds of a step.
     pub slopes: Vec<(usize, Bound)>,
