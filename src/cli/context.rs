@@ -15,7 +15,7 @@ use indicatif::{
 
 use super::error::{CliError, indented, to_stderr};
 use super::{outputs, typed};
-use cft_ident_logs::output::Together;
+use cft_ident_logs::output::FileBatch;
 use cft_ident_report::report::{Detail, Screen, figure};
 use cft_ident_stages::identify::{self, Control};
 
@@ -35,7 +35,7 @@ pub struct Context {
     /// [`Context::interrupted`] and the progress bars, for a stage of [`identify`].
     pub(super) control: Control,
     /// The outputs, which get their names together when the command has ended well.
-    pub(super) files: Together,
+    pub(super) files: FileBatch,
 }
 
 /// What a command leaves beside its result.
@@ -78,7 +78,7 @@ impl Context {
             screen: Screen::of(Detail::Usual),
             prints_document: false,
             control,
-            files: Together::default(),
+            files: FileBatch::default(),
         }
     }
 

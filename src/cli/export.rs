@@ -20,9 +20,9 @@ use super::{
 };
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::no_torque;
-use cft_ident_export::export::arm::{Arm, Says};
+use cft_ident_export::export::arm::{Arm, FormatSupport};
 use cft_ident_export::export::dissipative::below_zero;
-use cft_ident_export::export::left_out::{self, Elsewhere};
+use cft_ident_export::export::left_out::{self, OmissionPlace};
 use cft_ident_export::export::{self, ExportError, Note, Program, urdf_source};
 use cft_ident_files::config::{
     self, ModelFile, UrdfReplacement, replaced_in_mjcf, replaced_in_urdf,
@@ -198,7 +198,7 @@ struct Format<'a> {
     what: &'static str,
     /// The list beside it.
     side: PathBuf,
-    says: Says,
+    says: FormatSupport,
     text: Text,
 }
 
@@ -207,7 +207,7 @@ type Text = fn(&Arm, &[String]) -> String;
 
 fn formats(args: &Args) -> Vec<Format<'_>> {
     use export::{mjcf, sdf, usd};
-    let all: [(&Option<PathBuf>, &'static str, Says, Text); 3] = [
+    let all: [(&Option<PathBuf>, &'static str, FormatSupport, Text); 3] = [
         (&args.mjcf, "MJCF", mjcf::SAYS, mjcf::mjcf),
         (&args.sdf, "SDF", sdf::SAYS, sdf::sdf),
         (&args.usd, "USD", usd::SAYS, usd::usd),
@@ -349,8 +349,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             _ => true,
         };
         let elsewhere = match beside {
-            true => Elsewhere::Beside,
-            false => Elsewhere::Nowhere,
+            true => OmissionPlace::Beside,
+            false => OmissionPlace::Nowhere,
         };
         if beside {
             urdf_lines.extend(beside_urdf(&kept, &left_out));
@@ -396,7 +396,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             }
             head.extend(below_zero(&given.value.file, model));
             let side = export::left_out::side_file(&found, &head, &logs).map_err(failed)?;
-            head.extend(left_out::lines(&found, &logs, Elsewhere::Nowhere));
+            head.extend(left_out::lines(&found, &logs, OmissionPlace::Nowhere));
             head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
             let of_source = args.mjcf_source.as_deref();
             let text = match of_source.filter(|_| args.mjcf.as_deref() == Some(format.path)) {

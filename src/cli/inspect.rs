@@ -10,7 +10,7 @@ use cft_ident_core::robot::model::Model;
 use cft_ident_core::{motion, number};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::inspect::{
-    FaultKind, Findings, Inspection, LogFault, OrderComparison, look, look_again,
+    FaultKind, Inspection, LogFault, LogFindings, OrderComparison, look, look_again,
 };
 use cft_ident_logs::log::{
     LogSection, LogSpec, Provenance, RawReader, TopicFacts, escape, listing,
@@ -83,7 +83,7 @@ fn looked_at(
     topic: Option<String>,
     machine: Option<&LoggedRobot>,
     context: &Context,
-) -> Result<(Findings, RawReader), CliError> {
+) -> Result<(LogFindings, RawReader), CliError> {
     let section = LogSection {
         topic,
         ..LogSection::default()
@@ -114,7 +114,7 @@ pub(super) fn findings(
     spec: &LogSpec,
     machine: &LoggedRobot,
     context: &Context,
-) -> Result<Findings, CliError> {
+) -> Result<LogFindings, CliError> {
     Ok(looked_at(spec, None, Some(machine), context)?.0)
 }
 
@@ -125,7 +125,7 @@ fn inspect(
     known: Option<&Known>,
     context: &Context,
     warnings: &mut Vec<String>,
-) -> Result<(Findings, Provenance), CliError> {
+) -> Result<(LogFindings, Provenance), CliError> {
     let machine = known.map(|known| &known.machine);
     let (mut findings, log) = looked_at(spec, topic, machine, context)?;
     let name = escape(&spec.name());
@@ -214,7 +214,7 @@ const REVERSALS: u64 = 6;
 const ROWS_HZ: f64 = 5.0;
 
 /// That a log holds poses, and the way for it.
-fn held_poses(name: &str, found: &Findings) -> Option<String> {
+fn held_poses(name: &str, found: &LogFindings) -> Option<String> {
     let moving = || found.joints.iter().filter(|joint| joint.moves);
     let reversals = moving().map(|joint| joint.reversals).max()?;
     let slow = moving().all(|joint| joint.moving_share < MOVING_SHARE) && reversals >= REVERSALS;
@@ -283,7 +283,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if unknown && let Err(error) = RawReader::open(spec, None) {
             warnings.push(format!("{}: {error}", escape(&spec.name())));
             provenance.push(Provenance::of_file(&spec.path)?);
-            logs.push((spec.name(), Findings::default()));
+            logs.push((spec.name(), LogFindings::default()));
             all_topics.extend(listed);
             bar.advance(1);
             continue;

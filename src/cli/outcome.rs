@@ -9,7 +9,7 @@ use super::error::{CliError, indented, to_stderr};
 use super::exit::Exit;
 use super::{Destination, colour};
 use cft_ident_logs::log::is_hidden;
-use cft_ident_logs::output::Together;
+use cft_ident_logs::output::FileBatch;
 use cft_ident_report::report::Detail;
 use cft_ident_report::report::json::Document;
 
@@ -55,7 +55,7 @@ const ABOUT_ONE: usize = 2;
 pub(super) fn show(
     outcome: &Outcome,
     json: Option<&Destination>,
-    (files, detail): (&Together, Detail),
+    (files, detail): (&FileBatch, Detail),
     stdout: &mut dyn Write,
     stderr: &mut dyn Write,
 ) -> Result<Exit, CliError> {
@@ -175,7 +175,7 @@ mod tests {
         detail: Detail,
     ) -> (Result<Exit, CliError>, String) {
         let mut err = Vec::new();
-        let files = Together::default();
+        let files = FileBatch::default();
         let exit = show(outcome, json, (&files, detail), out, &mut err);
         (exit, String::from_utf8(err).unwrap())
     }

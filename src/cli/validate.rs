@@ -7,7 +7,7 @@ use super::{
     pictures, typed, written,
 };
 use cft_ident_core::number;
-use cft_ident_core::validate::{JointError, Reconstructed, TorqueErrors};
+use cft_ident_core::validate::{JointError, ReconstructedRow, TorqueErrors};
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_report::report::json::Document;
@@ -69,7 +69,7 @@ pub fn missed(errors: &TorqueErrors, limit: Option<f64>) -> Vec<String> {
     errors.joints.iter().filter(above).map(words).collect()
 }
 
-fn residual_row(r: &Reconstructed, band: bool) -> impl Iterator<Item = f64> {
+fn residual_row(r: &ReconstructedRow, band: bool) -> impl Iterator<Item = f64> {
     let residual = r.measured.iter().zip(r.reconstructed).map(|(a, b)| a - b);
     let torques = r.measured.iter().chain(r.reconstructed).copied();
     let limits = |sign: f64| {

@@ -6,9 +6,9 @@ use crate::export_support;
 
 use cft_ident::config::RobotFile;
 use cft_ident::effect::as_code::no_torque;
-use cft_ident::effect::formula::{Definition, Shape};
+use cft_ident::effect::formula::{FormulaDefinition, FormulaShape};
 use cft_ident::effect::own;
-use cft_ident::effect::{self, AugmentedModel, FAULTS, LAWS, Law, ModelEffect, Place};
+use cft_ident::effect::{self, AugmentedModel, EffectPlace, FAULTS, LAWS, Law, ModelEffect};
 use cft_ident::export::{self, Program};
 use cft_ident::identify::{Control, Log, LoggedRobot, read_whole};
 use cft_ident::robot::Robot;
@@ -55,7 +55,7 @@ fn shape(key: &str, i: usize) -> f64 {
 fn curves(robot: &Robot) -> Vec<ModelEffect> {
     let law = effect::law(robot, "empirical").unwrap();
     let of = |signal: u8| {
-        let mut curve = some(law, Place::Joint(1));
+        let mut curve = some(law, EffectPlace::Joint(1));
         curve.shape[0] = f64::from(signal);
         curve
     };
@@ -63,7 +63,7 @@ fn curves(robot: &Robot) -> Vec<ModelEffect> {
 }
 
 /// An effect of the catalogue with numbers of its own.
-fn some(law: &'static Law, place: Place) -> ModelEffect {
+fn some(law: &'static Law, place: EffectPlace) -> ModelEffect {
     let keys = law.shape.iter().enumerate();
     let shape = keys.map(|(i, key)| shape(key, i)).collect();
     let linear = (0..law.linear.len()).map(|i| 0.7 + 0.31 * i as f64);
@@ -71,11 +71,11 @@ fn some(law: &'static Law, place: Place) -> ModelEffect {
 }
 
 /// One of each kind of place.
-fn kinds(places: Vec<Place>) -> Vec<Place> {
-    let mut out: Vec<Place> = Vec::new();
+fn kinds(places: Vec<EffectPlace>) -> Vec<EffectPlace> {
+    let mut out: Vec<EffectPlace> = Vec::new();
     for place in places.into_iter().rev() {
-        let alike = |p: &Place| std::mem::discriminant(p) == std::mem::discriminant(&place);
-        if !out.iter().any(alike) || matches!(place, Place::Actuator(_)) {
+        let alike = |p: &EffectPlace| std::mem::discriminant(p) == std::mem::discriminant(&place);
+        if !out.iter().any(alike) || matches!(place, EffectPlace::Actuator(_)) {
             out.push(place);
         }
     }
@@ -95,7 +95,7 @@ fn catalogue() -> Vec<Case> {
                 let effect = some(law, place);
                 all.push(effect.clone());
                 // once is enough for what sits at a joint of any robot
-                if *tried && matches!(place, Place::Joint(_)) {
+                if *tried && matches!(place, EffectPlace::Joint(_)) {
                     continue;
                 }
                 cases.push(Case {

@@ -14,7 +14,7 @@ use crate::input::in_use::levers;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::temperatures;
-use crate::observe::{Alarm, Alarms, Explainer, Explanation, Observer, Recipe, recipe};
+use crate::observe::{Alarm, Alarms, Explainer, Explanation, Observer, ObserverRecipe, recipe};
 use cft_ident_core::motion::{FilterSettings, ZeroOrderHold};
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
@@ -128,7 +128,7 @@ pub fn watch_recipe(
     given: &GivenModel,
     step_s: f64,
     per_hour: f64,
-) -> Result<Recipe, IdentifyError> {
+) -> Result<ObserverRecipe, IdentifyError> {
     let (name, file) = (given.name.as_str(), &given.file);
     let (machine, refined) = (&given.machine(), &given.numbers()?);
     let held = &file.held_out;

@@ -15,7 +15,7 @@ use cft_ident_files::config::{Capsules, RobotFile, UrdfChain};
 use cft_ident_logs::inspect::{LogFault, Severity};
 use cft_ident_logs::log::{LogSpec, Provenance, Reader, escape};
 use cft_ident_logs::mapping::{
-    Asked, ClockSource, JointColumns, Known, Mapping, SeenColumns, look,
+    ClockSource, JointColumns, LogHints, Mapping, SeenColumns, UrdfJoint, look,
 };
 use cft_ident_plant::excite::space::always_touching;
 use cft_ident_report::report::json::Document;
@@ -242,8 +242,8 @@ pub(super) fn describe(
     let chain = chain.transpose()?;
     let both = chain.as_ref().zip(urdf);
     let capsules = both.map(|(chain, path)| chain.capsules(path));
-    let known: Option<Vec<Known>> = chain.as_ref().map(joints_of);
-    let asked = Asked {
+    let known: Option<Vec<UrdfJoint>> = chain.as_ref().map(joints_of);
+    let asked = LogHints {
         rate_hz: args.rate,
         topic: args.topic.clone(),
     };
@@ -355,7 +355,7 @@ fn arm_alone(chain: &UrdfChain, mapping: &Mapping, args: &Args) -> Option<String
     let tip = chain.links.iter().find(of_last)?.name.as_ref()?;
     let (urdf, log) = (args.urdf.as_ref()?, args.log.as_ref()?);
     let arm = UrdfChain::load(urdf, Some(tip)).ok()?;
-    let joints: Vec<Known> = joints_of(&arm);
+    let joints: Vec<UrdfJoint> = joints_of(&arm);
     let same = joints.iter().map(|joint| joint.name.as_str()).eq(logged);
     same.then(|| {
         format!(
@@ -437,11 +437,11 @@ fn inspected(faults: Option<&[LogFault]>) -> String {
 }
 
 /// The independent joints of a URDF, their kinds and their largest torques.
-fn joints_of(chain: &UrdfChain) -> Vec<Known> {
+fn joints_of(chain: &UrdfChain) -> Vec<UrdfJoint> {
     let of = |link: &LinkSection| {
         let name = link.joint.clone()?;
         let limits = chain.limits.iter().find(|(joint, _)| *joint == name);
-        Some(Known {
+        Some(UrdfJoint {
             kind: link.kind.unwrap_or(JointKind::Revolute),
             torque: limits.and_then(|(_, limits)| limits.torque),
             name,

@@ -3,9 +3,9 @@
 
 use nalgebra::DVector;
 
-use super::candidates::{Candidate, refined_shapes};
-use super::prepared::{PreparedCase, Summed, moved};
-use super::search::Chosen;
+use super::candidates::{EffectCandidate, refined_shapes};
+use super::prepared::{PreparedCase, SummedProducts, moved};
+use super::search::ChosenCandidate;
 use crate::effect::{AugmentedModel, ModelEffect};
 use crate::judge::Term;
 use crate::motion::MotionError;
@@ -18,8 +18,8 @@ const HALVED: usize = 4;
 
 /// A fit of chosen effects in some shape.
 struct Point {
-    summed: Summed,
-    candidates: Vec<Candidate>,
+    summed: SummedProducts,
+    candidates: Vec<EffectCandidate>,
     /// Of the declared unknowns, then of every coefficient.
     values: DVector<f64>,
     squares: f64,
@@ -31,11 +31,11 @@ impl PreparedCase<'_> {
     /// Moves the shapes of chosen candidates to where all blocks want them: sums of these alone, about the model fitted with them.
     pub fn polished(
         &self,
-        candidates: &mut [Candidate],
-        summed: &Summed,
-        chosen: &[Chosen],
+        candidates: &mut [EffectCandidate],
+        summed: &SummedProducts,
+        chosen: &[ChosenCandidate],
         directions: &[ModelEffect],
-    ) -> Result<Summed, MotionError> {
+    ) -> Result<SummedProducts, MotionError> {
         let field = self.field(candidates, summed);
         let values = field.terms(chosen).fit(&field.total(), &[]).values;
         let mut list = candidates.to_vec();
@@ -72,7 +72,7 @@ impl PreparedCase<'_> {
     fn better(
         &self,
         from: &Point,
-        chosen: &[Chosen],
+        chosen: &[ChosenCandidate],
         directions: &[ModelEffect],
     ) -> Result<Option<Point>, MotionError> {
         let about = moved(&from.summed.about, &self.unknowns, &from.values);
@@ -92,11 +92,11 @@ impl PreparedCase<'_> {
     /// Candidates with the amplitudes of a fit, a step on.
     fn there(
         &self,
-        list: &[Candidate],
-        chosen: &[Chosen],
+        list: &[EffectCandidate],
+        chosen: &[ChosenCandidate],
         values: &DVector<f64>,
         step: &[f64],
-    ) -> Vec<Candidate> {
+    ) -> Vec<EffectCandidate> {
         let mut list = list.to_vec();
         let (mut at, mut steps) = (self.unknowns.len(), step.iter());
         for c in chosen {
@@ -116,8 +116,8 @@ impl PreparedCase<'_> {
     fn point(
         &self,
         about: AugmentedModel,
-        candidates: Vec<Candidate>,
-        (chosen, directions): (&[Chosen], &[ModelEffect]),
+        candidates: Vec<EffectCandidate>,
+        (chosen, directions): (&[ChosenCandidate], &[ModelEffect]),
     ) -> Result<Point, MotionError> {
         // a law that is chosen gives the direction in its present shape
         let present = |d: &ModelEffect| {
@@ -132,7 +132,7 @@ impl PreparedCase<'_> {
         let field = self.field(&candidates, &summed);
         let (total, terms) = (field.total(), field.terms(chosen));
         let fit = terms.fit(&total, &[]);
-        let slopes = |c: &Chosen| summed.layout.slopes[c.candidate].clone();
+        let slopes = |c: &ChosenCandidate| summed.layout.slopes[c.candidate].clone();
         let slopes: Vec<Term> = chosen.iter().flat_map(slopes).collect();
         let all = terms.with(&slopes).fit(&total, &[]).values;
         Ok(Point {

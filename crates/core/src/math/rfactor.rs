@@ -157,21 +157,22 @@ impl RFactor {
 
 /// Annihilates k rows of the column-major `block`, whose n columns begin `stride` apart, under the row-major `triangle`.
 fn reduce(size: [usize; 3], triangle: &mut [f64], block: &mut [f64]) {
-    widest(Reduction {
+    widest(FactorReduction {
         size,
         triangle,
         block,
     });
 }
 
-struct Reduction<'a> {
+/// A triangle, and the block of rows that is reduced into it.
+struct FactorReduction<'a> {
     /// n, k and the stride.
     size: [usize; 3],
     triangle: &'a mut [f64],
     block: &'a mut [f64],
 }
 
-impl LaneWork for Reduction<'_> {
+impl LaneWork for FactorReduction<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use super::document::is_default;
 pub use super::limits::CoordinateLimits;
 use super::limits::Limits;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
-use cft_ident_core::robot::cft::{self, Setup, Structure};
+use cft_ident_core::robot::cft::{self, LaboratorySetup, ParameterStructure};
 use cft_ident_core::robot::drive::JointDrive;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::{JointKind, Robot};
@@ -46,7 +46,7 @@ pub struct RobotSection {
     pub model: ModelKind,
     /// Set-up of the CFT robot.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub setup: Option<Setup>,
+    pub setup: Option<LaboratorySetup>,
     /// Inertial parameters of the CFT robot: 12 (the report) or 22 (the full chain).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameters: Option<u32>,
@@ -348,8 +348,8 @@ impl RobotFile {
             ModelKind::Cft => Robot::cft(
                 self.robot.setup.unwrap_or_default(),
                 match self.robot.parameters {
-                    Some(22) => Structure::Full22,
-                    _ => Structure::Printed12,
+                    Some(22) => ParameterStructure::Full22,
+                    _ => ParameterStructure::Printed12,
                 },
             ),
             ModelKind::Serial if self.friction.motors == Some(true) => {

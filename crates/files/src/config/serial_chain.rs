@@ -12,7 +12,7 @@ use super::serial_section::{
 use cft_ident_core::explain::Explain;
 use cft_ident_core::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
 use cft_ident_core::robot::tree::{
-    Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError,
+    Coordinate, DependentCoordinate, JointCoupling, Link, SineTerm, Tree, TreeError,
 };
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_logs::log::{escape, list, nearest};
@@ -57,7 +57,7 @@ impl RobotSection {
         let links = (0..self.link.len()).map(|i| self.placed_link(i, &names));
         let links = links.collect::<Result<Vec<Link>, Misfit>>()?;
         let couplings = self.coupling.iter().map(|c| names.coupling(c));
-        let couplings = couplings.collect::<Result<Vec<Coupling>, Misfit>>()?;
+        let couplings = couplings.collect::<Result<Vec<JointCoupling>, Misfit>>()?;
         let joints = names.joints;
         let tree = Tree::new(links, joints.len(), self.gravity.unwrap_or(GRAVITY))
             .map_err(|error| Misfit::of_tree(&error))?;
@@ -196,8 +196,8 @@ impl Names {
             };
             of.iter().map(term).collect()
         };
-        let sine = |s: &SineSection| -> Result<Sine, Misfit> {
-            Ok(Sine {
+        let sine = |s: &SineSection| -> Result<SineTerm, Misfit> {
+            Ok(SineTerm {
                 amplitude: s.amplitude,
                 phase: s.phase,
                 of: terms(&s.of)?,
@@ -210,7 +210,7 @@ impl Names {
         })
     }
 
-    fn coupling(&self, c: &CouplingSection) -> Result<Coupling, Misfit> {
+    fn coupling(&self, c: &CouplingSection) -> Result<JointCoupling, Misfit> {
         let joint = |name: &str| {
             self.joint(name).ok_or_else(|| {
                 Misfit::of_robot(
@@ -219,7 +219,7 @@ impl Names {
                 )
             })
         };
-        let coupling = Coupling {
+        let coupling = JointCoupling {
             motor: joint(&c.motor)?,
             other: joint(&c.other)?,
             ratio: c.ratio,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cft_ident_core::robot::cft::Setup;
+use cft_ident_core::robot::cft::LaboratorySetup;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::robot_file::{FilterKind, FrictionLawKind};
 use cft_ident_files::config::trajectory::{Coordinates, Trajectory};
@@ -37,7 +37,7 @@ fn every_file_that_comes_with_the_tool_is_valid_and_found_from_anywhere() {
         }
     }
     let dspace = RobotFile::load(Path::new("configs/cft-dspace.toml")).unwrap();
-    assert_eq!(dspace.robot.setup, Some(Setup::Dspace));
+    assert_eq!(dspace.robot.setup, Some(LaboratorySetup::Dspace));
     assert_eq!(dspace.joint_names(), ["q1", "q2", "q4", "q5"]);
     assert_eq!(dspace.friction_law(), FrictionLawKind::DoubleTanh);
 }

@@ -9,7 +9,7 @@ use super::ExciteError;
 use super::information::{Information, normalised};
 use super::machine::ForeseenRobot;
 use super::motion::Motion;
-use cft_ident_core::inertia::columns::Own;
+use cft_ident_core::inertia::columns::JointTerm;
 use cft_ident_core::math::rank;
 
 /// Samples of a period at which condition and determinant are taken.
@@ -238,7 +238,7 @@ fn unit(machine: &ForeseenRobot, i: usize) -> String {
         if let Some(own) = i.checked_sub(first).and_then(|k| own.get(k)) {
             let kind = robot.joint_kind(j);
             return match own {
-                Own::Viscous => format!("{} s/{}", kind.torque_unit(), kind.position_unit()),
+                JointTerm::Viscous => format!("{} s/{}", kind.torque_unit(), kind.position_unit()),
                 _ => kind.torque_unit().to_owned(),
             };
         }

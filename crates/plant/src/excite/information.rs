@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use cft_ident_core::math::jacobi::Svd;
+use cft_ident_core::math::jacobi::SvdFactors;
 use cft_ident_core::math::rank;
 use cft_ident_core::math::rfactor::RFactor;
 use cft_ident_core::robot::RobotError;
@@ -110,7 +110,7 @@ impl Information {
 }
 
 /// Singular values of the columns scaled to norm 1; columns of zeros stay.
-pub(super) fn normalised(r: &DMatrix<f64>) -> Result<Svd, NoValue> {
+pub(super) fn normalised(r: &DMatrix<f64>) -> Result<SvdFactors, NoValue> {
     let mut scaled = r.clone();
     for mut column in scaled.column_iter_mut() {
         let norm = column.norm();

@@ -4,7 +4,7 @@
 use std::cell::OnceCell;
 
 use crate::simulate::Mechanism;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::robot::RobotError;
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::tree::pose::{Frame, frames};
@@ -122,9 +122,9 @@ impl ForeseenRobot {
         let mut values = self.model.theta.clone();
         for (j, own) in self.columns.own.iter().enumerate() {
             values.extend(own.iter().map(|own| match (own, &self.model.friction[j]) {
-                (Own::Offset, _) => self.model.offset[j],
-                (Own::Viscous, JointFriction::ViscousCoulomb(law)) => law.viscous,
-                (Own::Coulomb, JointFriction::ViscousCoulomb(law)) => law.coulomb,
+                (JointTerm::Offset, _) => self.model.offset[j],
+                (JointTerm::Viscous, JointFriction::ViscousCoulomb(law)) => law.viscous,
+                (JointTerm::Coulomb, JointFriction::ViscousCoulomb(law)) => law.coulomb,
                 _ => 0.0,
             }));
         }
@@ -240,7 +240,7 @@ impl ForeseenRobot {
             self.drive(state)?;
         }
         self.own_columns(y, |j, own| match own {
-            Own::Coulomb => beyond(j, line.sign[j]),
+            JointTerm::Coulomb => beyond(j, line.sign[j]),
             own => own.column(v[j]),
         });
         Ok(())
@@ -266,7 +266,7 @@ impl ForeseenRobot {
     }
 
     /// Spreads inertial rows to whole ones, with the joints' own columns.
-    fn own_columns(&self, y: &mut [f64], column: impl Fn(usize, &Own) -> f64) {
+    fn own_columns(&self, y: &mut [f64], column: impl Fn(usize, &JointTerm) -> f64) {
         let (p, shared) = (self.unknowns(), self.columns.shared);
         // from the last to the first: they only move up
         for j in (0..self.coordinates()).rev() {

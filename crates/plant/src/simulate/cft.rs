@@ -13,14 +13,14 @@ use super::run::{MotorInput, Start, run};
 use super::settings::Settings;
 use super::simulated_run::SimulatedRun;
 use cft_ident_core::robot::Robot;
-use cft_ident_core::robot::cft::actuation::Setup;
-use cft_ident_core::robot::cft::{PRINTED, Structure, practice};
+use cft_ident_core::robot::cft::actuation::LaboratorySetup;
+use cft_ident_core::robot::cft::{PRINTED, ParameterStructure, practice};
 use cft_ident_core::robot::friction::DoubleTanh;
 
 /// The true parameters of a simulated CFT robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CftTruth {
-    pub setup: Setup,
+    pub setup: LaboratorySetup,
     /// theta_1..theta_12, then the ten base parameters that the printed structure lacks, as `robot::cft::EXTENDED`.
     pub theta: [f64; 22],
     /// Friction of q1, q2, q4, q5 (theta_13..theta_32).
@@ -32,7 +32,7 @@ const DRAWS: usize = 1000;
 
 impl CftTruth {
     /// The synthetic robot that the built-in campaign simulates.
-    pub fn synthetic(setup: Setup) -> Self {
+    pub fn synthetic(setup: LaboratorySetup) -> Self {
         let mut theta = [0.0; 22];
         theta[..12].copy_from_slice(&practice::INERTIA);
         Self {
@@ -69,8 +69,8 @@ impl CftTruth {
     pub fn plant(&self) -> Result<Plant<4>, SimulateError> {
         let printed = self.theta[PRINTED..].iter().all(|x| *x == 0.0);
         let (structure, count) = match printed {
-            true => (Structure::Printed12, PRINTED),
-            false => (Structure::Full22, self.theta.len()),
+            true => (ParameterStructure::Printed12, PRINTED),
+            false => (ParameterStructure::Full22, self.theta.len()),
         };
         let mechanism = Mechanism::new(Robot::cft(self.setup, structure))?;
         let law = |j: usize, _| SmoothFriction::DoubleTanh(self.friction[j]);
@@ -89,17 +89,17 @@ impl CftTruth {
 }
 
 /// The CFT robot on a set-up, with the limits of Table 5.
-pub fn mechanism(setup: Setup) -> Result<Mechanism<4>, SimulateError> {
-    Mechanism::new(Robot::cft(setup, Structure::Printed12))
+pub fn mechanism(setup: LaboratorySetup) -> Result<Mechanism<4>, SimulateError> {
+    Mechanism::new(Robot::cft(setup, ParameterStructure::Printed12))
 }
 
 /// The Table 3 run on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
-pub fn excitation(setup: Setup) -> Reference<4> {
+pub fn excitation(setup: LaboratorySetup) -> Reference<4> {
     excitation_of(Fourier::of(&practice::of(setup).excitation))
 }
 
 /// [`excitation`], begun anywhere in its period.
-pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
+pub fn excitation_at_random_phase(setup: LaboratorySetup, seed: u64) -> Reference<4> {
     excitation_of(Fourier::of(&practice::of(setup).excitation).at_random_phase(seed))
 }
 
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn synthetic_robots_are_physical_and_varied_ones_stay_within_the_spread() {
-        for setup in [Setup::Tuedacs, Setup::Dspace] {
+        for setup in [LaboratorySetup::Tuedacs, LaboratorySetup::Dspace] {
             let nominal = CftTruth::synthetic(setup);
             nominal.check().expect("positive definite");
             for seed in 0..20 {
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn impossible_inertia_is_refused_with_the_pose() {
-        let mut truth = CftTruth::synthetic(Setup::Tuedacs);
+        let mut truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
         truth.theta[11] = -5.0;
         let refused = truth.check();
         assert!(matches!(
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn cft_parameters_carry_the_numbers_of_the_report() {
-        let truth = CftTruth::synthetic(Setup::Tuedacs);
+        let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
         assert_eq!(truth.friction_theta(), practice::FRICTION);
         assert_eq!(truth.printed(), practice::INERTIA);
         let parameters = truth.plant().expect("a pose").parameters();

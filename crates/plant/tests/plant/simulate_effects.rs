@@ -9,7 +9,7 @@ mod serial;
 mod static_torques;
 
 use cft_ident_core::robot::cft::pantograph::reference_jacobian;
-use cft_ident_core::robot::cft::{Coefficients, Setup, dynamics};
+use cft_ident_core::robot::cft::{LaboratorySetup, ReportCoefficients, dynamics};
 use cft_ident_plant::simulate::cft::{effects, excitation, follow};
 use cft_ident_plant::simulate::effects::{Effect, LAWS, PlantState};
 use cft_ident_plant::simulate::moving::Moving;
@@ -20,7 +20,7 @@ use cft_ident_plant::simulate::{
 use cft_ident_plant::simulate::{SingleJointTruth, SmoothFriction};
 
 fn truth() -> CftTruth {
-    CftTruth::synthetic(Setup::Tuedacs)
+    CftTruth::synthetic(LaboratorySetup::Tuedacs)
 }
 
 fn build(texts: &[&str]) -> Result<Effects, SimulateError> {
@@ -122,11 +122,17 @@ fn logged_torque_of_a_robot_with_an_offset_is_that_much_larger() {
     };
     let run = |texts: &[&str]| {
         let specs: Vec<EffectSpec> = texts.iter().map(|t| t.parse().expect("read")).collect();
-        follow(&truth(), &specs, excitation(Setup::Tuedacs), &settings).expect("runs")
+        follow(
+            &truth(),
+            &specs,
+            excitation(LaboratorySetup::Tuedacs),
+            &settings,
+        )
+        .expect("runs")
     };
     let offset = 2.0;
     let recording = run(&["torque-offset:q4:c=2"]);
-    let coefficients = Coefficients::from_theta12(&truth().printed());
+    let coefficients = ReportCoefficients::from_theta12(&truth().printed());
     // Over whole periods the declared model's torque, by the true motion, misses the offset.
     let period = 2500;
     let (first, last) = (3000, 3000 + period);
@@ -352,7 +358,8 @@ fn effect_with_inertia_in_actuator_coordinates_adds_the_rotor_energy() {
     };
     let power = |k: usize| {
         let (q, v) = (recording.actual.q[k], recording.actual.v[k]);
-        let gravity = dynamics::gravity_torque(&q, &Coefficients::from_theta12(&truth.printed()));
+        let gravity =
+            dynamics::gravity_torque(&q, &ReportCoefficients::from_theta12(&truth.printed()));
         -(0..4).map(|i| gravity[i] * v[i]).sum::<f64>()
     };
     let last = recording.rows() - 1;

@@ -1,7 +1,7 @@
 //! The integration against the equations: reference states, energy, tolerance, a second integrator.
 
 use cft_ident_core::robot::cft::geometry::{GRAVITY, L4, L6, U};
-use cft_ident_core::robot::cft::{Coefficients, Setup, dynamics};
+use cft_ident_core::robot::cft::{LaboratorySetup, ReportCoefficients, dynamics};
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::integrate::{DormandPrince, System, Tolerance};
@@ -36,7 +36,7 @@ fn plant_accelerates_as_the_reference_states_say() {
     let file = std::path::Path::new(cft_ident_support::ROOT).join("fixtures/oracle/reference.json");
     let text = std::fs::read_to_string(file).expect("fixture");
     let oracle: Value = serde_json::from_str(&text).expect("JSON");
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     for (k, number) in truth
         .printed()
         .iter()
@@ -74,7 +74,7 @@ fn plant_accelerates_as_the_reference_states_say() {
 
 /// Kinetic plus potential energy of the frictionless robot; the potential's gradient is G of eq. (17).
 fn energy(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> f64 {
-    let mass = dynamics::inertia(q, &Coefficients::from_theta12(theta));
+    let mass = dynamics::inertia(q, &ReportCoefficients::from_theta12(theta));
     let kinetic: f64 = (0..4)
         .flat_map(|i| (0..4).map(move |j| (i, j)))
         .map(|(i, j)| 0.5 * v[i] * mass[i][j] * v[j])
@@ -90,7 +90,7 @@ fn energy(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> f64 {
 
 #[test]
 fn energy_is_conserved_without_friction_and_volts() {
-    let mut truth = CftTruth::synthetic(Setup::Tuedacs);
+    let mut truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     truth.friction = [FREE; 4];
     let plant = truth.plant().expect("a pose");
     let mut system = moving(&plant, [0.0; 4]);
@@ -137,7 +137,7 @@ fn friction_and_volts_change_the_energy_by_their_work() {
             dydt[8] = (0..4).map(power).sum();
         }
     }
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let plant = truth.plant().expect("a pose");
     let volts = [-0.9, 0.3, 0.5, 2.0];
     let mut system = Powered(moving(&plant, volts), truth.friction);
@@ -180,7 +180,7 @@ fn difference(a: &SimulatedRun<4>, b: &SimulatedRun<4>) -> (f64, f64) {
 
 #[test]
 fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     for number in 0..5 {
         let with = |tolerance: Tolerance| {
             let reference = if number < 4 {
@@ -216,7 +216,7 @@ fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
 
 #[test]
 fn runge_kutta_with_a_bounded_step_agrees_through_the_stiff_reversal() {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let plant = truth.plant().expect("a pose");
     // Every joint is braked through zero speed by friction and volts.
     let start = [0.2, 0.3, -0.9, 1.9, 0.02, 0.1, 0.1, -0.1];

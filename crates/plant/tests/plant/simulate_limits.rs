@@ -1,7 +1,7 @@
 //! Starts, limits, saturation, rest, open loop: the behaviour of the report's simulation block.
 
 use cft_ident_core::robot::RobotError;
-use cft_ident_core::robot::cft::{Setup, pantograph};
+use cft_ident_core::robot::cft::{LaboratorySetup, pantograph};
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::{
@@ -13,7 +13,7 @@ use cft_ident_plant::simulate::{OneJointMove, SingleJointTruth, SmoothFriction};
 use crate::simulate_effects::missing::axis;
 
 fn truth() -> CftTruth {
-    CftTruth::synthetic(Setup::Tuedacs)
+    CftTruth::synthetic(LaboratorySetup::Tuedacs)
 }
 
 fn constant(volts: [f64; 4]) -> MotorInput<4> {
@@ -153,7 +153,7 @@ fn limit_stops_the_run_and_says_which_coordinate_and_when() {
     let place = place.expect("a coordinate");
     assert_eq!(recording.status[last][place], MotorStatus::LimitReached);
     assert_eq!(event.t, recording.t[last]);
-    let upper = Setup::Tuedacs.limits().upper[place];
+    let upper = LaboratorySetup::Tuedacs.limits().upper[place];
     assert!(
         event.value > upper && event.value < upper + 1e-2,
         "{event:?}"
@@ -191,7 +191,13 @@ fn saturation_cuts_the_volts_and_marks_the_channel() {
 #[test]
 fn logged_volts_played_back_repeat_the_motion() {
     let settings = perfect(3.0);
-    let first = follow(&truth(), &[], excitation(Setup::Tuedacs), &settings).expect("runs");
+    let first = follow(
+        &truth(),
+        &[],
+        excitation(LaboratorySetup::Tuedacs),
+        &settings,
+    )
+    .expect("runs");
     let series = VoltSeries::new(first.t.clone(), first.volts.clone()).expect("a series");
     let start = Start::State {
         position: first.x[0],
@@ -270,8 +276,13 @@ fn unusable_starts_settings_and_volts_are_errors_with_the_way_out() {
 
 #[test]
 fn table_3_with_the_printed_offsets_is_refused_on_dspace() {
-    let truth = CftTruth::synthetic(Setup::Dspace);
-    let outcome = follow(&truth, &[], excitation(Setup::Tuedacs), &perfect(1.0));
+    let truth = CftTruth::synthetic(LaboratorySetup::Dspace);
+    let outcome = follow(
+        &truth,
+        &[],
+        excitation(LaboratorySetup::Tuedacs),
+        &perfect(1.0),
+    );
     match outcome {
         Err(SimulateError::LimitAtStart { coordinate, .. }) => assert_eq!(coordinate, "x_c4"),
         other => panic!("{other:?}"),
@@ -347,7 +358,7 @@ fn one_joint_moves_stay_inside_given_ranges_or_are_refused() {
     let recording = follow(
         &truth(),
         &[],
-        plan.reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+        plan.reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
             .expect("fits"),
         &perfect(20.0),
     )
@@ -364,13 +375,13 @@ fn one_joint_moves_stay_inside_given_ranges_or_are_refused() {
         ..plan
     };
     let text = wide
-        .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+        .reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
         .expect_err("too wide")
         .to_string();
     assert!(text.contains("q1 cannot move over [0, 2]"), "{text}");
     assert!(
         OneJointMove::new(9, 20.0, None)
-            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+            .reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
             .is_err()
     );
 }

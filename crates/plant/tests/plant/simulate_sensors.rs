@@ -1,12 +1,12 @@
 //! What is logged: counts, seeds, noise, torques by (66), lost and uneven samples.
 
 use cft_ident_core::robot::cft::actuation::ENCODER_SCALE;
-use cft_ident_core::robot::cft::{Setup, pantograph};
+use cft_ident_core::robot::cft::{LaboratorySetup, pantograph};
 use cft_ident_plant::simulate::cft::{excitation, follow};
 use cft_ident_plant::simulate::{CftTruth, Noise, Sensors, Settings, SimulatedRun};
 
 fn run(sensors: Sensors<4>, seed: u64, effects: &[&str]) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let effects: Vec<_> = effects
         .iter()
         .map(|text| text.parse().expect("effect"))
@@ -56,7 +56,8 @@ fn logged_torques_are_the_logged_volts_by_equation_66() {
         &[],
     );
     for k in 0..recording.rows() {
-        let torque = Setup::Tuedacs.volts_to_torques(&recording.q[k], &recording.volts[k]);
+        let torque =
+            LaboratorySetup::Tuedacs.volts_to_torques(&recording.q[k], &recording.volts[k]);
         assert_eq!(recording.torque[k], torque);
     }
 }
@@ -103,7 +104,8 @@ fn noise_is_the_same_with_effects_on_and_off() {
         // The torque's own noise: what is left over (66) of the logged volts.
         let own: Vec<f64> = (0..with.rows())
             .flat_map(|k| {
-                let by_volts = Setup::Tuedacs.volts_to_torques(&with.q[k], &with.volts[k]);
+                let by_volts =
+                    LaboratorySetup::Tuedacs.volts_to_torques(&with.q[k], &with.volts[k]);
                 std::array::from_fn::<f64, 4, _>(|i| with.torque[k][i] - by_volts[i])
             })
             .collect();

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use cft_ident_core::effect::{AugmentedModel, ModelEffect, Role, Scene};
+use cft_ident_core::effect::{AugmentedModel, EffectScene, ModelEffect, Role};
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch, rest};
 use cft_ident_core::robot::model::JointFriction;
 
@@ -214,7 +214,7 @@ fn add(
     // effects remember: their columns are those of the whole stretch
     let plain = (!model.effects.is_empty())
         .then(|| AugmentedModel::plain(model.model.clone()).torques(stretch));
-    let scene = Scene {
+    let scene = EffectScene {
         robot: &model.model.robot,
         theta: &model.model.theta,
         laws: &model.model.friction,
@@ -310,7 +310,7 @@ impl OfJoint {
     fn new(
         model: &AugmentedModel,
         layout: &Layout,
-        scene: &Scene,
+        scene: &EffectScene,
         (j, theta): (usize, Vec<usize>),
     ) -> Self {
         let mut places = theta.clone();

@@ -15,7 +15,7 @@ use crate::input::logged_robot::LoggedRobot;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
-    Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
+    FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal, SignalDependence,
     SplitErrors, StepStatus,
 };
 use cft_ident_core::effect::ModelEffect;
@@ -371,7 +371,7 @@ impl Diagnosed {
     }
 }
 
-fn dependence(names: &[String], found: &Dependence) -> ResidualDependence {
+fn dependence(names: &[String], found: &SignalDependence) -> ResidualDependence {
     let signals = found.signals.iter();
     ResidualDependence {
         joint: names[found.joint].clone(),

@@ -19,7 +19,7 @@ use crate::input::reduced::error::ReducedError;
 use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
 use cft_ident_core::effect::{AugmentedModel, ModelEffect};
 use cft_ident_core::inertia::verdict::verdict;
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::motion::FilterSettings;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::Verdict;
@@ -134,7 +134,7 @@ fn take(found: &mut IdentifiedDynamics, fit: &AxisFit) {
             fit.free.len()
         ));
     }
-    if fit.ending == Ending::IterationLimit {
+    if fit.ending == IterationEnding::IterationLimit {
         found.warnings.push(format!(
             "fit to the motion: did not settle in {} steps; its last result stands",
             fit.steps

@@ -14,15 +14,15 @@ use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns
 use cft_ident_core::inertia::departure;
 use cft_ident_core::inertia::encoder::{add_scatter, bias};
 use cft_ident_core::inertia::feasible::nearest;
-use cft_ident_core::inertia::instruments::{self, Instrumental};
+use cft_ident_core::inertia::instruments::{self, InstrumentalFit};
 use cft_ident_core::inertia::late;
 use cft_ident_core::inertia::law_start;
 use cft_ident_core::inertia::refine::{self, RefinedFit};
-use cft_ident_core::inertia::robust::{self, Robust, Weigher};
+use cft_ident_core::inertia::robust::{self, RobustFit, RowWeigher};
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::inertia::solve::{self, Fit, fit};
 use cft_ident_core::inertia::standstill;
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_files::config::campaign::EstimatorKind;
 
 /// What an estimator says of its own work.
@@ -32,7 +32,7 @@ pub struct Account {
     pub estimator: EstimatorKind,
     /// The estimator that was asked for cannot do without the refinement of the friction law.
     pub law_refined: bool,
-    pub status: Ending,
+    pub status: IterationEnding,
     /// Passes over the logs; 1 for least squares.
     pub iterations: usize,
     /// Joint by joint; nothing for least squares.
@@ -69,7 +69,7 @@ impl Account {
         Account {
             estimator,
             law_refined: false,
-            status: Ending::Converged,
+            status: IterationEnding::Converged,
             iterations: 1,
             joints: Vec::new(),
             simulated: None,
@@ -122,8 +122,8 @@ impl Basis {
 
 /// What turns other readings of the logs into a fit of the same kind.
 enum Solver {
-    Linear(solve::Weighting),
-    Robust(Box<Weigher>),
+    Linear(solve::RowWeighting),
+    Robust(Box<RowWeigher>),
     Refined(Box<RefinedFit>),
     /// The fit, and the parameters that were simulated.
     Instrumental(Box<(Fit, DVector<f64>)>),
@@ -138,20 +138,20 @@ impl Solver {
         }
     }
 
-    fn weigher(&self) -> Option<Weigher> {
+    fn weigher(&self) -> Option<RowWeigher> {
         match self {
             Solver::Robust(weigher) => Some(weigher.afresh()),
             _ => None,
         }
     }
 
-    fn solve(&self, sums: BlockFactors, weigher: Option<&Weigher>) -> Result<Fit, FitError> {
+    fn solve(&self, sums: BlockFactors, weigher: Option<&RowWeigher>) -> Result<Fit, FitError> {
         match self {
             Solver::Refined(refined) => refined.solve(sums),
             Solver::Robust(own) => weigher.unwrap_or(own).solve(&sums),
             Solver::Linear(estimator) => fit(&sums, *estimator),
             // rows without instruments: what moves the plain fit moves this one
-            Solver::Instrumental(_) => fit(&sums, solve::Weighting::Wls),
+            Solver::Instrumental(_) => fit(&sums, solve::RowWeighting::Wls),
         }
     }
 }
@@ -190,8 +190,8 @@ pub fn estimate(
             first_reading(passes, &columns)?;
             instrumental(passes, &columns, shown)?
         }
-        EstimatorKind::Ols => linear(passes, &columns, solve::Weighting::Ols)?,
-        EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,
+        EstimatorKind::Ols => linear(passes, &columns, solve::RowWeighting::Ols)?,
+        EstimatorKind::Wls => linear(passes, &columns, solve::RowWeighting::Wls)?,
     };
     let bias = widen(passes, &columns, &solver, &mut fit)?;
     departure::widen_by_departure(&basis.sums, &mut fit);
@@ -256,7 +256,7 @@ fn with_known_friction(
 fn linear(
     passes: &mut Passes,
     columns: &RegressorColumns,
-    estimator: solve::Weighting,
+    estimator: solve::RowWeighting,
 ) -> Result<Found, IdentifyError> {
     let sums = first_reading(passes, columns)?;
     let found = fit(&sums, estimator)?;
@@ -276,13 +276,13 @@ fn first_reading(
     if passes.plain {
         return Ok(sums);
     }
-    let without = fit(&sums, solve::Weighting::Wls)?;
+    let without = fit(&sums, solve::RowWeighting::Wls)?;
     let open = standstill::open_joints(columns, &without);
     if open.is_empty() || !passes.count_rests(&open) {
         return Ok(sums);
     }
     let all = passes.read(PositionFilter::Declared, columns, None)?;
-    let with = fit(&all, solve::Weighting::Wls)?;
+    let with = fit(&all, solve::RowWeighting::Wls)?;
     let counted = standstill::counted(columns, open.clone(), [&without, &with]);
     passes.count_rests(&counted);
     match counted.len() {
@@ -341,7 +341,7 @@ fn robust_regression(
     account: &mut Account,
 ) -> Result<Found, IdentifyError> {
     passes.work.doing("robust regression");
-    let Robust {
+    let RobustFit {
         fit,
         factors: sums,
         weigher,
@@ -369,12 +369,12 @@ fn instrumental(
 ) -> Result<Found, IdentifyError> {
     passes.work.doing("instrumental variables");
     let sums = passes.read(PositionFilter::Declared, columns, None)?;
-    let plain = fit(&sums, solve::Weighting::Wls)?;
+    let plain = fit(&sums, solve::RowWeighting::Wls)?;
     let map = passes.machine.robot.standard_map();
     let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
     let effective = plain.effective_rows / plain.rows as f64;
     let mut simulate_by = plain.theta.clone();
-    let Instrumental {
+    let InstrumentalFit {
         fit,
         ending: status,
         iterations,
@@ -429,7 +429,7 @@ fn widen(
     };
     add_processing(fit, &again);
     let grids = passes.machine.robot.transmission().encoder_steps();
-    let wls = matches!(solver, Solver::Linear(solve::Weighting::Wls));
+    let wls = matches!(solver, Solver::Linear(solve::RowWeighting::Wls));
     if grids.is_none() && !wls {
         return Ok(None);
     }

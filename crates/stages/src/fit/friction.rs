@@ -15,12 +15,12 @@ use crate::input::model::new_model;
 use crate::input::one_joint::{self, OneJointLog};
 use crate::input::repeated::each_row_once;
 use crate::setup::Finding;
-use cft_ident_core::friction::estimate::{JointEstimate, Nis, Options, estimate};
+use cft_ident_core::friction::estimate::{FrictionOptions, JointEstimate, NisStatistic, estimate};
 use cft_ident_core::friction::excitation::{FrictionError, moving_joint};
-use cft_ident_core::friction::inputs::Inputs;
+use cft_ident_core::friction::inputs::FrictionInputs;
 use cft_ident_core::friction::passes::GivenNoise;
 use cft_ident_core::friction::prepare::{SensorModel, SmoothedMotion, prepare, resolution};
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::number;
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_core::verdict::Verdict;
@@ -125,7 +125,7 @@ impl FrictionOfJoint {
             joint: machine.robot.joint_names()[index].clone(),
             index,
             logs,
-            converged: estimate.ending == Ending::Converged,
+            converged: estimate.ending == IterationEnding::Converged,
             parameters: LawParameters {
                 viscous: parameter(0),
                 coulomb_1: parameter(1),
@@ -268,15 +268,15 @@ fn one_joint(
             joint: name.clone(),
         })
     })?;
-    let options = Options {
+    let options = FrictionOptions {
         start: start_of(machine, name),
         noise: GivenNoise {
             torque: noise.and_then(|n| n.torque_std),
             position_factor: None,
         },
-        ..Options::default()
+        ..FrictionOptions::default()
     };
-    let inputs = Inputs {
+    let inputs = FrictionInputs {
         robot: &machine.robot,
         joint: j,
         motions: &group.motions,
@@ -302,11 +302,11 @@ fn start_of(machine: &LoggedRobot, joint: &str) -> Option<DoubleTanh> {
 fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
     let (joint, e) = (&found.joint, &found.estimate);
     let mut out = Vec::new();
-    if e.ending != Ending::Converged {
+    if e.ending != IterationEnding::Converged {
         out.push(format!(
             "{joint}: the search ended without converging ({}): none of its parameters is identified",
             match e.ending {
-                Ending::IterationLimit => "at the limit of iterations",
+                IterationEnding::IterationLimit => "at the limit of iterations",
                 _ => "it diverged",
             }
         ));
@@ -317,7 +317,7 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
             number::significant(speed, 2)
         ));
     }
-    let Nis {
+    let NisStatistic {
         mean,
         lower_95,
         upper_95,
@@ -353,7 +353,7 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
         ));
     }
     out.extend(missed_plateaus(found));
-    let settled = e.ending == Ending::Converged;
+    let settled = e.ending == IterationEnding::Converged;
     for (k, value) in e.values.iter().enumerate() {
         match value.verdict {
             Verdict::LowerBound => out.push(format!(

@@ -396,7 +396,7 @@ fn warnings(fit: &GainFit, reference: Option<&str>, mut of_logs: Vec<String>) ->
             "gains are ratios to that of {reference}: the model is in the unit of its channel, and a known payload (`--fit-gains LOG:mass=KG`) would make it SI"
         ));
     }
-    if fit.ending != cft_ident_core::math::descent::Ending::Converged {
+    if fit.ending != cft_ident_core::math::descent::IterationEnding::Converged {
         of_logs.push(format!(
             "the gains did not settle in {} steps; their last values stand",
             fit.iterations

@@ -28,7 +28,7 @@ use crate::input::repeated::each_row_once;
 use crate::input::unknowns::{FittedUnknown, columns, unknowns};
 use cft_ident_core::inertia::accumulate::RelativeResidual;
 use cft_ident_core::inertia::encoder::correct;
-use cft_ident_core::inertia::essential::{Essential, essential};
+use cft_ident_core::inertia::essential::{EssentialParameters, essential};
 use cft_ident_core::inertia::gains::by_gains;
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
@@ -279,7 +279,7 @@ fn share_uncertainty(estimated: &mut Estimated, gains: &CurrentGains) -> Result<
 /// Share that a fit leaves of every joint where noise is as large as the torque: noise leaves 0.7 of their sum.
 const NOISE_ONLY_SHARE: f64 = 0.7;
 /// The essential unknowns, and the relative residual of each joint with those alone.
-fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyError> {
+fn essentials(estimated: &Estimated) -> Result<(EssentialParameters, Vec<f64>), IdentifyError> {
     let (fit, basis) = (&estimated.fit, &estimated.basis);
     let weights = weights_of(
         &basis.sums,

@@ -19,7 +19,9 @@ use cft_ident_core::friction::estimate::FrictionCurvePoint;
 use cft_ident_core::motion::ParallelFilters;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::robot::model::JointFriction;
-use cft_ident_core::validate::{JointError, Overall, Reconstruction, Validation};
+use cft_ident_core::validate::{
+    JointError, OverallTorqueErrors, TorqueReconstruction, TorqueValidation,
+};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
 
@@ -35,7 +37,7 @@ pub struct Side {
 /// Both models on the same logs.
 pub struct TriedOnLogs {
     pub in_memory: InMemory,
-    pub validations: [Validation; 2],
+    pub validations: [TorqueValidation; 2],
     pub differences: ErrorDifferences,
 }
 
@@ -115,7 +117,7 @@ pub struct BothAt {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ComparedOnLogs {
     pub joints: Vec<ComparedErrors<JointError>>,
-    pub overall: ComparedErrors<Overall>,
+    pub overall: ComparedErrors<OverallTorqueErrors>,
     pub processing: Summary,
 }
 
@@ -272,7 +274,7 @@ fn on_logs(
     let settings = machine.settings();
     let named = |error| IdentifyError::motion(&machine.name, error);
     let validation = |side: &Side| {
-        let mut all = Reconstruction::new(&side.model.model, &in_memory.rest_speed, None);
+        let mut all = TorqueReconstruction::new(&side.model.model, &in_memory.rest_speed, None);
         for (segment, stretch) in in_memory.stretches.iter().enumerate() {
             let hat = side.model.reconstruct(stretch);
             all.add_stretch(&settings, segment, stretch, &hat, &mut |_| {})

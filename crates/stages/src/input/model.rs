@@ -58,12 +58,15 @@ pub(crate) fn own_laws(
     let of = |candidate: &CandidateSection| {
         let unit = |name: &String| candidate.units.get(name).cloned().unwrap_or_default();
         let coefficients = candidate.formulas.iter();
-        let shapes = candidate.shapes.iter().map(|(name, range)| formula::Shape {
-            name: name.clone(),
-            unit: range.unit.clone(),
-            range: [range.from, range.to],
-        });
-        let definition = formula::Definition {
+        let shapes = candidate
+            .shapes
+            .iter()
+            .map(|(name, range)| formula::FormulaShape {
+                name: name.clone(),
+                unit: range.unit.clone(),
+                range: [range.from, range.to],
+            });
+        let definition = formula::FormulaDefinition {
             name: candidate.name.clone(),
             joints: candidate.joints.clone(),
             coefficients: coefficients

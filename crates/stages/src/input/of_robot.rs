@@ -5,7 +5,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
-use cft_ident_core::validate::{Reconstructed, TorqueErrors};
+use cft_ident_core::validate::{ReconstructedRow, TorqueErrors};
 use cft_ident_logs::log::Instant;
 use std::f64::consts::TAU;
 
@@ -92,7 +92,7 @@ impl Beyond {
         }
     }
 
-    pub(crate) fn take(&mut self, row: &Reconstructed, origin: Instant) {
+    pub(crate) fn take(&mut self, row: &ReconstructedRow, origin: Instant) {
         for (most, x) in self.measured.iter_mut().zip(row.measured) {
             *most = most.max(x.abs());
         }

@@ -15,8 +15,8 @@ use cft_ident_core::inertia::closed_loop::LoopGains;
 use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::encoder::{self, GRIDS, NOISY, PositionNoise, accumulate_shifted};
 use cft_ident_core::inertia::instruments::{self, ReferenceSource};
-use cft_ident_core::inertia::jumps::{Jump, jumps};
-use cft_ident_core::inertia::robust::Weigher;
+use cft_ident_core::inertia::jumps::{ResidualJump, jumps};
+use cft_ident_core::inertia::robust::RowWeigher;
 use cft_ident_core::motion::{FilterSettings, Summary};
 use cft_ident_logs::log::{Block, Provenance};
 
@@ -54,7 +54,7 @@ pub struct Passes<'a> {
     pub inputs: Vec<Provenance>,
     pub warnings: Vec<String>,
     /// Stretches in which something pushes the robot, by the places of the logs, by the first reading.
-    pub(crate) jumps: Vec<(usize, Jump)>,
+    pub(crate) jumps: Vec<(usize, ResidualJump)>,
     /// Of the first log, by the first reading.
     pub summary: Option<Summary>,
     /// Sampling step of each log, by the first reading [s].
@@ -174,7 +174,7 @@ impl<'a> Passes<'a> {
         &mut self,
         filter: PositionFilter,
         columns: &RegressorColumns,
-        weigher: Option<&mut Weigher>,
+        weigher: Option<&mut RowWeigher>,
     ) -> Result<BlockFactors, IdentifyError> {
         self.read_as(filter, columns, weigher, false)
     }
@@ -183,7 +183,7 @@ impl<'a> Passes<'a> {
         &mut self,
         filter: PositionFilter,
         columns: &RegressorColumns,
-        mut weigher: Option<&mut Weigher>,
+        mut weigher: Option<&mut RowWeigher>,
         condensed: bool,
     ) -> Result<BlockFactors, IdentifyError> {
         let first = self.summary.is_none();
@@ -325,7 +325,7 @@ impl<'a> Passes<'a> {
         columns: RegressorColumns,
         reading: u32,
         index: usize,
-        weigher: Option<&mut Weigher>,
+        weigher: Option<&mut RowWeigher>,
     ) -> Result<BlockFactors, IdentifyError> {
         let log = &self.logs[index];
         let steps = self.noise_that_tells(index);
@@ -363,7 +363,7 @@ impl<'a> Passes<'a> {
         &mut self,
         columns: &RegressorColumns,
         grid: u32,
-        mut weigher: Option<&mut Weigher>,
+        mut weigher: Option<&mut RowWeigher>,
     ) -> Result<Option<BlockFactors>, IdentifyError> {
         let unknown = self.machine.robot.transmission().encoder_steps().is_none();
         if unknown && (0..self.logs.len()).all(|log| self.noise_that_tells(log).is_none()) {

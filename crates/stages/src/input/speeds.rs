@@ -1,6 +1,6 @@
 //! How fast the joints of a log move, by which a rest is distinguished from a slow motion.
 
-use cft_ident_logs::log::{Block, Conversion};
+use cft_ident_logs::log::{Block, RowConversion};
 
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against a motion.
 const SPACING_S: f64 = 0.02;
@@ -103,7 +103,7 @@ impl SpeedMeter {
     }
 
     /// Takes a block of what was logged; `conversion` makes joint positions of it.
-    pub(crate) fn take(&mut self, block: &Block, conversion: Option<&Conversion>) {
+    pub(crate) fn take(&mut self, block: &Block, conversion: Option<&RowConversion>) {
         let n = block.joints();
         if n == 0 {
             return;

@@ -6,7 +6,7 @@ use super::logged_robot::LoggedRobot;
 use cft_ident_core::effect::{AugmentedModel, Law};
 use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::motion::Stretch;
-use cft_ident_logs::log::{Instant, LogError, Temperatures};
+use cft_ident_logs::log::{Instant, JointTemperatures, LogError};
 
 /// A temperature that an effect takes.
 pub(crate) struct Taken {
@@ -63,13 +63,13 @@ impl LoggedRobot {
     ///
     /// # Errors
     /// A log that lacks a column that is named, or a temperature that is no number.
-    pub fn temperatures(&self, log: &Log, origin: Instant) -> Result<Temperatures, LogError> {
+    pub fn temperatures(&self, log: &Log, origin: Instant) -> Result<JointTemperatures, LogError> {
         match (log, self.file.temperature_layout()) {
             (Log::File(spec), Some((joints, layout))) => {
-                Temperatures::read(spec, (&joints, &layout), origin)
+                JointTemperatures::read(spec, (&joints, &layout), origin)
             }
             (Log::Arrays(arrays), _) => Ok(arrays.temperatures()),
-            _ => Ok(Temperatures::default()),
+            _ => Ok(JointTemperatures::default()),
         }
     }
 
@@ -126,10 +126,10 @@ impl LoggedRobot {
         model: &AugmentedModel,
         log: &Log,
         origin: Instant,
-    ) -> Result<Temperatures, IdentifyError> {
+    ) -> Result<JointTemperatures, IdentifyError> {
         let taken = of_model(model);
         if taken.is_empty() {
-            return Ok(Temperatures::default());
+            return Ok(JointTemperatures::default());
         }
         let found = self.temperatures(log, origin).unwrap_or_default();
         match taken.iter().find(|t| found.at(t.joint, 0.0).is_none()) {

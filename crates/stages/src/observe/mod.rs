@@ -21,5 +21,5 @@ pub(crate) use excesses::{KEPT, Quiet, QuietSample};
 pub(crate) use explain::Explainer;
 pub use explain::{ExplainedNumber, Explanation};
 pub use observer::{Observed, Observer};
-pub use recipe::Recipe;
+pub use recipe::ObserverRecipe;
 pub(crate) use recipe::recipe;

@@ -1,11 +1,11 @@
 //! From rows to external torques.
 
 use crate::band::Directions;
-use cft_ident_core::effect::{AugmentedModel, Sampled};
-use cft_ident_core::math::causal::{Causal, delay_samples};
-use cft_ident_core::math::sos::Sos;
+use cft_ident_core::effect::{AugmentedModel, SampledModel};
+use cft_ident_core::math::causal::{CausalSections, delay_samples};
+use cft_ident_core::math::sos::SosFilter;
 use cft_ident_core::motion::{CausalMotion, FilterSettings, MotionError, MotionSample};
-use cft_ident_logs::log::{Block, Temperatures};
+use cft_ident_logs::log::{Block, JointTemperatures};
 
 /// Order of the last low-pass.
 pub(super) const ORDER: usize = 2;
@@ -40,12 +40,12 @@ pub struct Observer {
     cutoff_hz: f64,
     core: Option<Core>,
     first: Option<f64>,
-    temperatures: Temperatures,
+    temperatures: JointTemperatures,
 }
 
 struct Core {
-    plant: Sampled,
-    smooth: Causal,
+    plant: SampledModel,
+    smooth: CausalSections,
     settle: usize,
     delay_s: f64,
     late: Option<Late>,
@@ -79,7 +79,7 @@ impl Observer {
             cutoff_hz: settings.cutoff_hz,
             core: None,
             first: None,
-            temperatures: Temperatures::default(),
+            temperatures: JointTemperatures::default(),
         })
     }
 
@@ -93,7 +93,7 @@ impl Observer {
     }
 
     /// Takes the temperatures of the log that it observes.
-    pub fn set_temperatures(&mut self, temperatures: Temperatures) {
+    pub fn set_temperatures(&mut self, temperatures: JointTemperatures) {
         self.temperatures = temperatures;
     }
 
@@ -143,14 +143,14 @@ impl Observer {
 impl Core {
     fn design(model: &AugmentedModel, cutoff_hz: f64, dt: f64) -> Result<Self, MotionError> {
         let n = model.model.robot.joints();
-        let sos = Sos::butterworth(ORDER, cutoff_hz, 1.0 / dt)?;
+        let sos = SosFilter::butterworth(ORDER, cutoff_hz, 1.0 / dt)?;
         let late = Late::of(model, dt);
         let lead = late.as_ref().map_or(0, |late| late.lead);
         Ok(Self {
-            plant: Sampled::new(model.clone(), dt),
+            plant: SampledModel::new(model.clone(), dt),
             settle: sos.settle_samples(SETTLED),
             delay_s: dt * (delay_samples(&sos) + lead as f64),
-            smooth: Causal::new(Some(&sos), 2 * n),
+            smooth: CausalSections::new(Some(&sos), 2 * n),
             late,
             count: 0,
             tau: vec![0.0; n],

@@ -4,11 +4,11 @@
 use super::stepper::{Held, held, stopped_by};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::dynamics::Dynamics;
+use cft_ident_core::robot::dynamics::RobotDynamics;
 
 pub(super) struct Abreast<'a> {
     model: &'a AugmentedModel,
-    dynamics: Dynamics,
+    dynamics: RobotDynamics,
     dt: f64,
     jumps: bool,
     /// Mass of an axis without links, the same everywhere; nothing else acts on it.

@@ -10,9 +10,9 @@ use serde::Serialize;
 use super::fit::{Fitted, POSITIONS, RunSpan, apart, errors, fit, rms, windows};
 use super::numbers::{Columns, columns, numbers};
 use cft_ident_core::effect::{
-    AugmentedModel, Cover, Family, LAWS, Law, ModelEffect, Place, Role, Search,
+    AugmentedModel, EffectPlace, Family, LAWS, Law, LogCoverage, ModelEffect, Role, ShapeSearch,
 };
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
 
@@ -88,7 +88,7 @@ pub struct AxisFit {
     pub before: PositionErrors,
     /// After; blocks are those of fits without them.
     pub after: PositionErrors,
-    pub ending: Ending,
+    pub ending: IterationEnding,
     /// Steps of the last fit.
     pub steps: usize,
     pub tried: Vec<TriedAxis>,
@@ -103,7 +103,7 @@ pub fn fit_axis(
 ) -> Result<AxisFit, AxisError> {
     let trial = Trial {
         stretches,
-        cover: Cover::of(&start.model.robot, stretches, 0.0),
+        cover: LogCoverage::of(&start.model.robot, stretches, 0.0),
         offset,
         stop,
     };
@@ -189,7 +189,7 @@ struct Chosen {
 
 struct Trial<'a> {
     stretches: &'a [Stretch],
-    cover: Cover,
+    cover: LogCoverage,
     offset: bool,
     stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -317,12 +317,12 @@ impl Trial<'_> {
             entry.friction
                 && entry.families.contains(&Family::Velocity)
                 && entry.role == Role::Columns
-                && entry.search != Search::Orders
+                && entry.search != ShapeSearch::Orders
                 && law.memory.is_none()
                 && law.varied.is_none()
                 && !model.effects.iter().any(|e| e.name() == entry.name)
         };
-        let place = Place::Joint(0);
+        let place = EffectPlace::Joint(0);
         let laws = LAWS.iter().filter(of_speed).filter(|law| {
             let places = law.places(&model.model.robot, &model.model.friction);
             places.contains(&place)

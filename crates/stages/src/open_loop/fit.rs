@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::abreast::Abreast;
 use super::numbers::{Columns, numbers, with_numbers};
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::math::descent::{Ending, StepControl, Trial, descend};
+use cft_ident_core::math::descent::{IterationEnding, StepControl, Trial, descend};
 use cft_ident_core::math::long_run::long_run;
 use cft_ident_core::math::rank_revealing::RankRevealingInverse;
 use cft_ident_core::motion::Stretch;
@@ -119,7 +119,7 @@ pub(super) struct Fitted {
     pub model: AugmentedModel,
     /// Root mean square of the positions' errors \[m or rad\].
     pub rms: f64,
-    pub ending: Ending,
+    pub ending: IterationEnding,
     pub steps: usize,
     /// Of all numbers, where it is wanted; zero rows of what was not moved.
     pub covariance: DMatrix<f64>,

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use cft_ident_core::effect::{AugmentedModel, Sampled};
+use cft_ident_core::effect::{AugmentedModel, SampledModel};
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::dynamics::Dynamics;
+use cft_ident_core::robot::dynamics::RobotDynamics;
 use cft_ident_core::robot::model::JointFriction;
 
 /// Sweeps over the joints in which impulses of friction settle.
@@ -13,8 +13,8 @@ const SWEEPS: usize = 50;
 /// A model in motion.
 pub struct Stepper {
     model: AugmentedModel,
-    effects: Sampled,
-    dynamics: Dynamics,
+    effects: SampledModel,
+    dynamics: RobotDynamics,
     dt: f64,
     /// Joints whose friction jumps at rest and is held there by it.
     jumps: Vec<bool>,
@@ -41,7 +41,7 @@ impl Stepper {
         };
         let laws = model.model.friction.iter().enumerate();
         Stepper {
-            effects: Sampled::new(model.clone(), dt),
+            effects: SampledModel::new(model.clone(), dt),
             dynamics: model.model.robot.dynamics(&model.model.theta),
             dt,
             // what remembers has a friction of its own at rest

@@ -3,7 +3,7 @@
 
 use super::Replay;
 use cft_ident_core::effect::empirical::ways;
-use cft_ident_core::effect::{AugmentedModel, CurveSignal, Family, ModelEffect, Role, Search};
+use cft_ident_core::effect::{AugmentedModel, CurveSignal, Family, ModelEffect, Role, ShapeSearch};
 use cft_ident_core::motion::{MotionError, Stretch};
 use cft_ident_core::robot::JointKind;
 
@@ -131,7 +131,7 @@ enum OfSignal {
 
 impl OfSignal {
     fn of(effect: &ModelEffect, joint: usize) -> Self {
-        let wave = (effect.law.entry.search == Search::Orders).then(|| effect.shape.first());
+        let wave = (effect.law.entry.search == ShapeSearch::Orders).then(|| effect.shape.first());
         if let Some(order) = wave.flatten().filter(|order| **order > 0.0) {
             return OfSignal::Wave(1.0 / order);
         }

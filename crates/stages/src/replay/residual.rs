@@ -2,7 +2,7 @@
 
 use super::Replay;
 use cft_ident_core::diagnose::{JointEvidence, evidence, one_after_the_other};
-use cft_ident_core::effect::{AugmentedModel, Place, Search};
+use cft_ident_core::effect::{AugmentedModel, EffectPlace, ShapeSearch};
 use cft_ident_core::motion::{MotionError, Stretch};
 
 /// The residual of one joint.
@@ -76,7 +76,7 @@ fn begins(replay: &Replay, stretches: &[&Stretch]) -> Vec<(f64, String)> {
 /// Orders of the waves that a model has at a joint.
 fn orders(model: &AugmentedModel, joint: usize) -> Vec<f64> {
     let effects = model.effects.iter();
-    let waves = effects.filter(|e| e.law.entry.search == Search::Orders);
-    let here = waves.filter(|e| e.place == Place::Joint(joint));
+    let waves = effects.filter(|e| e.law.entry.search == ShapeSearch::Orders);
+    let here = waves.filter(|e| e.place == EffectPlace::Joint(joint));
     here.filter_map(|e| e.shape.first().copied()).collect()
 }

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use cft_ident::config::Trajectory;
-use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
-use cft_ident::friction::inputs::Inputs;
+use cft_ident::friction::estimate::{FrictionOptions, JointEstimate, estimate};
+use cft_ident::friction::inputs::FrictionInputs;
 use cft_ident::friction::motions::motions;
-use cft_ident::friction::prepare::{Prepared, SensorModel as Read, prepare};
+use cft_ident::friction::prepare::{PreparedProblem, SensorModel as Read, prepare};
 use cft_ident::identify::narrowed;
 use cft_ident::log::Block;
 use cft_ident::motion::FilterSettings as Processing;
@@ -168,7 +168,7 @@ pub fn estimated(
     names: &[String],
     log: &Block,
     smoothing: bool,
-) -> (Prepared, JointEstimate) {
+) -> (PreparedProblem, JointEstimate) {
     let found = |settings: &Processing| {
         motions(&log.t, &log.q, &log.tau, 4, settings).expect("a whole log")
     };
@@ -185,14 +185,14 @@ pub fn estimated(
     let wide = found(&processing());
     let narrower = found(&narrowed(&processing(), 1000.0));
     let prepared = prepare(robot, joint, &wide, &sensors).expect("the joint moves");
-    let inputs = Inputs {
+    let inputs = FrictionInputs {
         robot,
         joint,
         motions: &wide,
         narrower: &narrower,
         sensors: &sensors,
     };
-    let options = Options::default();
+    let options = FrictionOptions::default();
     let inputs = smoothing.then_some(&inputs);
     let e = estimate(JOINTS[joint], names, &prepared, inputs, &options).expect("an estimate");
     (prepared, e)

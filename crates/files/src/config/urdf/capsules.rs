@@ -7,7 +7,7 @@ use super::{Collision, UrdfChain, mesh};
 use crate::config::check_limits::MOST_CAPSULES;
 use crate::config::limits::CapsuleSection;
 use cft_ident_core::number::is_usable;
-use cft_ident_core::robot::tree::enclosing::{Ball, EnclosedPiece, enclosing, volume};
+use cft_ident_core::robot::tree::enclosing::{BoundingBall, EnclosedPiece, enclosing, volume};
 use cft_ident_core::robot::tree::space::{UNTURNED, Vector};
 use cft_ident_logs::log::escape;
 
@@ -84,7 +84,7 @@ fn of_link<'c>(
     left: &mut u64,
     out: &mut Capsules,
 ) -> Held {
-    let (mut balls, mut each): (Vec<Ball>, Vec<EnclosedPiece>) = (Vec::new(), Vec::new());
+    let (mut balls, mut each): (Vec<BoundingBall>, Vec<EnclosedPiece>) = (Vec::new(), Vec::new());
     for collision in collisions {
         let begin = balls.len();
         match add(collision, folder, left, &mut balls) {
@@ -118,7 +118,7 @@ fn add(
     collision: &Collision,
     folder: &Path,
     left: &mut u64,
-    balls: &mut Vec<Ball>,
+    balls: &mut Vec<BoundingBall>,
 ) -> Result<Option<EnclosedPiece>, String> {
     let unreadable = || "a shape that cannot be read".to_owned();
     let shape = collision.shape.as_ref().ok_or_else(unreadable)?;

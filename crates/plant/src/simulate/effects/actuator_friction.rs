@@ -4,7 +4,7 @@
 //! the joints q4 and q5 feel J_4 f and J_5 f: their friction depends on the pose and couples them.
 
 use super::{Built, PlantLaw};
-use cft_ident_core::effect::Place;
+use cft_ident_core::effect::EffectPlace;
 use cft_ident_core::effect::actuator_friction::ENTRY;
 use cft_ident_core::robot::cft::pantograph::reference_jacobian;
 
@@ -12,7 +12,7 @@ pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.2 * site.scale / site.speed, 0.3 * site.scale, 1200.0],
     build: |site, _, values| {
-        let Place::Actuator(row) = site.place else {
+        let EffectPlace::Actuator(row) = site.place else {
             return Err(site.refuse(ENTRY.name, "it sits at the screws x_r and y_r"));
         };
         let (viscous, coulomb, slope) = (values[0], values[1], values[2]);

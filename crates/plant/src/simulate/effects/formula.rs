@@ -6,7 +6,7 @@
 use super::{Effect, EffectSpec, EffectValue, LAWS, PlantParameter, PlantState, Site, Sites, sign};
 use crate::simulate::SimulateError;
 use crate::simulate::temperature::PlantTemperatures;
-use cft_ident_core::effect::Places;
+use cft_ident_core::effect::PlaceRule;
 use cft_ident_core::math::formula::{Formula, MOST_NAMES};
 use cft_ident_core::robot::FormulaSignal;
 use cft_ident_files::config::candidates::CandidateSection;
@@ -51,7 +51,7 @@ pub(super) fn build(
     let keys = candidate.shapes.keys().chain(candidate.formulas.keys());
     spec.check_keys(keys.map(String::as_str).collect())?;
     let mut out = Vec::new();
-    for site in spec.sites(Places::Joints, sites)? {
+    for site in spec.sites(PlaceRule::Joints, sites)? {
         let may = |joints: &Vec<String>| joints.contains(&site.name);
         if !candidate.joints.as_ref().is_none_or(may) {
             match &spec.joint {

@@ -13,7 +13,7 @@ use super::frames::{Frame, frames};
 use super::{Built, PlantLaw, PlantRobot, Site};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::gravity_tilt::ENTRY;
-use cft_ident_core::robot::cft::dynamics::Coefficients;
+use cft_ident_core::robot::cft::dynamics::ReportCoefficients;
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_core::robot::tree::Tree;
 use cft_ident_core::robot::{JointKind, Robot};
@@ -48,7 +48,7 @@ fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Sim
     }
 }
 
-fn of_cft(chain: Coefficients, gx: f64, gy: f64) -> Result<Built, SimulateError> {
+fn of_cft(chain: ReportCoefficients, gx: f64, gy: f64) -> Result<Built, SimulateError> {
     Built::inertia(move |motion, _, torque| {
         let (Some(&[_, q2, q4, q5]), [tau1, tau2, tau4, tau5]) = (motion.q.first_chunk(), torque)
         else {

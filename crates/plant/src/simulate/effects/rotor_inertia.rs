@@ -5,7 +5,7 @@
 
 use super::{Built, PlantLaw};
 use crate::simulate::SimulateError;
-use cft_ident_core::effect::Place;
+use cft_ident_core::effect::EffectPlace;
 use cft_ident_core::effect::rotor_inertia::ENTRY;
 use cft_ident_core::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
 
@@ -13,7 +13,7 @@ pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.25 * site.inertia],
     build: |site, _, values| match site.place {
-        Place::Actuator(row) => at_screw(row, values[0]),
+        EffectPlace::Actuator(row) => at_screw(row, values[0]),
         _ => at_joint(site.joint(), values[0]),
     },
 };

@@ -4,7 +4,7 @@
 use crate::simulate::SimulateError;
 use crate::simulate::plant::Plant;
 use crate::simulate::temperature::PlantTemperatures;
-use cft_ident_core::effect::Place;
+use cft_ident_core::effect::EffectPlace;
 use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::cft::geometry::L4;
@@ -21,7 +21,7 @@ const SIGN_RATE: f64 = 10_000.0;
 /// What an effect is built for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Site {
-    pub place: Place,
+    pub place: EffectPlace,
     /// Name of the joint or screw; empty for the robot as a whole.
     pub name: String,
     /// Whether it turns (orders are then per revolution) or slides (per metre).
@@ -123,7 +123,7 @@ impl<'a> Sites<'a> {
         };
         let screws = screws(plant, &joints)?;
         let whole = joints.first().map(|first| Site {
-            place: Place::All,
+            place: EffectPlace::All,
             name: String::new(),
             ..first.clone()
         });
@@ -163,7 +163,7 @@ fn joint<const J: usize>(plant: &Plant<J>, j: usize, speed: f64) -> Site {
     let robot = &plant.mechanism.robot;
     let [coulomb, viscous] = plant.laws[j].levels();
     Site {
-        place: Place::Joint(j),
+        place: EffectPlace::Joint(j),
         name: robot.joint_names()[j].clone(),
         turns: plant.mechanism.turns(j),
         scale: plant.laws[j].torque(speed).abs(),
@@ -259,7 +259,7 @@ fn screws<const J: usize>(plant: &Plant<J>, joints: &[Site]) -> Result<Vec<Site>
         let mut direction = [0.0; J];
         direction[2..4].copy_from_slice(&jacobian[row]);
         screws.push(Site {
-            place: Place::Actuator(row),
+            place: EffectPlace::Actuator(row),
             name: (*name).to_owned(),
             turns: false,
             // A force on the crank of length L4 that takes the torque of the joint.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{LAWS, PlantLaw, PlantRobot, Site, Sites};
 use crate::simulate::SimulateError;
-use cft_ident_core::effect::{Entry, Key, Place, Places};
+use cft_ident_core::effect::{EffectPlace, Entry, Key, PlaceRule};
 use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::candidates::CandidateSection;
@@ -111,7 +111,7 @@ impl EffectSpec {
     /// The sites that the effect acts on: the one that is named, or all that the effect may sit at.
     pub(super) fn sites<'a>(
         &self,
-        places: Places,
+        places: PlaceRule,
         sites: &'a Sites,
     ) -> Result<&'a [Site], SimulateError> {
         let whole = sites.whole.as_slice();
@@ -120,20 +120,20 @@ impl EffectSpec {
             None => SimulateError::unknown_joint("", &[]),
         };
         let (joints, screws): (&[Site], &[Site]) = match places {
-            Places::Joints | Places::JointsOrAll | Places::Pairs | Places::Others => {
+            PlaceRule::Joints | PlaceRule::JointsOrAll | PlaceRule::Pairs | PlaceRule::Others => {
                 (&sites.joints, &[])
             }
-            Places::Actuators if sites.screws.is_empty() => {
+            PlaceRule::Actuators if sites.screws.is_empty() => {
                 return Err(refuse(ErrorText::new("it sits at the screws of the CFT robot, x_r and y_r").remedy("a single joint's own friction is `nonlinear-viscous`, `asymmetric-friction` or `stribeck`")));
             }
-            Places::Actuators => (&[], &sites.screws),
-            Places::JointsAndActuators => (&sites.joints, &sites.screws),
-            Places::Whole if self.joint.is_some() => {
+            PlaceRule::Actuators => (&[], &sites.screws),
+            PlaceRule::JointsAndActuators => (&sites.joints, &sites.screws),
+            PlaceRule::Whole if self.joint.is_some() => {
                 return Err(refuse(
                     ErrorText::new("it concerns all joints together").remedy("leave the joint out"),
                 ));
             }
-            Places::Whole => (whole, &[]),
+            PlaceRule::Whole => (whole, &[]),
         };
         let Some(name) = &self.joint else {
             return Ok(if screws.is_empty() { joints } else { screws });
@@ -191,7 +191,7 @@ impl EffectValue {
             false => JointKind::Prismatic,
         };
         // Joints are counted from one; `from` is a joint where units follow it.
-        let of_two = matches!(entry.places, Places::Pairs | Places::Others);
+        let of_two = matches!(entry.places, PlaceRule::Pairs | PlaceRule::Others);
         let from = pairs().find(|(key, _)| of_two && key.name == "from");
         let joint = |(_, number): (_, &f64)| (*number - 1.0).max(0.0) as usize;
         let from = from.map_or(own, |pair| machine.robot.joint_kind(joint(pair)));
@@ -203,7 +203,7 @@ impl EffectValue {
         Self {
             effect: entry.name.to_owned(),
             family: entry.family().name().to_owned(),
-            joint: (site.place != Place::All).then(|| site.name.clone()),
+            joint: (site.place != EffectPlace::All).then(|| site.name.clone()),
             parameters: pairs().map(parameter).collect(),
         }
     }

@@ -8,7 +8,7 @@ use rand::RngExt;
 use super::{Blend, Target};
 use crate::simulate::SimulateError;
 use crate::simulate::chance::{Purpose, stream};
-use cft_ident_core::robot::cft::{Setup, practice};
+use cft_ident_core::robot::cft::{LaboratorySetup, practice};
 use cft_ident_core::robot::practice::Excitation;
 
 /// Positions x_i(t) = offset_i + sum_l a_il/(l w) sin(l w t) - b_il/(l w) cos(l w t), eq. (43).
@@ -37,7 +37,7 @@ pub struct Fourier<const J: usize> {
 impl Fourier<4> {
     /// The report's excitation trajectory in (x_c1, x_c2, x_c3, x_c4): Table 3 with the printed offsets.
     pub fn table_3() -> Self {
-        Self::of(&practice::of(Setup::Tuedacs).excitation)
+        Self::of(&practice::of(LaboratorySetup::Tuedacs).excitation)
     }
 }
 

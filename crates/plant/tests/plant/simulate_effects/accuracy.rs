@@ -1,6 +1,6 @@
 //! The integration with effects, whose torques bend and jump, against itself at tighter tolerances.
 
-use cft_ident_core::robot::cft::Setup;
+use cft_ident_core::robot::cft::LaboratorySetup;
 use cft_ident_plant::simulate::cft::{follow, mechanism};
 use cft_ident_plant::simulate::integrate::Tolerance;
 use cft_ident_plant::simulate::{CftTruth, OneJointMove, SimulatedRun};
@@ -9,7 +9,7 @@ use super::missing::{perfect, specs};
 
 /// A ladder of q4 that turns at both ends, slow plateaus included.
 fn ladder(text: &str, tolerance: Tolerance) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let reference = OneJointMove::new(2, 10.0, None)
         .reference(&mechanism(truth.setup).expect("four joints"))
         .expect("fits");

@@ -1,7 +1,7 @@
 //! Logs of robots with effects, and the torque that the declared model misses in them at the true motion.
 
 use cft_ident_core::robot::JointKind;
-use cft_ident_core::robot::cft::{Coefficients, Setup, dynamics};
+use cft_ident_core::robot::cft::{LaboratorySetup, ReportCoefficients, dynamics};
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_plant::simulate::cft::{excitation, follow};
 use cft_ident_plant::simulate::single_joint::{self, SingleJointTruth};
@@ -24,11 +24,11 @@ pub fn perfect<const J: usize>(seconds: f64) -> Settings<J> {
 
 /// Table 3 on the synthetic robot: all joints move and turn round.
 pub fn table_3(texts: &[&str]) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     follow(
         &truth,
         &specs(texts),
-        excitation(Setup::Tuedacs),
+        excitation(LaboratorySetup::Tuedacs),
         &perfect(5.0),
     )
     .expect("runs")
@@ -36,14 +36,20 @@ pub fn table_3(texts: &[&str]) -> SimulatedRun<4> {
 
 /// The same with encoder counts and noise, and a seed.
 pub fn noisy(texts: &[&str], seed: u64) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let mut settings = perfect(3.0);
     settings.seed = seed;
     settings.sensors = Sensors {
         torque_noise: Noise::Relative(0.01),
         ..Sensors::default()
     };
-    follow(&truth, &specs(texts), excitation(Setup::Tuedacs), &settings).expect("runs")
+    follow(
+        &truth,
+        &specs(texts),
+        excitation(LaboratorySetup::Tuedacs),
+        &settings,
+    )
+    .expect("runs")
 }
 
 /// State of one row: positions, speeds, accelerations.
@@ -56,13 +62,13 @@ pub fn row(recording: &SimulatedRun<4>, k: usize) -> Row {
 
 /// M a + C v + G of the declared model.
 pub fn rigid((q, v, a): &Row) -> [f64; 4] {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
-    dynamics::inverse_dynamics(q, v, a, &Coefficients::from_theta12(&truth.printed()))
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
+    dynamics::inverse_dynamics(q, v, a, &ReportCoefficients::from_theta12(&truth.printed()))
 }
 
 /// Friction of the declared model.
 pub fn friction(v: &[f64; 4]) -> [f64; 4] {
-    let laws = CftTruth::synthetic(Setup::Tuedacs).friction;
+    let laws = CftTruth::synthetic(LaboratorySetup::Tuedacs).friction;
     std::array::from_fn(|i| laws[i].torque(v[i]))
 }
 

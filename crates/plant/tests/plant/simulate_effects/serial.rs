@@ -1,7 +1,7 @@
 //! Effects on a serial robot: where they have a place, and a payload and a tilt against the same robot built
 //! with them.
 
-use cft_ident_core::effect::{Entry, Places};
+use cft_ident_core::effect::{Entry, PlaceRule};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::standard::{Body, STANDARD};
@@ -93,7 +93,7 @@ fn built(truth: &Plant<3>, texts: &[&str]) -> Result<Effects, SimulateError> {
 pub fn places(entry: &Entry) -> &'static str {
     let truth = truth([0.0, 0.0, -9.81], [0.0; STANDARD]);
     let fits = |text: &str| built(&truth, &[text]).is_ok();
-    if entry.places == Places::Whole {
+    if entry.places == PlaceRule::Whole {
         return if fits(entry.name) { "whole" } else { "no" };
     }
     let [turns, slides] = ["second", "slide"].map(|joint| fits(&format!("{}:{joint}", entry.name)));

@@ -12,7 +12,7 @@ use crate::report::table::{Align, Columns, Table};
 use crate::report::traces::TraceStyle;
 use crate::report::words::listed;
 use crate::report::{Report, Writer, summary};
-use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, LeftCandidate, SplitErrors};
+use cft_ident_core::diagnose::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors, UseErrors};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
@@ -349,7 +349,7 @@ pub(super) fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed
         None => vec![("", now)],
     };
     let names = machine.robot.joint_names();
-    let percent = |e: &Errors, j: usize| number::percent(e.joints[j].headline());
+    let percent = |e: &UseErrors, j: usize| number::percent(e.joints[j].headline());
     let mut columns =
         Columns::new("relative torque error", 0..names.len()).words("joint", |j| &names[j]);
     for (side, errors) in &sides {

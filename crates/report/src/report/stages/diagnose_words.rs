@@ -5,7 +5,7 @@ use super::step_words::titled;
 use crate::report::usual;
 use crate::report::words::listed;
 use crate::report::{Figure, FoundLine, Headline, Tone, Writer};
-use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
+use cft_ident_core::diagnose::{Diagnosis, FoundEffect, SplitErrors, StepStatus, UseErrors};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
 use cft_ident_stages::open_loop::JointFreeRun;
@@ -78,7 +78,7 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> Words {
 /// Error before, error after and what is usual.
 fn headline(machine: &LoggedRobot, d: &Diagnosis) -> Headline {
     let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
-    let mean = |e: &Errors| e.overall.mean_relative_error_moving;
+    let mean = |e: &UseErrors| e.overall.mean_relative_error_moving;
     let [from, to] = [before, after].map(|e| number::percent(mean(e)));
     let changed = d.written().next().is_some();
     let torque_is = machine.file.log.torque_is;
@@ -161,7 +161,7 @@ fn added(machine: &LoggedRobot, d: &Diagnosis) -> Vec<FoundLine> {
 }
 
 /// The errors that count, and of which data they are: held-out ones where there are any.
-pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
+pub(super) fn errors(of: &SplitErrors) -> (&'static str, &UseErrors) {
     match &of.holdout {
         Some(errors) => ("held-out data", errors),
         None => ("the fitted data", &of.train),

@@ -11,7 +11,7 @@ use crate::report::words::{escaped, listed, percent as known_percent, r2};
 use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer, summary, usual};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
-use cft_ident_core::validate::{JointError, TorqueErrors, Validation};
+use cft_ident_core::validate::{JointError, TorqueErrors, TorqueValidation};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, TorqueIs, escape};
 use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for};
@@ -306,7 +306,7 @@ fn used_before(page: &mut Writer, of: &Validate) {
 }
 
 /// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
-pub fn figure(validation: &Validation, title: &str) -> TorqueFigure {
+pub fn figure(validation: &TorqueValidation, title: &str) -> TorqueFigure {
     let (traces, joints) = (&validation.traces, &validation.errors.joints);
     let of = |values: &[f64], j: usize| {
         let values = values.iter().skip(j).step_by(joints.len());

@@ -7,7 +7,7 @@ use super::error::ReducedError;
 use super::matrix;
 use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors, JointRows};
 use cft_ident_core::inertia::columns::RegressorColumns;
-use cft_ident_core::inertia::scores::{self, BlockScore, Scores};
+use cft_ident_core::inertia::scores::{self, BlockScore, BlockScores};
 
 /// What a reading of a log holds besides its matrices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,7 +38,7 @@ impl Head {
     }
 
     /// Scores from theta_0 and the steps of each joint, and the scores in these.
-    fn scores_of(&self, joints: &[DMatrix<f64>], steps: &[i16]) -> Scores {
+    fn scores_of(&self, joints: &[DMatrix<f64>], steps: &[i16]) -> BlockScores {
         let row = |k: usize| joints.iter().map(|m| m.row(k).transpose()).collect();
         let step: Vec<DVector<f64>> = row(1);
         let mut steps = steps.iter();
@@ -54,7 +54,7 @@ impl Head {
             rows: *rows,
             of_joint: step.iter().map(&mut of_joint).collect(),
         });
-        Scores {
+        BlockScores {
             blocks: blocks.collect(),
             at: row(0),
             step,
@@ -92,7 +92,7 @@ impl Factors {
             let joints = s.at.iter().zip(&s.step);
             joints.map(|(at, step)| DMatrix::from_rows(&[at.transpose(), step.transpose()]))
         });
-        let of_block = |s: &Scores, b: &BlockScore| -> Vec<i16> {
+        let of_block = |s: &BlockScores, b: &BlockScore| -> Vec<i16> {
             let joints = b.of_joint.iter().zip(&s.step);
             let pairs = joints.flat_map(|(scores, step)| scores.iter().zip(step.iter()));
             let kept = pairs.filter(|(_, step)| **step > 0.0);

@@ -16,7 +16,7 @@ use super::error::ReducedError;
 use super::factors::{Factors, Head};
 use super::reduced_log::{FrictionGiven, MadeWith, ReducedLog, ReducedLogs, ReducedRows};
 use crate::input::own_settings::{CutoffCosts, OwnSettings};
-use cft_ident_core::motion::{Skipped, Summary};
+use cft_ident_core::motion::{SkippedStretches, Summary};
 use cft_ident_logs::log::{Provenance, REDUCED, begins_with, escape, sha256_of_bytes};
 
 /// Number of the format.
@@ -96,7 +96,7 @@ impl SummaryHead {
             dt: self.dt,
             duration_s: self.duration_s,
             segments: self.segments,
-            skipped: Skipped {
+            skipped: SkippedStretches {
                 segments,
                 samples,
                 spans_s,
