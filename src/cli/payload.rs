@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, paths_of, written};
 use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
-use cft_ident_report::report::table::{Align, Table};
-use cft_ident_report::report::{Figure, FoundLine, Headline, Report, Tone};
+use cft_ident_report::report::table::{CellAlignment, Table};
+use cft_ident_report::report::{FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline};
 use cft_ident_stages::identify::{
     self, Dataset, IntervalNumber, Payload, PayloadReading, PayloadVerdict,
 };
@@ -73,7 +73,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     Ok(Outcome::new(
         report.text_for(context.screen),
-        Document::new("payload", &found.inputs, &found.warnings, &found)?,
+        JsonDocument::new("payload", &found.inputs, &found.warnings, &found)?,
     ))
 }
 
@@ -110,12 +110,12 @@ fn report(found: &Payload, logs: &str) -> Report {
         let value = reading.map(|of| format!("{} kg", shown(&of.mass)));
         value.unwrap_or(number::ABSENT.to_owned())
     };
-    let figure = |label, value| Figure {
+    let figure = |label, value| VerdictFigure {
         label,
         value,
-        tone: Tone::Plain,
+        tone: FigureTone::Plain,
     };
-    all.headline(Headline {
+    all.headline(VerdictHeadline {
         figures: vec![
             figure("mass", mass(false)),
             figure("with free gains", mass(true)),
@@ -241,10 +241,10 @@ fn tables(found: &Payload, logs: &str) -> [Table; 2] {
         escape(logs)
     );
     let mut table = Table::new(&[
-        ("", Align::Left),
-        ("gains as in the model", Align::Left),
-        ("gain errors free", Align::Left),
-        ("unit", Align::Left),
+        ("", CellAlignment::Left),
+        ("gains as in the model", CellAlignment::Left),
+        ("gain errors free", CellAlignment::Left),
+        ("unit", CellAlignment::Left),
     ])
     .caption(&caption);
     if let [as_given, free] = &found.readings[..] {
@@ -259,11 +259,11 @@ fn tables(found: &Payload, logs: &str) -> [Table; 2] {
         }
     }
     let mut errors = Table::new(&[
-        ("joint", Align::Left),
-        ("error before", Align::Decimal),
-        ("with the body", Align::Decimal),
-        ("and gains", Align::Decimal),
-        ("gain error", Align::Left),
+        ("joint", CellAlignment::Left),
+        ("error before", CellAlignment::Decimal),
+        ("with the body", CellAlignment::Decimal),
+        ("and gains", CellAlignment::Decimal),
+        ("gain error", CellAlignment::Left),
     ]);
     if let [as_given, free] = &found.readings[..] {
         for ((a, b), gain) in as_given.joints.iter().zip(&free.joints).zip(&free.gains) {

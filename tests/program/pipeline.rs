@@ -13,7 +13,7 @@ use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use cft_ident::simulate::cft::{excitation, follow};
-use cft_ident::simulate::{CftTruth, Sensors, Settings, SimulatedRun};
+use cft_ident::simulate::{CftTruth, PlantSensors, Settings, SimulatedRun};
 
 fn source(block: &Block) -> impl FnMut(&mut Block) -> Result<bool, Infallible> + '_ {
     move |out| {
@@ -59,7 +59,7 @@ fn noise_free_data_give_theta_within_a_thousandth() {
     let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
     let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let mut settings = Settings::new(30.0);
-    settings.sensors = Sensors::perfect();
+    settings.sensors = PlantSensors::perfect();
     let recording = follow(&truth, &[], excitation(LaboratorySetup::Tuedacs), &settings).unwrap();
     let fit = fitted(&robot, &truth, &recording);
     assert_eq!(fit.rank, 12);

@@ -24,7 +24,7 @@ use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::simulate::cft::{excitation_at_random_phase, follow, mechanism};
-use cft_ident::simulate::{CftTruth, OneJointMove, Sensors, Settings};
+use cft_ident::simulate::{CftTruth, OneJointMove, PlantSensors, Settings};
 use cft_ident::validate::TorqueReconstruction;
 use cft_ident::verdict::Verdict;
 use rand::{RngExt, SeedableRng};
@@ -177,7 +177,7 @@ fn campaign(seed: u64) -> Value {
     let true_model = model(truth.printed().to_vec(), truth.friction);
     let mut settings = noisy(20.0, 10 * seed + 6);
     let sensed = errors(&robot, &truth, &settings, &[&estimated, &true_model]);
-    settings.sensors = Sensors::perfect();
+    settings.sensors = PlantSensors::perfect();
     let clean = errors(&robot, &truth, &settings, &[&estimated, &true_model]);
     json!({
         "seed": seed, "joints": joints, "theta": theta,

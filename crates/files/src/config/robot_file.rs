@@ -327,15 +327,15 @@ pub struct RobotFile {
     pub sensors: SensorsSection,
     /// What was taken otherwise than it is written, one sentence each; commands tell it as warnings.
     #[serde(skip)]
-    pub notes: Notes,
+    pub notes: ReadingNotes,
 }
 
 /// Sentences about the reading of a file. They are no part of what it says: two files that say the same
 /// are equal, whatever was noted of them.
 #[derive(Debug, Clone, Default)]
-pub struct Notes(pub Vec<String>);
+pub struct ReadingNotes(pub Vec<String>);
 
-impl PartialEq for Notes {
+impl PartialEq for ReadingNotes {
     fn eq(&self, _: &Self) -> bool {
         true
     }

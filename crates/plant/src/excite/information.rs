@@ -14,14 +14,14 @@ use super::series::{Kinematics, Series};
 
 /// R factors of the rows of each joint along a motion.
 #[derive(Debug, Clone)]
-pub struct Information {
+pub struct InformationFactors {
     /// Upper triangles, p x p.
     pub joints: Vec<DMatrix<f64>>,
     /// Rows per joint.
     pub rows: u64,
 }
 
-impl Information {
+impl InformationFactors {
     /// Of whole periods of a series, at `samples` equal steps of one period.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::robot::RobotError;
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::tree::pose::{Frame, frames};
-use cft_ident_files::config::trajectory::Coordinates;
+use cft_ident_files::config::trajectory::TrajectoryCoordinates;
 
 use super::foreseen::TorqueSource;
 use super::limits::{BoundedQuantity, Quantity};
@@ -63,7 +63,7 @@ impl State {
 
 /// Friction and signs of one instant as straight lines in the velocities, so that differences do not meet their bends.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Linearised {
+pub(super) struct LinearisedFriction {
     friction: [(f64, f64); MAX_COORDINATES],
     sign: [(f64, f64); MAX_COORDINATES],
     v: [f64; MAX_COORDINATES],
@@ -86,10 +86,10 @@ impl ForeseenRobot {
     }
 
     /// The coordinates in which motions of this machine are designed.
-    pub fn designed(&self) -> Coordinates {
+    pub fn designed(&self) -> TrajectoryCoordinates {
         match self.mechanism.motors_at_joints() {
-            true => Coordinates::Joint,
-            false => Coordinates::Cartesian,
+            true => TrajectoryCoordinates::Joint,
+            false => TrajectoryCoordinates::Cartesian,
         }
     }
 
@@ -199,8 +199,8 @@ impl ForeseenRobot {
     }
 
     /// Friction and signs at the velocities of a state.
-    pub(super) fn linearised(&self, state: &State) -> Linearised {
-        let mut out = Linearised {
+    pub(super) fn linearised(&self, state: &State) -> LinearisedFriction {
+        let mut out = LinearisedFriction {
             friction: [(0.0, 0.0); MAX_COORDINATES],
             sign: [(0.0, 0.0); MAX_COORDINATES],
             v: state.v,
@@ -223,7 +223,7 @@ impl ForeseenRobot {
     pub(super) fn rows(
         &self,
         state: &mut State,
-        line: &Linearised,
+        line: &LinearisedFriction,
         torques: bool,
         y: &mut [f64],
     ) -> Result<(), RobotError> {
@@ -281,8 +281,8 @@ impl ForeseenRobot {
 
     /// What channels bound at a state.
     #[inline]
-    pub fn quantities<'a>(&'a self, state: &'a State) -> Quantities<'a> {
-        Quantities {
+    pub fn quantities<'a>(&'a self, state: &'a State) -> BoundQuantities<'a> {
+        BoundQuantities {
             machine: self,
             state,
             frames: OnceCell::new(),
@@ -293,7 +293,7 @@ impl ForeseenRobot {
 
 /// What channels bound at one state.
 #[derive(Debug)]
-pub struct Quantities<'a> {
+pub struct BoundQuantities<'a> {
     machine: &'a ForeseenRobot,
     state: &'a State,
     frames: OnceCell<Vec<Frame>>,
@@ -301,7 +301,7 @@ pub struct Quantities<'a> {
     half_widths: OnceCell<[[f64; MAX_COORDINATES]; 2]>,
 }
 
-impl Quantities<'_> {
+impl BoundQuantities<'_> {
     /// How far the quantity of a channel may be off, 95 % of the time.
     #[inline]
     pub fn half_width(&self, channel: &BoundedQuantity) -> f64 {

@@ -3,13 +3,13 @@
 use rand::RngExt;
 
 use super::SimulateError;
-use super::chance::{Purpose, stream};
-use super::effects::{EffectSpec, EffectValue, Effects, Sites};
+use super::chance::{ChancePurpose, stream};
+use super::effects::{EffectSpec, EffectValue, PlantEffects, RobotSites};
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
 use super::plant::Plant;
-use super::reference::{Fourier, Path, Reference, ReferenceFrame};
-use super::run::{MotorInput, Start, run};
+use super::reference::{FourierReference, Path, Reference, ReferenceFrame};
+use super::run::{MotionStart, MotorInput, run};
 use super::settings::Settings;
 use super::simulated_run::SimulatedRun;
 use cft_ident_core::robot::Robot;
@@ -48,7 +48,7 @@ impl CftTruth {
     /// # Errors
     /// [`SimulateError::NotPositiveDefinite`] when no draw of a thousand is.
     pub fn varied(&self, spread: f64, seed: u64) -> Result<Self, SimulateError> {
-        let mut chance = stream(seed, Purpose::Plant);
+        let mut chance = stream(seed, ChancePurpose::Plant);
         let mut draw = || {
             let mut near = |x: f64| x * (1.0 + spread * chance.random_range(-1.0..=1.0));
             let mut drawn = *self;
@@ -95,15 +95,15 @@ pub fn mechanism(setup: LaboratorySetup) -> Result<Mechanism<4>, SimulateError> 
 
 /// The Table 3 run on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
 pub fn excitation(setup: LaboratorySetup) -> Reference<4> {
-    excitation_of(Fourier::of(&practice::of(setup).excitation))
+    excitation_of(FourierReference::of(&practice::of(setup).excitation))
 }
 
 /// [`excitation`], begun anywhere in its period.
 pub fn excitation_at_random_phase(setup: LaboratorySetup, seed: u64) -> Reference<4> {
-    excitation_of(Fourier::of(&practice::of(setup).excitation).at_random_phase(seed))
+    excitation_of(FourierReference::of(&practice::of(setup).excitation).at_random_phase(seed))
 }
 
-fn excitation_of(series: Fourier<4>) -> Reference<4> {
+fn excitation_of(series: FourierReference<4>) -> Reference<4> {
     let (frame, path) = (ReferenceFrame::Motors, Path::Fourier(series));
     Reference { frame, path }
 }
@@ -112,8 +112,8 @@ fn excitation_of(series: Fourier<4>) -> Reference<4> {
 pub fn effects(
     truth: &CftTruth,
     specs: &[EffectSpec],
-) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
-    Effects::build(specs, &Sites::of(&truth.plant()?)?)
+) -> Result<(PlantEffects, Vec<EffectValue>), SimulateError> {
+    PlantEffects::build(specs, &RobotSites::of(&truth.plant()?)?)
 }
 
 /// Runs a reference with the default gains, from the settled start.
@@ -125,10 +125,10 @@ pub fn follow(
 ) -> Result<SimulatedRun<4>, SimulateError> {
     let plant = truth.plant()?;
     plant.check()?;
-    let (effects, _) = Effects::build(specs, &Sites::of(&plant)?)?;
+    let (effects, _) = PlantEffects::build(specs, &RobotSites::of(&plant)?)?;
     let control = plant.control();
     let drive = MotorInput::Follow { reference, control };
-    run(&plant, effects, &Start::Settled, &drive, settings)
+    run(&plant, effects, &MotionStart::Settled, &drive, settings)
 }
 
 #[cfg(test)]

@@ -4,10 +4,10 @@ use cft_ident_core::robot::cft::geometry::{GRAVITY, L4, L6, U};
 use cft_ident_core::robot::cft::{LaboratorySetup, ReportCoefficients, dynamics};
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
-use cft_ident_plant::simulate::integrate::{DormandPrince, System, Tolerance};
-use cft_ident_plant::simulate::moving::Moving;
+use cft_ident_plant::simulate::integrate::{DormandPrince, OdeSystem, StepTolerance};
+use cft_ident_plant::simulate::moving::MovingPlant;
 use cft_ident_plant::simulate::{
-    CftTruth, Effects, OneJointMove, Plant, Sensors, Settings, SimulatedRun,
+    CftTruth, OneJointMove, Plant, PlantEffects, PlantSensors, Settings, SimulatedRun,
 };
 use serde_json::Value;
 
@@ -19,10 +19,10 @@ const FREE: DoubleTanh = DoubleTanh {
     slope_2: 1.0,
 };
 
-fn moving(plant: &Plant<4>, volts: [f64; 4]) -> Moving<'_, 4> {
-    Moving {
+fn moving(plant: &Plant<4>, volts: [f64; 4]) -> MovingPlant<'_, 4> {
+    MovingPlant {
         plant,
-        effects: Effects::default(),
+        effects: PlantEffects::default(),
         volts,
     }
 }
@@ -104,7 +104,7 @@ fn energy_is_conserved_without_friction_and_volts() {
     };
     let (q, v) = split(&y);
     let start = energy(&q, &v, &theta);
-    let mut integrator = DormandPrince::new(Tolerance::default());
+    let mut integrator = DormandPrince::new(StepTolerance::default());
     let mut exchanged: f64 = 0.0;
     for k in 0..5000 {
         let t = 1e-3 * f64::from(k);
@@ -127,8 +127,8 @@ fn energy_is_conserved_without_friction_and_volts() {
 
 #[test]
 fn friction_and_volts_change_the_energy_by_their_work() {
-    struct Powered<'a>(Moving<'a, 4>, [DoubleTanh; 4]);
-    impl System<16> for Powered<'_> {
+    struct Powered<'a>(MovingPlant<'a, 4>, [DoubleTanh; 4]);
+    impl OdeSystem<16> for Powered<'_> {
         fn rates(&self, t: f64, y: &[f64; 16], dydt: &mut [f64; 16]) {
             self.0.rates(t, y, dydt);
             let q = std::array::from_fn(|i| y[i]);
@@ -152,7 +152,7 @@ fn friction_and_volts_change_the_energy_by_their_work() {
         )
     };
     let start = at(&y);
-    let mut integrator = DormandPrince::new(Tolerance::default());
+    let mut integrator = DormandPrince::new(StepTolerance::default());
     integrator
         .advance(&mut system, 0.0, 0.5, &mut y)
         .expect("smooth");
@@ -182,7 +182,7 @@ fn difference(a: &SimulatedRun<4>, b: &SimulatedRun<4>) -> (f64, f64) {
 fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
     let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     for number in 0..5 {
-        let with = |tolerance: Tolerance| {
+        let with = |tolerance: StepTolerance| {
             let reference = if number < 4 {
                 OneJointMove::new(number, 20.0, None)
                     .reference(&mechanism(truth.setup).expect("four joints"))
@@ -193,19 +193,19 @@ fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
             // Without quantisation: a count that tips over elsewhere is no error of integration.
             let settings = Settings {
                 tolerance,
-                sensors: Sensors::perfect(),
+                sensors: PlantSensors::perfect(),
                 ..Settings::new(20.0)
             };
             follow(&truth, &[], reference, &settings).expect("runs")
         };
-        let normal = with(Tolerance::default());
-        let (q, v) = difference(&normal, &with(Tolerance::default().scaled(0.5)));
+        let normal = with(StepTolerance::default());
+        let (q, v) = difference(&normal, &with(StepTolerance::default().scaled(0.5)));
         println!("experiment {number}: q {q:.1e}, v {v:.1e}");
         assert!(
             q < 1e-9 && v < 1e-7,
             "halved tolerance, experiment {number}: q {q}, v {v}"
         );
-        let (q, v) = difference(&normal, &with(Tolerance::default().scaled(1e-3)));
+        let (q, v) = difference(&normal, &with(StepTolerance::default().scaled(1e-3)));
         println!("experiment {number}: q {q:.1e}, v {v:.1e} to the thousandth of it");
         assert!(
             q < 2e-9 && v < 2e-7,
@@ -222,7 +222,7 @@ fn runge_kutta_with_a_bounded_step_agrees_through_the_stiff_reversal() {
     let start = [0.2, 0.3, -0.9, 1.9, 0.02, 0.1, 0.1, -0.1];
     let mut system = moving(&plant, [-0.5, 0.0, -0.2, -0.9]);
     let mut adaptive = start;
-    let mut integrator = DormandPrince::new(Tolerance::default());
+    let mut integrator = DormandPrince::new(StepTolerance::default());
     for k in 0..300 {
         let t = 1e-3 * f64::from(k);
         integrator

@@ -5,8 +5,8 @@ use cft_ident_core::robot::cft::{LaboratorySetup, pantograph};
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::{
-    CftTruth, Effects, MotorInput, MotorStatus, Path, Reference, ReferenceFrame, RunEnding,
-    Sensors, Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
+    CftTruth, MotionStart, MotorInput, MotorStatus, Path, PlantEffects, PlantSensors, Reference,
+    ReferenceFrame, RunEnding, Settings, SimulateError, SimulatedRun, VoltSeries, run,
 };
 use cft_ident_plant::simulate::{OneJointMove, SingleJointTruth, SmoothFriction};
 
@@ -22,26 +22,26 @@ fn constant(volts: [f64; 4]) -> MotorInput<4> {
 
 fn perfect(seconds: f64) -> Settings<4> {
     Settings {
-        sensors: Sensors::perfect(),
+        sensors: PlantSensors::perfect(),
         ..Settings::new(seconds)
     }
 }
 
-fn at_rest(position: [f64; 4]) -> Start<4> {
-    Start::State {
+fn at_rest(position: [f64; 4]) -> MotionStart<4> {
+    MotionStart::State {
         position,
         speed: [0.0; 4],
     }
 }
 
 fn play(
-    start: &Start<4>,
+    start: &MotionStart<4>,
     drive: &MotorInput<4>,
     settings: &Settings<4>,
 ) -> Result<SimulatedRun<4>, SimulateError> {
     run(
         &truth().plant().expect("a pose"),
-        Effects::default(),
+        PlantEffects::default(),
         start,
         drive,
         settings,
@@ -52,7 +52,7 @@ fn play(
 fn eight_initial_conditions_come_back_in_the_first_row() {
     let position = [-0.2, 0.15, 1.3, 0.4];
     let speed = [0.02, -0.03, 0.4, -0.1];
-    let start = Start::State { position, speed };
+    let start = MotionStart::State { position, speed };
     let recording = play(&start, &constant([0.0; 4]), &perfect(0.01)).expect("runs");
     let (q, v) = (recording.actual.q[0], recording.actual.v[0]);
     for i in 0..4 {
@@ -86,7 +86,7 @@ fn robot_at_rest_without_gravity_load_and_volts_stays_at_rest() {
     let start = at_rest([-0.13, 0.27, 2.8, 0.2]);
     let recording = run(
         &plant,
-        Effects::default(),
+        PlantEffects::default(),
         &start,
         &constant([0.0; 4]),
         &perfect(1.0),
@@ -199,7 +199,7 @@ fn logged_volts_played_back_repeat_the_motion() {
     )
     .expect("runs");
     let series = VoltSeries::new(first.t.clone(), first.volts.clone()).expect("a series");
-    let start = Start::State {
+    let start = MotionStart::State {
         position: first.x[0],
         speed: [0.0; 4],
     };
@@ -257,7 +257,7 @@ fn unusable_starts_settings_and_volts_are_errors_with_the_way_out() {
             Err(SimulateError::Volts { .. })
         ));
     }
-    let wild = Start::State {
+    let wild = MotionStart::State {
         position: [-0.1, 0.2, 2.0, 0.1],
         speed: [1e9, 0.0, 0.0, 0.0],
     };
@@ -305,12 +305,12 @@ fn single_joint_follows_its_equation_exactly() {
     joint.check().expect("physical");
     let drive =
         MotorInput::Volts(VoltSeries::new(vec![0.0, 10.0], vec![[1.0]; 2]).expect("a series"));
-    let start = Start::State {
+    let start = MotionStart::State {
         position: [0.0],
         speed: [0.0],
     };
     let settings = Settings::new(2.0);
-    let recording = run(&joint, Effects::default(), &start, &drive, &settings).expect("runs");
+    let recording = run(&joint, PlantEffects::default(), &start, &drive, &settings).expect("runs");
     for (t, v) in recording.t.iter().zip(&recording.actual.v) {
         let exact = 38.0 / 200.0 * (1.0 - (-200.0 * t / 95.0).exp());
         assert!((v[0] - exact).abs() < 1e-9, "{} for {exact}", v[0]);
@@ -333,7 +333,7 @@ fn dry_friction_holds_a_single_joint_below_its_breakaway() {
         let drive = MotorInput::Volts(
             VoltSeries::new(vec![0.0, 10.0], vec![[force]; 2]).expect("a series"),
         );
-        let start = Start::State {
+        let start = MotionStart::State {
             position: [0.0],
             speed: [0.0],
         };
@@ -341,7 +341,8 @@ fn dry_friction_holds_a_single_joint_below_its_breakaway() {
             saturation: f64::INFINITY,
             ..Settings::new(1.0)
         };
-        let recording = run(&joint, Effects::default(), &start, &drive, &settings).expect("runs");
+        let recording =
+            run(&joint, PlantEffects::default(), &start, &drive, &settings).expect("runs");
         recording.actual.q.last().expect("rows")[0]
     };
     assert!(travelled(15.0) < 2e-4, "{}", travelled(15.0));

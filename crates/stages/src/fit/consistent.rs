@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::estimate::Estimated;
+use super::estimate::InertialEstimate;
 use crate::input::error::IdentifyError;
 use crate::input::logged_robot::LoggedRobot;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
@@ -167,7 +167,7 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
 /// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached.
 pub(crate) fn consistent(
     machine: &LoggedRobot,
-    estimated: &Estimated,
+    estimated: &InertialEstimate,
     fastest: &[f64],
 ) -> Result<ConsistentLinks, IdentifyError> {
     let map = machine.robot.standard_map();

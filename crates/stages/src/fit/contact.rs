@@ -4,7 +4,7 @@ use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
-use crate::input::passes::{Passes, PositionFilter};
+use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::unknowns::{FittedUnknown, columns};
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::columns::RegressorColumns;
@@ -30,12 +30,12 @@ pub(crate) fn contacts(
         return Ok(Vec::new());
     }
     let own = machine.own_settings(logs, &[], control)?;
-    let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
+    let mut passes = LogPasses::new(machine, logs, control).each_by_itself(own);
     passes.read(PositionFilter::Declared, &columns(machine, None), None)?;
     passes.contacts()
 }
 
-impl Passes<'_> {
+impl LogPasses<'_> {
     /// The stretches that the first reading found, one sentence each.
     pub(crate) fn contacts(&self) -> Result<Vec<String>, IdentifyError> {
         let shown = |(log, jump): &(usize, ResidualJump)| {
@@ -83,8 +83,11 @@ pub(crate) fn hangs_on_bridged(
         return Ok(None);
     }
     let kept = machine.keeping(RowFault::Spike);
-    let mut passes =
-        Passes::new(&kept, logs, control).each_by_itself(kept.own_settings(logs, &[], control)?);
+    let mut passes = LogPasses::new(&kept, logs, control).each_by_itself(kept.own_settings(
+        logs,
+        &[],
+        control,
+    )?);
     let as_logged = passes.read(PositionFilter::Declared, linear, None)?;
     let (Ok(now), Ok(other)) = (
         fit(rows, RowWeighting::Wls),

@@ -177,14 +177,14 @@ pub fn friction(
 }
 
 /// Logs by the joint that they move, with their inputs and warnings.
-type Grouped = (BTreeMap<usize, Group>, Vec<Provenance>, Vec<String>);
+type LogsByJoint = (BTreeMap<usize, JointLogs>, Vec<Provenance>, Vec<String>);
 
 fn by_joint(
     machine: &LoggedRobot,
     logs: &[Log],
     settings: &FrictionSettings,
     control: &Control,
-) -> Result<Grouped, IdentifyError> {
+) -> Result<LogsByJoint, IdentifyError> {
     let names = machine.robot.joint_names();
     let place = |name: &String| {
         let found = names.iter().position(|n| n == name);
@@ -196,7 +196,7 @@ fn by_joint(
     let named = settings.joint.as_ref().map(place).transpose()?;
     let _work = control.begin("reading logs", None);
     let ranges = machine.ranges();
-    let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
+    let mut groups: BTreeMap<usize, JointLogs> = BTreeMap::new();
     let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
         let OneJointLog {
@@ -229,7 +229,7 @@ fn by_joint(
 
 /// Logs of one joint.
 #[derive(Default)]
-struct Group {
+struct JointLogs {
     motions: Vec<SmoothedMotion>,
     narrower: Vec<SmoothedMotion>,
     zero_order_hold: bool,
@@ -240,7 +240,7 @@ struct Group {
 fn one_joint(
     machine: &LoggedRobot,
     j: usize,
-    group: &Group,
+    group: &JointLogs,
     parameter_names: &[String],
 ) -> Result<JointEstimate, IdentifyError> {
     let name = &machine.robot.joint_names()[j];

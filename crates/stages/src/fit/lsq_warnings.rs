@@ -1,6 +1,6 @@
 //! What a fit warns of.
 
-use super::estimate::Account;
+use super::estimate::EstimatorAccount;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::unknowns::FittedUnknown;
 use cft_ident_core::inertia::instruments::ReferenceSource;
@@ -22,7 +22,7 @@ pub(crate) fn with_friction(law: bool) -> &'static str {
     }
 }
 
-impl Account {
+impl EstimatorAccount {
     /// What did not come as it should, as warnings.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();

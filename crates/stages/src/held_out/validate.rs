@@ -12,7 +12,7 @@ use crate::input::in_memory::read_whole;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::refined;
-use crate::input::of_robot::{Beyond, Places};
+use crate::input::of_robot::{JointRanges, TorquePeaks};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::ReducedLog;
@@ -192,8 +192,8 @@ fn errors_of(
     let band = Band::new(file, &refined.model).filter(|_| rows);
     let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
-    let mut places = Places::new(&machine);
-    let mut beyond = Beyond::new(machine.robot.joints());
+    let mut places = JointRanges::new(&machine);
+    let mut beyond = TorquePeaks::new(machine.robot.joints());
     let mut seen = |r: &ReconstructedRow, origin: Instant| {
         places.take(r.q);
         beyond.take(r, origin);

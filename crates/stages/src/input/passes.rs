@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::control::{Control, Work};
+use super::control::{Control, ControlledWork};
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
@@ -46,11 +46,11 @@ pub(crate) enum PositionFilter {
 }
 
 /// Readings of the same logs, one after the other.
-pub struct Passes<'a> {
+pub struct LogPasses<'a> {
     pub(crate) machine: &'a LoggedRobot,
     pub(crate) logs: &'a [Log],
     pub(crate) control: &'a Control,
-    pub(crate) work: Work,
+    pub(crate) work: ControlledWork,
     pub inputs: Vec<Provenance>,
     pub warnings: Vec<String>,
     /// Stretches in which something pushes the robot, by the places of the logs, by the first reading.
@@ -69,9 +69,9 @@ pub struct Passes<'a> {
     order: Vec<usize>,
 }
 
-impl<'a> Passes<'a> {
+impl<'a> LogPasses<'a> {
     pub fn new(machine: &'a LoggedRobot, logs: &'a [Log], control: &'a Control) -> Self {
-        Passes {
+        LogPasses {
             machine,
             logs,
             control,
@@ -90,7 +90,7 @@ impl<'a> Passes<'a> {
 
     /// The same with the rests and the smoothing that each log calls for by itself.
     pub(crate) fn each_by_itself(self, own: Vec<OwnSettings>) -> Self {
-        Passes { own, ..self }
+        LogPasses { own, ..self }
     }
 
     /// Samples at standstill of these joints count from here on; not where logs were reduced without them.

@@ -168,7 +168,7 @@ pub(crate) fn known(model: &Model) -> Vec<Option<JointFriction>> {
 }
 
 /// Opens a log for its positions.
-type Open<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
+type LogOpener<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
 
 impl LoggedRobot {
     /// The same robot with the position cut-offs that its logs call for; a law is none where it is not known.
@@ -211,7 +211,7 @@ impl LoggedRobot {
         logs: &[Log],
         laws: &[Option<JointFriction>],
         rest_speed: &[f64],
-        open: Open,
+        open: LogOpener,
     ) -> Result<LoggedRobot, IdentifyError> {
         if !self.finds_cutoffs() {
             return Ok(self.clone());
@@ -311,7 +311,7 @@ impl LoggedRobot {
         logs: &[Log],
         laws: &[Option<JointFriction>],
         rest_speed: &[f64],
-        open: Open,
+        open: LogOpener,
     ) -> Result<CutoffCosts, IdentifyError> {
         let settings = self.settings();
         let raw = FilterSettings {

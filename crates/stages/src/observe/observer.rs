@@ -16,7 +16,7 @@ const NODES: usize = 4;
 
 /// External torques of one sample; what they are of lies [`Observer::delay_s`] before its time.
 #[derive(Debug, Clone, Copy)]
-pub struct Observed<'a> {
+pub struct ExternalTorques<'a> {
     /// Time of the newest row \[s\].
     pub t: f64,
     /// \[N or Nm\]
@@ -38,17 +38,17 @@ pub struct Observer {
     model: AugmentedModel,
     uncertain: Option<Directions>,
     cutoff_hz: f64,
-    core: Option<Core>,
+    core: Option<ObserverCore>,
     first: Option<f64>,
     temperatures: JointTemperatures,
 }
 
-struct Core {
+struct ObserverCore {
     plant: SampledModel,
     smooth: CausalSections,
     settle: usize,
     delay_s: f64,
-    late: Option<Late>,
+    late: Option<TorqueDelay>,
     /// Samples since the stretch began.
     count: usize,
     tau: Vec<f64>,
@@ -58,7 +58,7 @@ struct Core {
 }
 
 /// Torques of the last samples, where the model's come late or early.
-pub(super) struct Late {
+pub(super) struct TorqueDelay {
     /// Samples by which the torque of each joint is late.
     pub by: Vec<f64>,
     /// Samples that are waited for.
@@ -113,7 +113,7 @@ impl Observer {
         &mut self,
         rows: &Block,
         last: bool,
-        out: &mut dyn FnMut(&Observed),
+        out: &mut dyn FnMut(&ExternalTorques),
     ) -> Result<(), MotionError> {
         self.first = self.first.or(rows.t.first().copied());
         let first = self.first.unwrap_or(0.0);
@@ -125,7 +125,7 @@ impl Observer {
                 return;
             }
             if core.is_none() {
-                match Core::design(model, cutoff, dt) {
+                match ObserverCore::design(model, cutoff, dt) {
                     Ok(designed) => *core = Some(designed),
                     Err(error) => failed = Some(error),
                 }
@@ -140,11 +140,11 @@ impl Observer {
     }
 }
 
-impl Core {
+impl ObserverCore {
     fn design(model: &AugmentedModel, cutoff_hz: f64, dt: f64) -> Result<Self, MotionError> {
         let n = model.model.robot.joints();
         let sos = SosFilter::butterworth(ORDER, cutoff_hz, 1.0 / dt)?;
-        let late = Late::of(model, dt);
+        let late = TorqueDelay::of(model, dt);
         let lead = late.as_ref().map_or(0, |late| late.lead);
         Ok(Self {
             plant: SampledModel::new(model.clone(), dt),
@@ -165,7 +165,7 @@ impl Core {
         sample: &MotionSample,
         begins: bool,
         uncertain: &mut Option<Directions>,
-        out: &mut dyn FnMut(&Observed),
+        out: &mut dyn FnMut(&ExternalTorques),
     ) {
         let n = self.tau.len();
         if begins {
@@ -201,7 +201,7 @@ impl Core {
         if let Some(directions) = uncertain {
             directions.variances(motion, &mut self.variance);
         }
-        out(&Observed {
+        out(&ExternalTorques {
             t: sample.t,
             external: &self.row[..n],
             speed: &self.row[n..],
@@ -214,12 +214,12 @@ impl Core {
     }
 }
 
-impl Late {
+impl TorqueDelay {
     /// For the shifts of a model; none where it has none.
     pub(super) fn of(model: &AugmentedModel, dt: f64) -> Option<Self> {
         let joints = 0..model.model.robot.joints();
         let by: Vec<f64> = joints.map(|j| model.shift(j) / dt).collect();
-        by.iter().any(|d| *d != 0.0).then(|| Late::new(by))
+        by.iter().any(|d| *d != 0.0).then(|| TorqueDelay::new(by))
     }
 
     fn new(by: Vec<f64>) -> Self {
@@ -300,7 +300,7 @@ mod tests {
     fn check(model: AugmentedModel, late: f64) -> f64 {
         let mut observer = Observer::new(model, &FilterSettings::default()).unwrap();
         let mut found = Vec::new();
-        let push = &mut |o: &Observed| found.push((o.t, o.external[0]));
+        let push = &mut |o: &ExternalTorques| found.push((o.t, o.external[0]));
         observer.push(&rows(late), true, push).unwrap();
         let delay = observer.delay_s().unwrap();
         for (t, x) in &found {

@@ -1,6 +1,6 @@
 //! An observer for one sampling step as numbers, for generated code.
 
-use super::observer::{Late, ORDER, SETTLED};
+use super::observer::{ORDER, SETTLED, TorqueDelay};
 use crate::band::{Direction, Directions};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::math::causal::delay_samples;
@@ -10,7 +10,7 @@ pub use cft_ident_export::export::recipe::ObserverRecipe;
 use cft_ident_export::export::recipe::{
     DelayRecipe as LateOf, FilterCascade, ParameterDeviation, UntouchedTorques,
 };
-use cft_ident_files::config::held_out::{Excesses, HeldOut};
+use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 
 fn cascade(sos: Option<&SosFilter>, settle: usize) -> FilterCascade {
     let flat = |s: &Section| [s.b[0], s.b[1], s.b[2], s.a[0], s.a[1]];
@@ -30,7 +30,7 @@ fn cascade(sos: Option<&SosFilter>, settle: usize) -> FilterCascade {
 pub fn recipe(
     (model, uncertain): (&AugmentedModel, &Directions),
     settings: &FilterSettings,
-    (held, excesses): (&[HeldOut], &Excesses),
+    (held, excesses): (&[HeldOut], &TorqueExcesses),
     step_s: f64,
     per_hour: f64,
 ) -> Result<ObserverRecipe, MotionError> {
@@ -40,7 +40,7 @@ pub fn recipe(
         delay_s,
     } = CausalFilter::design(settings, step_s)?;
     let smooth = SosFilter::butterworth(ORDER, settings.cutoff_hz, 1.0 / step_s)?;
-    let late = Late::of(model, step_s);
+    let late = TorqueDelay::of(model, step_s);
     let lead = late.as_ref().map_or(0, |late| late.lead);
     let threshold = excesses.threshold(per_hour);
     let untouched = |held: &HeldOut| UntouchedTorques {

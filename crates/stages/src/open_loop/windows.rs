@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::stepper::Stepper;
+use super::stepper::ModelStepper;
 use cft_ident_core::effect::{AugmentedModel, shifted};
 use cft_ident_core::motion::Stretch;
 
@@ -71,7 +71,7 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
         if size < MIN_WINDOW_SAMPLES {
             continue;
         }
-        let mut follower = Follower::new(model, stretch, STEP_S);
+        let mut follower = TorqueFollower::new(model, stretch, STEP_S);
         // the last sample of a window is the first of the next
         let begins = (0..).step_by(size - 1);
         for begin in begins.take_while(|begin| begin + size <= stretch.len()) {
@@ -116,8 +116,8 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
 }
 
 /// A model that follows the torques of a stretch.
-pub(super) struct Follower<'a> {
-    stepper: Stepper,
+pub(super) struct TorqueFollower<'a> {
+    stepper: ModelStepper,
     stretch: &'a Stretch,
     /// Torques where they move the model: one that comes late is logged later.
     tau: Vec<Vec<f64>>,
@@ -125,7 +125,7 @@ pub(super) struct Follower<'a> {
     parts: f64,
 }
 
-impl<'a> Follower<'a> {
+impl<'a> TorqueFollower<'a> {
     /// By steps of at most so many seconds.
     pub fn new(model: &AugmentedModel, stretch: &'a Stretch, step_s: f64) -> Self {
         let mut tau = stretch.tau.clone();
@@ -134,7 +134,7 @@ impl<'a> Follower<'a> {
         }
         let parts = (stretch.dt / step_s).ceil().max(1.0);
         Self {
-            stepper: Stepper::new(model, stretch.dt / parts),
+            stepper: ModelStepper::new(model, stretch.dt / parts),
             stretch,
             tau,
             parts,

@@ -1,7 +1,7 @@
 //! One effect along logs: the residual of the model that is fitted without it over the signal on which it depends, and
 //! what the model with it explains of that.
 
-use super::Replay;
+use super::LogReplay;
 use cft_ident_core::effect::empirical::ways;
 use cft_ident_core::effect::{AugmentedModel, CurveSignal, Family, ModelEffect, Role, ShapeSearch};
 use cft_ident_core::motion::{MotionError, Stretch};
@@ -24,7 +24,7 @@ pub struct EffectRows {
 }
 
 pub(super) fn effect(
-    replay: &Replay,
+    replay: &LogReplay,
     (model, without): (&AugmentedModel, &AugmentedModel),
     at: usize,
     logs: &[usize],
@@ -53,7 +53,7 @@ pub(super) fn effect(
 
 /// The rows of an effect: at its joint, or where it adds the most.
 fn rows(
-    replay: &Replay,
+    replay: &LogReplay,
     (model, without): (&AugmentedModel, &AugmentedModel),
     at: usize,
     logs: &[usize],
@@ -147,7 +147,7 @@ impl OfSignal {
         }
     }
 
-    fn named(self, replay: &Replay, effect: &ModelEffect, joint: usize) -> (String, String) {
+    fn named(self, replay: &LogReplay, effect: &ModelEffect, joint: usize) -> (String, String) {
         let robot = &replay.machine.robot;
         let unit = |j: usize| robot.joint_kind(j).position_unit();
         let torque = replay.machine.file.torque_unit(joint);

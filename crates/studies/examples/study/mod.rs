@@ -15,7 +15,7 @@ use cft_ident::identify::narrowed;
 use cft_ident::log::Block;
 use cft_ident::motion::FilterSettings as Processing;
 use cft_ident::robot::Robot;
-use cft_ident::simulate::reference::Fourier;
+use cft_ident::simulate::reference::FourierReference;
 use cft_ident::simulate::{
     Noise, Path as Motion, Reference, ReferenceFrame, Settings, SimulatedRun,
 };
@@ -130,7 +130,7 @@ pub fn noisy(seconds: f64, seed: u64) -> Settings<4> {
 }
 
 /// A Fourier series that comes with the tool.
-pub fn series(file: &str) -> Fourier<4> {
+pub fn series(file: &str) -> FourierReference<4> {
     let Ok(Trajectory::Fourier(file)) = Trajectory::load(Path::new(file)) else {
         panic!("{file} comes with the tool");
     };
@@ -140,8 +140,8 @@ pub fn series(file: &str) -> Fourier<4> {
             .map(|l| std::array::from_fn(|i| columns[i][l]))
             .collect()
     };
-    let usual = Fourier::table_3();
-    Fourier {
+    let usual = FourierReference::table_3();
+    FourierReference {
         offset: std::array::from_fn(|i| file.series[i].offset),
         a: column(&|i| file.series[i].a.clone()),
         b: column(&|i| file.series[i].b.clone()),
@@ -153,7 +153,7 @@ pub fn series(file: &str) -> Fourier<4> {
 }
 
 /// A series in motor coordinates as a reference.
-pub fn along(series: Fourier<4>) -> Reference<4> {
+pub fn along(series: FourierReference<4>) -> Reference<4> {
     Reference {
         frame: ReferenceFrame::Motors,
         path: Motion::Fourier(series),

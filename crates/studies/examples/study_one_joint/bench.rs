@@ -12,8 +12,8 @@ use cft_ident::robot::{JointKind, Robot};
 use cft_ident::simulate::reference::{LadderPlan, Path, ReferenceFrame, TURN};
 use cft_ident::simulate::run::run;
 use cft_ident::simulate::{
-    Effects, MotorInput, Noise, Reference, Settings, SimulatedRun, SingleJointTruth,
-    SmoothFriction, Start,
+    MotionStart, MotorInput, Noise, PlantEffects, Reference, Settings, SimulatedRun,
+    SingleJointTruth, SmoothFriction,
 };
 use rand::{RngExt, SeedableRng};
 
@@ -141,8 +141,8 @@ fn ladder(
     settings.sensors.torque_noise = Noise::Relative(0.01);
     run(
         &plant,
-        Effects::default(),
-        &Start::Settled,
+        PlantEffects::default(),
+        &MotionStart::Settled,
         &drive,
         &settings,
     )

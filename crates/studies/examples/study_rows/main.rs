@@ -26,7 +26,7 @@ use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::simulate::cft::follow;
-use cft_ident::simulate::reference::{Fourier, Points};
+use cft_ident::simulate::reference::{FourierReference, SplineReference};
 use cft_ident::simulate::{CftTruth, Path as Motion, Reference, ReferenceFrame, SimulatedRun};
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -49,7 +49,7 @@ fn main() {
     summarise(&rows, &folder);
 }
 
-fn slowed(mut of: Fourier<4>, factor: f64) -> Fourier<4> {
+fn slowed(mut of: FourierReference<4>, factor: f64) -> FourierReference<4> {
     of.fundamental *= factor;
     for x in of.a.iter_mut().chain(&mut of.b).flatten() {
         *x *= factor;
@@ -82,7 +82,7 @@ fn points(seed: u64) -> Reference<4> {
     }
     Reference {
         frame: ReferenceFrame::Motors,
-        path: Motion::Points(Points::new(&list).expect("times increase")),
+        path: Motion::Points(SplineReference::new(&list).expect("times increase")),
     }
 }
 

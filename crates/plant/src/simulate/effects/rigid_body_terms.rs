@@ -2,7 +2,7 @@
 //!
 //! M, C and G are linear in the parameters, so the ten alone make the inertia and the torque that are added.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::rigid_body_terms::ENTRY;
 use cft_ident_core::robot::cft::dynamics::{ReportCoefficients, inertia_and_bias};
 
@@ -26,7 +26,7 @@ pub static LAW: PlantLaw = PlantLaw {
             *own = *value;
         }
         let terms = ReportCoefficients::from_theta22(&theta);
-        Built::inertia(move |motion, mass, torque| {
+        BuiltLaw::inertia(move |motion, mass, torque| {
             let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
                 return;
             };

@@ -15,12 +15,12 @@ const SLIDING_SPEED: f64 = 0.2;
 const TURNING_SPEED: f64 = 0.5;
 /// Middling speed of the screws' nuts \[m/s\].
 const SCREW_SPEED: f64 = 0.05;
-/// Rate at which a torque of [`Site::scale`] against the speed brings the joint to rest \[1/s\]: steps of 0.3 ms stay stable.
+/// Rate at which a torque of [`EffectSite::scale`] against the speed brings the joint to rest \[1/s\]: steps of 0.3 ms stay stable.
 const SIGN_RATE: f64 = 10_000.0;
 
 /// What an effect is built for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Site {
+pub struct EffectSite {
     pub place: EffectPlace,
     /// Name of the joint or screw; empty for the robot as a whole.
     pub name: String,
@@ -42,7 +42,7 @@ pub struct Site {
     pub viscous: f64,
 }
 
-impl Site {
+impl EffectSite {
     /// Index of the joint; 0 where the place is none.
     pub fn joint(&self) -> usize {
         self.place.joint().unwrap_or(0)
@@ -100,16 +100,16 @@ impl PlantRobot<'_> {
 
 /// All places of one robot.
 #[derive(Debug, Clone)]
-pub struct Sites<'a> {
+pub struct RobotSites<'a> {
     pub machine: PlantRobot<'a>,
-    pub joints: Vec<Site>,
-    pub screws: Vec<Site>,
-    pub whole: Vec<Site>,
+    pub joints: Vec<EffectSite>,
+    pub screws: Vec<EffectSite>,
+    pub whole: Vec<EffectSite>,
     /// How warm its drives are.
     pub temperatures: PlantTemperatures,
 }
 
-impl<'a> Sites<'a> {
+impl<'a> RobotSites<'a> {
     /// The places of a plant.
     ///
     /// # Errors
@@ -122,7 +122,7 @@ impl<'a> Sites<'a> {
             None => joints(plant),
         };
         let screws = screws(plant, &joints)?;
-        let whole = joints.first().map(|first| Site {
+        let whole = joints.first().map(|first| EffectSite {
             place: EffectPlace::All,
             name: String::new(),
             ..first.clone()
@@ -141,14 +141,14 @@ impl<'a> Sites<'a> {
 }
 
 /// The joints of a robot whose workspace only its file knows, with their inertia in the middle of the travel.
-fn joints<const J: usize>(plant: &Plant<J>) -> Vec<Site> {
+fn joints<const J: usize>(plant: &Plant<J>) -> Vec<EffectSite> {
     let m = &plant.mechanism;
     // one joint alone has its inertia in every pose
     let (least, at, speed) = match m.joints() {
         1 => (1.0, 1.0, 0.2),
         _ => (0.3, 0.5, 0.5),
     };
-    let site = |j: usize| Site {
+    let site = |j: usize| EffectSite {
         scale: plant.laws[j].torque(at).abs(),
         inertia: plant.inertia[j],
         least_inertia: least * plant.inertia[j],
@@ -159,10 +159,10 @@ fn joints<const J: usize>(plant: &Plant<J>) -> Vec<Site> {
 }
 
 /// A joint with its friction at a middling speed, whose inertia and travel are still to be given.
-fn joint<const J: usize>(plant: &Plant<J>, j: usize, speed: f64) -> Site {
+fn joint<const J: usize>(plant: &Plant<J>, j: usize, speed: f64) -> EffectSite {
     let robot = &plant.mechanism.robot;
     let [coulomb, viscous] = plant.laws[j].levels();
-    Site {
+    EffectSite {
         place: EffectPlace::Joint(j),
         name: robot.joint_names()[j].clone(),
         turns: plant.mechanism.turns(j),
@@ -217,7 +217,7 @@ fn joints_in<const J: usize>(
     plant: &Plant<J>,
     middle: &[f64; J],
     poses: &[[f64; J]],
-) -> Result<Vec<Site>, SimulateError> {
+) -> Result<Vec<EffectSite>, SimulateError> {
     let m = &plant.mechanism;
     let mut joints = Vec::with_capacity(m.joints());
     for j in 0..m.joints() {
@@ -227,7 +227,7 @@ fn joints_in<const J: usize>(
             true => TURNING_SPEED,
             false => SLIDING_SPEED,
         };
-        let mut site = Site {
+        let mut site = EffectSite {
             inertia: felt(plant, middle, &direction)?,
             least_inertia: f64::INFINITY,
             ..joint(plant, j, speed)
@@ -244,7 +244,10 @@ fn joints_in<const J: usize>(
 }
 
 /// The screws of the pantograph.
-fn screws<const J: usize>(plant: &Plant<J>, joints: &[Site]) -> Result<Vec<Site>, SimulateError> {
+fn screws<const J: usize>(
+    plant: &Plant<J>,
+    joints: &[EffectSite],
+) -> Result<Vec<EffectSite>, SimulateError> {
     let m = &plant.mechanism;
     let mut screws = Vec::new();
     let Some(limits) = m.robot.transmission().limits() else {
@@ -258,7 +261,7 @@ fn screws<const J: usize>(plant: &Plant<J>, joints: &[Site]) -> Result<Vec<Site>
     for (row, name) in m.robot.transmission().screws().iter().enumerate() {
         let mut direction = [0.0; J];
         direction[2..4].copy_from_slice(&jacobian[row]);
-        screws.push(Site {
+        screws.push(EffectSite {
             place: EffectPlace::Actuator(row),
             name: (*name).to_owned(),
             turns: false,

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{LAWS, PlantLaw, PlantRobot, Site, Sites};
+use super::{EffectSite, LAWS, PlantLaw, PlantRobot, RobotSites};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::{EffectPlace, Entry, Key, PlaceRule};
 use cft_ident_core::number::is_usable;
@@ -112,14 +112,14 @@ impl EffectSpec {
     pub(super) fn sites<'a>(
         &self,
         places: PlaceRule,
-        sites: &'a Sites,
-    ) -> Result<&'a [Site], SimulateError> {
+        sites: &'a RobotSites,
+    ) -> Result<&'a [EffectSite], SimulateError> {
         let whole = sites.whole.as_slice();
         let refuse = |why: ErrorText| match whole.first().or(sites.joints.first()) {
             Some(site) => site.refuse(&self.name, why),
             None => SimulateError::unknown_joint("", &[]),
         };
-        let (joints, screws): (&[Site], &[Site]) = match places {
+        let (joints, screws): (&[EffectSite], &[EffectSite]) = match places {
             PlaceRule::Joints | PlaceRule::JointsOrAll | PlaceRule::Pairs | PlaceRule::Others => {
                 (&sites.joints, &[])
             }
@@ -138,7 +138,7 @@ impl EffectSpec {
         let Some(name) = &self.joint else {
             return Ok(if screws.is_empty() { joints } else { screws });
         };
-        let named = |list: &'a [Site]| {
+        let named = |list: &'a [EffectSite]| {
             let place = list.iter().position(|site| site.name == *name)?;
             list.get(place..=place)
         };
@@ -168,7 +168,11 @@ impl EffectSpec {
     }
 
     /// One number per key of the effect.
-    pub(super) fn numbers(&self, law: &PlantLaw, site: &Site) -> Result<Vec<f64>, SimulateError> {
+    pub(super) fn numbers(
+        &self,
+        law: &PlantLaw,
+        site: &EffectSite,
+    ) -> Result<Vec<f64>, SimulateError> {
         let keys = law.entry.keys;
         self.check_keys(keys.iter().map(|key| key.name).collect())?;
         let sized = |key: &Key| key.size && self.given(key.name).is_some();
@@ -184,7 +188,12 @@ impl EffectSpec {
 }
 
 impl EffectValue {
-    pub(super) fn new(entry: &Entry, site: &Site, machine: &PlantRobot, numbers: &[f64]) -> Self {
+    pub(super) fn new(
+        entry: &Entry,
+        site: &EffectSite,
+        machine: &PlantRobot,
+        numbers: &[f64],
+    ) -> Self {
         let pairs = || entry.keys.iter().zip(numbers);
         let own = match site.turns {
             true => JointKind::Revolute,

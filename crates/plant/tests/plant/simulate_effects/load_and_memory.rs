@@ -1,7 +1,7 @@
 //! Effects of load, memory and timing: against the balance of torques and against exact solutions.
 
 use cft_ident_core::robot::cft::LaboratorySetup;
-use cft_ident_plant::simulate::effects::Sites;
+use cft_ident_plant::simulate::effects::RobotSites;
 use cft_ident_plant::simulate::{CftTruth, SimulatedRun};
 
 use super::missing::{Row, assert_missing, axis, friction, missing, pushed, rigid, row, table_3};
@@ -187,7 +187,7 @@ fn elastic_joints_deflect_by_what_the_link_needs() {
     let recording = table_3(&["elasticity:q5:stiffness=9000"]);
     let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let plant = truth.plant().expect("a pose");
-    let sites = Sites::of(&plant).expect("physical");
+    let sites = RobotSites::of(&plant).expect("physical");
     let site = &sites.joints[3];
     let rotor = (0.2 * site.inertia).min(0.3 * site.least_inertia);
     let damping = 2.0 * 0.025 * (stiffness * (site.inertia - rotor)).sqrt();

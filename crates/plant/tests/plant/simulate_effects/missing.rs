@@ -6,8 +6,8 @@ use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_plant::simulate::cft::{excitation, follow};
 use cft_ident_plant::simulate::single_joint::{self, SingleJointTruth};
 use cft_ident_plant::simulate::{
-    CftTruth, EffectSpec, MotorInput, Noise, Sensors, Settings, SimulateError, SimulatedRun,
-    SmoothFriction, Start, VoltSeries, run,
+    CftTruth, EffectSpec, MotionStart, MotorInput, Noise, PlantSensors, Settings, SimulateError,
+    SimulatedRun, SmoothFriction, VoltSeries, run,
 };
 
 pub fn specs(texts: &[&str]) -> Vec<EffectSpec> {
@@ -16,7 +16,7 @@ pub fn specs(texts: &[&str]) -> Vec<EffectSpec> {
 
 pub fn perfect<const J: usize>(seconds: f64) -> Settings<J> {
     Settings {
-        sensors: Sensors::perfect(),
+        sensors: PlantSensors::perfect(),
         seed: 7,
         ..Settings::new(seconds)
     }
@@ -39,9 +39,9 @@ pub fn noisy(texts: &[&str], seed: u64) -> SimulatedRun<4> {
     let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let mut settings = perfect(3.0);
     settings.seed = seed;
-    settings.sensors = Sensors {
+    settings.sensors = PlantSensors {
         torque_noise: Noise::Relative(0.01),
-        ..Sensors::default()
+        ..PlantSensors::default()
     };
     follow(
         &truth,
@@ -140,7 +140,7 @@ pub fn pushed(
         .iter()
         .map(|t| [2.0 * (1.7 * t).sin() + 0.7 * (5.1 * t).cos()])
         .collect();
-    let start = Start::State {
+    let start = MotionStart::State {
         position: [0.0],
         speed: [0.0],
     };

@@ -10,8 +10,8 @@ use cft_ident_core::robot::tree::pose::{self, Frame};
 use cft_ident_core::robot::tree::space::{add, turn};
 use cft_ident_plant::simulate::CftTruth;
 use cft_ident_plant::simulate::cft::effects;
-use cft_ident_plant::simulate::effects::Effects;
-use cft_ident_plant::simulate::moving::Moving;
+use cft_ident_plant::simulate::effects::PlantEffects;
+use cft_ident_plant::simulate::moving::MovingPlant;
 
 use super::missing::{Row, assert_missing, axis, pushed, specs, table_3};
 
@@ -331,7 +331,7 @@ fn tilted_gravity_pulls_at_every_link_of_the_chain() {
     let plant = truth.plant().expect("a pose");
     let load = |texts: &[&str], q: &[f64; 4]| {
         let (effects, _) = effects(&truth, &specs(texts)).expect("known");
-        let moving = Moving {
+        let moving = MovingPlant {
             plant: &plant,
             effects,
             volts: [0.0; 4],
@@ -402,6 +402,6 @@ fn a_single_joint_has_the_same_effects_where_they_have_a_place() {
 
 #[test]
 fn effects_of_nothing_are_not_there() {
-    assert!(Effects::default().is_empty());
+    assert!(PlantEffects::default().is_empty());
     assert_eq!(table_3(&["spring:q2:k=0"]).rows(), 5000);
 }

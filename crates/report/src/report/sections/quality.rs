@@ -35,14 +35,14 @@ fn also(cell: &mut String, entry: &str) {
 }
 
 /// A log as it was found, or why it could not be inspected.
-pub struct Inspected {
+pub struct InspectedLog {
     /// Name of the log.
     pub name: String,
     pub found: Result<LogFindings, String>,
 }
 
 /// The section: every log once, and its faults, the worst first.
-pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
+pub fn section(page: &mut Writer, logs: &[InspectedLog], warnings: &[String]) {
     page.heading("Data quality");
     let (mut inspected, mut faults) = (Vec::new(), Vec::<Vec<String>>::new());
     let mut hidden = 0;

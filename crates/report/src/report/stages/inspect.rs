@@ -1,6 +1,6 @@
 //! The report of `inspect`: the contents of logs and their faults.
 
-use crate::report::table::{Align, Columns};
+use crate::report::table::{CellAlignment, Columns};
 use crate::report::words::listed;
 use crate::report::{Report, Writer};
 use cft_ident_core::number;
@@ -107,7 +107,7 @@ fn joints(out: &mut Writer, found: &LogFindings) {
         .numbers("travel", |joint| shown(joint.travel))
         .numbers("speed", |joint| shown(joint.speed_max))
         .numbers("acc.", |joint| shown(joint.acceleration_max))
-        .column(Align::Right, "reversals", |joint| {
+        .column(CellAlignment::Right, "reversals", |joint| {
             joint.reversals.to_string()
         })
         .percent("moving", |joint| joint.moving_share)
