@@ -88,6 +88,7 @@ const STAGES: [&str; 6] = [
     "missing effects",
     "report",
 ];
+/// A campaign that is being identified.
 struct IdentifyJob {
     name: String,
     campaign: CampaignFile,
@@ -478,6 +479,7 @@ fn keep(
     }
 }
 
+/// The folder of the results, and the files that are in it.
 struct StageFolder<'a> {
     path: &'a Path,
     context: &'a Context,

@@ -21,6 +21,7 @@ pub struct SetupArgs {
     pub as_declared: bool,
 }
 
+/// Logs whose set-up was checked, with what was found.
 pub struct CheckedDataset {
     /// The robot to go on with, and the logs.
     pub data: Dataset,

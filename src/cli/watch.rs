@@ -49,6 +49,7 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
+/// Where rows that were watched are written.
 enum WatchSink {
     Lines(JsonLines),
     /// A line an alarm, and where the watch stands.
@@ -57,6 +58,7 @@ enum WatchSink {
     None,
 }
 
+/// Lines for a person at a terminal, as alarms come.
 struct TerminalLines {
     /// Whether an alarm is on.
     on: bool,

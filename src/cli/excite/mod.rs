@@ -186,6 +186,7 @@ impl From<ExciteError> for CliError {
     }
 }
 
+/// A run of `excite`: its arguments and the robot that it designs for.
 struct ExciteRun<'a> {
     args: &'a Args,
     context: &'a Context,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::Args;
 
+/// Files that the design is written to.
 pub(super) struct OutputNames {
     pub trajectory: Option<PathBuf>,
     pub samples: Option<PathBuf>,

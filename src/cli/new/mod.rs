@@ -63,6 +63,7 @@ pub(super) fn rate(text: &str) -> Result<f64, String> {
     rate.ok_or_else(|| "give a number above 0".to_owned())
 }
 
+/// What a drafted robot file describes the robot by.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum DraftShape {
     /// A URDF beside the robot file, by the path that the file will hold.

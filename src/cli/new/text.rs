@@ -9,6 +9,7 @@ use cft_ident_files::config::{DeclaredCapsules, UrdfChain};
 use cft_ident_logs::log::{escape, list};
 use cft_ident_logs::mapping::{ClockSource, JointColumns, Mapping, SeenColumns};
 
+/// What a draft is written from.
 pub(super) struct DraftInputs<'a> {
     pub name: String,
     pub shape: DraftShape,

@@ -19,6 +19,7 @@ use super::{DynamicsForm, Robot, four};
 #[derive(Debug, Clone)]
 pub struct BaseTilt(GravityMoments);
 
+/// What the moments of a tilted base are computed from; `Unknown` where nothing is known of the links.
 #[derive(Debug, Clone)]
 enum GravityMoments {
     Unknown,

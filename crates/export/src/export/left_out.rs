@@ -24,6 +24,7 @@ pub struct LeftOut {
     pub percent_of_torque: Option<f64>,
 }
 
+/// A part of the model that a file cannot say, with the torque that it is worth.
 struct OmittedPart<'a> {
     what: String,
     torque: Box<Torque<'a>>,

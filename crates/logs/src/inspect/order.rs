@@ -57,6 +57,7 @@ pub struct OrderComparison {
     slopes: Vec<[f64; 3]>,
 }
 
+/// The row before, with its torques by the model and as they were logged.
 #[derive(Debug, Clone)]
 struct LastRow {
     segment: usize,

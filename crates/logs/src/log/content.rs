@@ -14,6 +14,7 @@ pub const REDUCED: &[u8] = b"cft-ident reduced\n";
 /// Bytes that are looked at.
 pub(super) const HEAD: usize = 1 << 16;
 
+/// How the bytes of a file are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CompressionFormat {
     None,
@@ -24,8 +25,10 @@ pub(super) enum CompressionFormat {
     Bzip2,
 }
 
+/// The bytes of a file from its first one on, those that were looked at among them.
 pub(super) type ContentBytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
 
+/// A file that is open: how it is compressed, its size, and its bytes.
 pub(super) struct FileContent {
     pub(super) compression: CompressionFormat,
     /// Length of the file as it lies on the disk [bytes].

@@ -15,6 +15,7 @@ use super::stream::HashedReader;
 use super::table;
 use super::text::TextRows;
 
+/// The rows of a log that was opened, and what became known of it.
 pub(super) struct OpenedRows {
     pub(super) rows: Box<dyn LogRows>,
     /// The layout that it turns out to have.

@@ -211,6 +211,7 @@ pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
     Ok(checksum.hexadecimal())
 }
 
+/// SHA-256 of the bytes of a log, as they are read.
 #[derive(Clone, Default)]
 pub(super) struct SourceChecksum(Sha256);
 

@@ -11,6 +11,7 @@ use super::source::SourceChecksum;
 #[derive(Clone)]
 pub(super) struct HashedReader(Arc<Mutex<StreamState>>);
 
+/// The bytes of a stream, with their checksum.
 struct StreamState {
     from: Box<dyn Read + Send>,
     checksum: SourceChecksum,

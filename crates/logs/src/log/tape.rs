@@ -123,6 +123,7 @@ struct TapeState {
     error: Option<LogError>,
 }
 
+/// Where a chunk of rows is kept.
 enum ChunkPlace {
     Memory(Arc<RowChunk>),
     /// At this byte of the temporary file, with so many rows.

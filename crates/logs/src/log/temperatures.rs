@@ -14,6 +14,7 @@ pub struct JointTemperatures {
     courses: Vec<(usize, LoggedTemperature)>,
 }
 
+/// A logged temperature over time: instants \[s\] and values \[degC\].
 #[derive(Debug, Clone, Default, PartialEq)]
 struct LoggedTemperature {
     t: Vec<f64>,

@@ -6,6 +6,7 @@
 //! | `<kind>_<joint>` of every joint, e.g. `tau_hat_q1` | `/<kind>` | effort for torques, else position |
 //! | all others | `/columns`, the names of columns for those of joints | position |
 
+/// The arrays of a message with the states of joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StateArray {
     Position,

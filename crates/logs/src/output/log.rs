@@ -25,6 +25,7 @@ enum LogEncoding {
     Parquet,
 }
 
+/// How a log that is written is compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PackingKind {
     None,
@@ -63,6 +64,7 @@ impl LogForm {
     }
 }
 
+/// A file that is written, compressed as it was asked for.
 pub(super) enum PackedFile {
     Plain(AtomicFile),
     Gzip(flate2::write::GzEncoder<AtomicFile>),
@@ -113,6 +115,7 @@ impl Write for PackedFile {
     }
 }
 
+/// What the rows of a log are written to.
 enum LogSink {
     Text(Box<io::BufWriter<PackedFile>>),
     Messages(Box<McapLog<PackedFile>>),

@@ -20,7 +20,9 @@ pub enum Progress<'a> {
     Note(&'a str),
 }
 
+/// Says whether work is to end.
 type StopCheck = dyn Fn() -> bool + Send + Sync;
+/// Is told of the progress of work.
 type ProgressListener = dyn Fn(Progress) + Send + Sync;
 
 /// Cancellation and progress as callbacks, called from any thread; by default nothing stops a stage

@@ -47,6 +47,7 @@ pub struct QuietTorques {
     pub step_s: f64,
 }
 
+/// External torques of one row of an untouched robot.
 #[derive(Clone, Copy)]
 struct QuietRow<'a> {
     gap: f64,

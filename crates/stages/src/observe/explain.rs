@@ -47,6 +47,7 @@ pub struct TorqueExplainer {
     next: f64,
 }
 
+/// Normal equations: products of the columns with one another and with the right side.
 #[derive(Clone)]
 struct NormalSums {
     normal: DMatrix<f64>,

@@ -6,6 +6,7 @@ use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::dynamics::RobotDynamics;
 
+/// Windows of one length that are rolled out abreast.
 pub(super) struct ParallelWindows<'a> {
     model: &'a AugmentedModel,
     dynamics: RobotDynamics,

@@ -114,6 +114,7 @@ pub(super) fn rms(e: &[f64]) -> f64 {
     (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt()
 }
 
+/// A model that was fitted to rolled-out windows.
 #[derive(Debug, Clone)]
 pub(super) struct WindowFit {
     pub model: AugmentedModel,
@@ -125,6 +126,7 @@ pub(super) struct WindowFit {
     pub covariance: DMatrix<f64>,
 }
 
+/// A point of the iteration: unknowns, errors there, and their slopes.
 struct FitPoint {
     x: Vec<f64>,
     errors: DVector<f64>,

@@ -48,6 +48,7 @@ pub struct OpenLoop {
     pub joints: Vec<JointDrift>,
 }
 
+/// Sums of the squares of one joint over windows.
 #[derive(Clone, Copy, Default)]
 struct WindowSums {
     square: f64,

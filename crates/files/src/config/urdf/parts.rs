@@ -16,6 +16,7 @@ use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::tree::space::{Vector, of_roll_pitch_yaw};
 use cft_ident_logs::log::{escape, list, nearest};
 
+/// The types of joints that a URDF knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum UrdfJointKind {
     Fixed,
@@ -36,6 +37,7 @@ const KINDS: [(&str, UrdfJointKind); 6] = [
     ("planar", UrdfJointKind::Planar),
 ];
 
+/// The joint that another one follows: position = multiplier * that of `joint` + offset.
 #[derive(Debug)]
 pub(super) struct MimicJoint {
     pub joint: String,

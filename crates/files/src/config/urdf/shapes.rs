@@ -13,6 +13,7 @@ pub(super) struct LinkShape {
     pub origin: Vector,
 }
 
+/// What a shape is: a box around it, or the name of a mesh with its scale.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ShapeForm {
     /// A capsule that holds it.

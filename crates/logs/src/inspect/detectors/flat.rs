@@ -35,6 +35,7 @@ impl FlatRun {
     }
 }
 
+/// Finds the runs of rows in which a channel stands still, row after row.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FlatDetector {
     current: Option<OpenFlatRun>,
@@ -51,6 +52,7 @@ pub(crate) struct FlatDetector {
     pub(crate) bottom: LargestLevels,
 }
 
+/// The run that has not ended yet, with the least and the greatest value in it.
 #[derive(Debug, Clone, Copy)]
 struct OpenFlatRun {
     run: FlatRun,

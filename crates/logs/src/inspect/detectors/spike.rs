@@ -74,6 +74,7 @@ fn cubic(nodes: &[[f64; 2]], at: f64) -> Option<f64> {
     Some((0..4).map(|i| weight(i) * nodes[i][1]).sum())
 }
 
+/// Finds rows that stand out between those before and behind them, row after row.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SpikeDetector {
     values: RowRing,

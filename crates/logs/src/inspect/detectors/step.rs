@@ -25,6 +25,7 @@ const MAX_LEAPS: usize = 4096;
 /// Largest heights that may be leaps, over those of 99 % of the rows.
 const SUSPECT_FACTOR: f64 = 3.0;
 
+/// A step of a channel from one row to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SampleLeap {
     /// Times of the last row before it and of the first one after it [s].
@@ -33,6 +34,7 @@ pub(crate) struct SampleLeap {
     pub(crate) height: f64,
 }
 
+/// Finds leaps of a channel, row after row.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LeapDetector {
     times: RowRing,

@@ -20,6 +20,7 @@ struct LongStep {
     range: f64,
 }
 
+/// Finds the long steps of a position that begins anew after its range, row after row.
 #[derive(Debug, Clone)]
 pub(crate) struct TurnDetector {
     low: f64,
@@ -45,6 +46,7 @@ impl Default for TurnDetector {
     }
 }
 
+/// A position that begins anew after its range, and how often it did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WrappedPosition {
     pub(crate) range: f64,

@@ -5,6 +5,7 @@ use super::windows::Window;
 /// Rows by which the velocity may lag or lead.
 const FARTHEST: usize = 50;
 
+/// How a logged velocity follows the derivative of its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct VelocityMatch {
     /// Rows by which it is late; negative where it is early.

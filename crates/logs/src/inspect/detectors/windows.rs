@@ -13,6 +13,7 @@ pub(crate) struct Window {
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
+/// Stretches of a channel that are kept for a closer look, evenly over the log.
 #[derive(Debug, Clone)]
 pub(crate) struct WindowSampler {
     pub(crate) kept: Vec<Window>,

@@ -42,6 +42,7 @@ pub(super) struct MessageHead {
     pub(super) number: u64,
 }
 
+/// Where a recording breaks off, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct MessageBreak {
     pub(super) reason: String,
@@ -104,6 +105,7 @@ impl fmt::Display for UnevenArray {
     }
 }
 
+/// A number of a message by its path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FieldLeaf {
     pub(super) path: String,

@@ -34,6 +34,7 @@ pub(super) struct Sample {
     pub(super) file: String,
 }
 
+/// Pairs positions and torques that come in messages of their own.
 #[derive(Default)]
 pub(super) struct TorquePairing {
     zero_order_hold: bool,

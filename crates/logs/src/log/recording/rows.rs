@@ -62,6 +62,7 @@ impl LeftOut {
     }
 }
 
+/// What a message gives to a row.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum SampleContent {
     Whole,

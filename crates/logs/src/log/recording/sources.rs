@@ -31,6 +31,7 @@ impl MessagePublisher {
     }
 }
 
+/// The publishers of a topic, and which of them a log is read from.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct PublisherSet {
     /// Each with whether its messages are used.
@@ -88,6 +89,7 @@ impl PublisherSet {
     }
 }
 
+/// What the messages of one topic showed: how many, their first and last numbers, and their steps.
 #[derive(Default)]
 struct TopicActivity {
     messages: u64,

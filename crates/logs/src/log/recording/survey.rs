@@ -19,6 +19,7 @@ const TRIES: u32 = 200;
 /// Messages that are looked at for further topics once the channels are found.
 const FURTHER: u32 = 2000;
 
+/// The topics that a log is read from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct TopicChoice {
     /// Topic of the positions; of the torques where there are no positions to read.

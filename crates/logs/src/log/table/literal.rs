@@ -3,6 +3,7 @@
 use std::iter::Peekable;
 use std::str::Chars;
 
+/// A literal of Python, as the head of a NumPy array has it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum PythonLiteral {
     Text(String),

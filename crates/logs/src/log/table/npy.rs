@@ -10,6 +10,7 @@ use super::zip::{self, ZipMember};
 /// Largest head of an array [bytes].
 const HEAD: usize = 1 << 16;
 
+/// The type of an array's numbers: kind, size in bytes and order of bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ScalarType {
     kind: ScalarKind,
@@ -17,6 +18,7 @@ pub(super) struct ScalarType {
     big_endian: bool,
 }
 
+/// The kinds of numbers of a NumPy array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ScalarKind {
     Float,
@@ -45,6 +47,7 @@ pub(super) struct Element {
     pub(super) named: bool,
 }
 
+/// The file that holds an array: one of its own, or a member of an archive.
 enum ArrayPlace {
     File(OpenFile),
     Member(OpenFile, ZipMember),

@@ -10,6 +10,7 @@ const END: u64 = 65_557;
 /// Largest directory that is read [bytes].
 const DIRECTORY: u64 = 1 << 24;
 
+/// A file in a zip archive.
 #[derive(Debug, Clone)]
 pub(super) struct ZipMember {
     pub(super) name: String,

@@ -7,6 +7,7 @@ pub(super) const ROWS: usize = 1024;
 /// Numbers of a chunk, but for its last row.
 pub(super) const NUMBERS: usize = 1 << 15;
 
+/// So many rows, one behind the other.
 #[derive(Default)]
 pub(super) struct RowChunk {
     pub stamps: Vec<RowTime>,

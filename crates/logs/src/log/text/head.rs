@@ -11,6 +11,7 @@ use crate::log::content::{DOCUMENT, HEAD};
 use crate::log::layout::Layout;
 use crate::log::{LogError, source};
 
+/// What the first lines of a text log say of the others.
 pub(super) struct TextHead {
     pub(super) comment: u8,
     pub(super) table: TextTable,

@@ -30,6 +30,7 @@ pub(in crate::log) struct JsonRows {
     values: Vec<f64>,
 }
 
+/// Which channels the keys of a line fill.
 #[derive(Default)]
 struct KeySlots {
     keys: Vec<(String, usize)>,
@@ -233,6 +234,7 @@ impl<'de> Visitor<'de> for Row<'_> {
     }
 }
 
+/// Where the value of a key goes.
 enum KeyPlace {
     Number(usize),
     List(usize, usize),
@@ -267,6 +269,7 @@ impl Visitor<'_> for Key<'_> {
     }
 }
 
+/// A list of numbers, each of which is written to its channel in SI units.
 struct ValueList<'a> {
     scales: &'a [[f64; 2]],
     values: &'a mut [f64],

@@ -6,6 +6,7 @@ use crate::log::columns;
 use crate::log::section::{ColumnDelimiter, LogSection};
 use crate::log::time::Instant;
 
+/// The line that names the columns of a text log, and what it says of them.
 pub(super) struct TextTable {
     /// Index of the line that names the columns.
     pub(super) at: usize,

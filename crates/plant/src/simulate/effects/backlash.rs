@@ -27,6 +27,7 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Share of half the gap within which contact comes about.
 const CONTACT: f64 = 0.005;
 
+/// Play between the motor and the link of a joint.
 struct BacklashEffect {
     joint: usize,
     half: f64,

@@ -59,6 +59,7 @@ fn build(site: &EffectSite, _: &PlantRobot, values: &[f64]) -> Result<BuiltLaw, 
     })
 }
 
+/// A spring that carries the weight of a link.
 struct CounterbalanceEffect {
     joint: usize,
     stiffness: f64,

@@ -42,6 +42,7 @@ pub static LAW: PlantLaw = PlantLaw {
     },
 };
 
+/// Friction and inertia that a joint has by the motion of another one.
 struct CouplingEffect {
     joint: usize,
     from: usize,

@@ -37,6 +37,7 @@ const fn bend(turns: bool) -> f64 {
     if turns { 1e-3 } else { 1e-4 }
 }
 
+/// A bristle between the surfaces of a joint, which bends before they slide.
 struct PreslidingEffect {
     joint: usize,
     sigma0: f64,

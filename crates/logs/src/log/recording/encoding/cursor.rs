@@ -39,6 +39,7 @@ impl ByteSpan {
     }
 }
 
+/// Reads numbers and texts from the bytes of a message, one after the other.
 pub(super) struct ByteCursor<'d> {
     pub(super) data: &'d [u8],
     at: usize,

@@ -11,6 +11,7 @@ use super::wire::{BrokenBytes, WireFields, WireValue, elements};
 /// Messages inside messages inside ..., deepest.
 const MAX_DEPTH: usize = 64;
 
+/// The message types of a schema, and which of them its messages have.
 #[derive(Debug, Clone)]
 pub(super) struct MessageTypes {
     pub(super) messages: Vec<MessageType>,
@@ -35,6 +36,7 @@ pub(super) struct FieldType {
     pub(super) kind: FieldKind,
 }
 
+/// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FieldKind {
     Number(NumberType),
@@ -45,6 +47,7 @@ pub(super) enum FieldKind {
     Other,
 }
 
+/// The types of numbers of a protobuf field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NumberType {
     Double,

@@ -7,6 +7,7 @@ const MAX_DEPTH: usize = 32;
 /// Bytes of definition text that are read.
 const MAX_DEFINITION_BYTES: usize = 1 << 20;
 
+/// The types of fields that are no messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PrimitiveType {
     Bool,
@@ -61,6 +62,7 @@ pub(super) enum ElementType {
     Message(usize),
 }
 
+/// How many elements a field has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ElementCount {
     One,

@@ -19,6 +19,7 @@ pub(super) struct PlanNode {
     pub(super) slots: Vec<(usize, PlanSlot)>,
 }
 
+/// What is taken from a field, and to which outputs it goes.
 #[derive(Debug, Clone)]
 pub(super) enum PlanSlot {
     /// A number for this output.
@@ -40,6 +41,7 @@ pub(super) struct ElementPick {
     pub(super) by: ElementSelector,
 }
 
+/// Which element of an array is meant: by its index, or by its name in a list beside it.
 #[derive(Debug, Clone)]
 pub(super) enum ElementSelector {
     Index(usize),
@@ -58,6 +60,7 @@ enum PathHop {
     Element(usize),
 }
 
+/// Where the way to a number ends.
 enum PathEnd {
     Number,
     Element(usize, PrimitiveType),

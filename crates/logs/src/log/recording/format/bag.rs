@@ -185,6 +185,7 @@ impl MessageFile for BagFile {
     }
 }
 
+/// The topics of a bag, and the index of each by its number in the database.
 type BagTopics = (Vec<Topic>, BTreeMap<i64, usize>);
 
 /// Topics with the definitions of their types, which older databases do not hold.

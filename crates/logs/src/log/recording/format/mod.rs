@@ -12,6 +12,7 @@ use super::message::MessageFile;
 use crate::log::LogError;
 use crate::log::content::FileContent;
 
+/// Opens a recording of a format for the messages of some topics.
 type FormatOpener = fn(&Path, FileContent, &[String]) -> Result<Box<dyn MessageFile>, LogError>;
 
 pub(in crate::log) struct Format {
