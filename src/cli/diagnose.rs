@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup, typed,
 };
-use cft_ident_core::diagnose::DiagnosisWishes;
+use cft_ident_core::diagnose::DiagnosisOptions;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::{provenance, quality, residual};
@@ -90,7 +90,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         keep: args.keep,
         candidates: own.map_or(Vec::new(), |given| given.value),
         hold_friction: args.hold_friction,
-        wishes: DiagnosisWishes {
+        wishes: DiagnosisOptions {
             search: args.search,
             accepted: args.accept.iter().map(|text| accepted(text)).collect(),
         },

@@ -50,7 +50,7 @@ pub use crate::fleet::track::{
 };
 pub use crate::fleet::track_source::TrackSource;
 pub use crate::held_out::compare::{
-    Compared, ComparisonResult, DIFFERENT, FrictionCurves, ModelSide, TriedOnLogs, compare,
+    Compared, ComparedFile, ComparisonResult, DIFFERENT, FrictionCurves, TriedOnLogs, compare,
 };
 pub use crate::held_out::hold_out::Held;
 pub use crate::held_out::residual::{JointResidual, RelativeError};

@@ -35,7 +35,7 @@ pub use outcome::{
     Diagnosis, FormulaEnd, FormulaPicture, FormulaSymmetry, FoundEffect, FoundFormula,
     FrictionChange, LeftCandidate, NotWritten, SplitErrors, StepStatus,
 };
-pub use problem::case::{DiagnosisCase, DiagnosisWishes};
+pub use problem::case::{DiagnosisCase, DiagnosisOptions};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::formula_numbers::{FORMULA_NUMBERS, FormulaNumbers};
 pub use problem::prior::ParameterPrior;

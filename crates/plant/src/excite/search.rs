@@ -15,7 +15,7 @@ use super::objective::{Objective, PriorInformation};
 use super::repair::repaired;
 use super::series::Series;
 use super::start::random_motion;
-use super::usage::{ChannelUse, ScanCare, along_period, most_broken, worst};
+use super::usage::{ChannelUse, ScanEffort, along_period, most_broken, worst};
 use super::variables::DesignVariables;
 
 /// What is to be designed, and how hard to look.
@@ -50,7 +50,7 @@ pub struct FoundMotion {
 }
 
 /// What a start has given: the criterion and the motion within the limits.
-type BestMotion = Option<(f64, Series)>;
+type BestTrial = Option<(f64, Series)>;
 
 /// Rounds that every start gets.
 const FIRST: [LagrangianRound; 3] = [(6.0, 60), (8.0, 40), (12.0, 40)];
@@ -126,13 +126,13 @@ pub fn design(
             &channels,
             &series,
             &task.offsets,
-            ScanCare::Thorough,
+            ScanEffort::Thorough,
         )?;
         let series = rounded(machine, &channels, series);
         let value = value(machine, task, &series)?;
         Some((value, series))
     };
-    let mut searches: Vec<(usize, LagrangianSearch, BestMotion)> = (0..task.starts)
+    let mut searches: Vec<(usize, LagrangianSearch, BestTrial)> = (0..task.starts)
         .into_par_iter()
         .filter_map(|start| {
             // one start is looked through whatever happens
@@ -177,8 +177,8 @@ pub fn design(
 }
 
 /// Which of two starts has given more; one without a motion comes last.
-fn order(a: &BestMotion, b: &BestMotion) -> std::cmp::Ordering {
-    let of = |x: &BestMotion| x.as_ref().map_or(f64::INFINITY, |x| x.0);
+fn order(a: &BestTrial, b: &BestTrial) -> std::cmp::Ordering {
+    let of = |x: &BestTrial| x.as_ref().map_or(f64::INFINITY, |x| x.0);
     of(a).total_cmp(&of(b))
 }
 

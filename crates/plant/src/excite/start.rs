@@ -8,7 +8,7 @@ use super::limits::BoundedQuantity;
 use super::machine::ForeseenRobot;
 use super::repair::repaired;
 use super::series::Series;
-use super::usage::ScanCare;
+use super::usage::ScanEffort;
 use super::variables::DesignVariables;
 
 /// Standard deviation of the offsets about the middle, in half spans.
@@ -43,8 +43,14 @@ pub(super) fn random_motion(
         }
     }
     let large = series.scaled(START_EXCESS);
-    repaired(machine, channels, &large, &variables.fixed, ScanCare::Rough)
-        .unwrap_or_else(|| series.scaled(0.0))
+    repaired(
+        machine,
+        channels,
+        &large,
+        &variables.fixed,
+        ScanEffort::Rough,
+    )
+    .unwrap_or_else(|| series.scaled(0.0))
 }
 
 /// A random motion that fills the limits: what stands for a usual one.

@@ -120,7 +120,7 @@ pub fn design_strokes(
         let by_acceleration = turn * (amplitude / acceleration).sqrt();
         by_speed.max(by_acceleration).max(PERIODS / task.cutoff_hz)
     };
-    let file_of = |path: &StrokeWay| {
+    let file_of = |path: &StrokePath| {
         let points = path.points.iter().map(|[t, x]| {
             let mut position = pose.clone();
             position[joint] += x;
@@ -131,12 +131,12 @@ pub fn design_strokes(
             points: points.collect(),
         }
     };
-    let mut path = StrokeWay::of(&amplitudes, &period);
+    let mut path = StrokePath::of(&amplitudes, &period);
     let mut file = file_of(&path);
     // where one stroke goes over into the next a curve through the points is faster than either
     let slower = slower_by(machine, joint, &file, free)?;
     if slower > 1.0 {
-        path = StrokeWay::of(&amplitudes, &|amplitude| slower * period(amplitude));
+        path = StrokePath::of(&amplitudes, &|amplitude| slower * period(amplitude));
         file = file_of(&path);
     }
     let rows = 2.0 * task.cutoff_hz;
@@ -181,7 +181,7 @@ fn slower_by(
 }
 
 /// A way to and fro: times and positions, and its parts as amplitude, period and begin.
-struct StrokeWay {
+struct StrokePath {
     points: Vec<[f64; 2]>,
     parts: Vec<StrokePart>,
     seconds: f64,
@@ -209,7 +209,7 @@ impl StrokePart {
     }
 }
 
-impl StrokeWay {
+impl StrokePath {
     fn of(amplitudes: &[f64], period: &dyn Fn(f64) -> f64) -> Self {
         let mut parts: Vec<StrokePart> = Vec::new();
         let mut begin = 0.0;
@@ -249,7 +249,7 @@ impl StrokeWay {
         if let Some(last) = parts.last() {
             points.push([begin, last.at(begin)[0]]);
         }
-        StrokeWay {
+        StrokePath {
             points,
             parts,
             seconds: begin,
@@ -299,7 +299,7 @@ impl Torque {
 }
 
 /// The like that comes nearest to the effect, and the torque that it leaves in standard errors.
-fn separation(path: &StrokeWay, task: &StrokesTask, noise: f64) -> (&'static str, f64) {
+fn separation(path: &StrokePath, task: &StrokesTask, noise: f64) -> (&'static str, f64) {
     let rate = 2.0 * task.cutoff_hz * SAMPLES_PER_ROW as f64;
     let count = (path.seconds * rate) as usize;
     let samples: Vec<[f64; 3]> = (0..count).map(|k| path.at(k as f64 / rate)).collect();
@@ -386,8 +386,8 @@ mod tests {
         }
     }
 
-    fn path(amplitudes: &[f64]) -> StrokeWay {
-        StrokeWay::of(amplitudes, &|_| 0.6)
+    fn path(amplitudes: &[f64]) -> StrokePath {
+        StrokePath::of(amplitudes, &|_| 0.6)
     }
 
     const AROUND: [f64; 5] = [0.005, 0.008, 0.013, 0.04, 0.08];

@@ -14,7 +14,7 @@ const TOLERANCE: f64 = 1e-7;
 
 /// How exactly a period is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ScanCare {
+pub(super) enum ScanEffort {
     /// To a thousandth, for a start of a search.
     Rough,
     /// As what is written must keep its limits.
@@ -48,11 +48,11 @@ pub(super) fn about_period(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
     series: &Series,
-    care: ScanCare,
+    care: ScanEffort,
 ) -> Vec<ChannelUse> {
     match care {
-        ScanCare::Thorough => period(machine, channels, series, PARTS, 1e-5),
-        ScanCare::Rough => period(machine, channels, series, 96, 1e-3),
+        ScanEffort::Thorough => period(machine, channels, series, PARTS, 1e-5),
+        ScanEffort::Rough => period(machine, channels, series, 96, 1e-3),
     }
 }
 

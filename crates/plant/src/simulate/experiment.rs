@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::SimulateError;
 use super::controller::ControllerSettings;
 use super::mechanism::Mechanism;
-use super::one_joint::{MovedPart, OneJointMove};
+use super::one_joint::{MovedAxis, OneJointMove};
 use super::plant::Plant;
 use super::reference::{FourierReference, Path, Reference, ReferenceFrame, SplineReference};
 use cft_ident_files::config::trajectory::{self, Trajectory, TrajectoryCoordinates};
@@ -51,7 +51,7 @@ impl<'a> Experiment<'a> {
         Ok(match *self {
             Self::Usual => Some(usual(mechanism, &ladder)?),
             Self::OneJoint { joint, part } => {
-                ladder.mover = MovedPart::named(&mechanism.robot, joint)?;
+                ladder.mover = MovedAxis::named(&mechanism.robot, joint)?;
                 ladder.part = part;
                 Some(ladder.reference(mechanism)?)
             }

@@ -54,7 +54,7 @@ pub use error::SimulateError;
 pub use experiment::Experiment;
 pub use joint_friction::SmoothFriction;
 pub use mechanism::Mechanism;
-pub use one_joint::{MovedPart, OneJointMove};
+pub use one_joint::{MovedAxis, OneJointMove};
 pub use order::{
     InitialConditions, Order, Rows, SimulatedLog, SimulationSummary, simulate, simulate_from,
     simulate_rows,

@@ -26,8 +26,8 @@ use crate::input::temperatures;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
-    self, DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisProgress, DiagnosisWatch,
-    DiagnosisWishes, FORMULA_NUMBERS, LogRole, ModelProposal, ParameterPrior,
+    self, DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisOptions, DiagnosisProgress,
+    DiagnosisWatch, FORMULA_NUMBERS, LogRole, ModelProposal, ParameterPrior,
 };
 use cft_ident_core::effect::{self, AugmentedModel, ModelEffect};
 use cft_ident_core::judge::NUMBERS;
@@ -46,7 +46,7 @@ pub struct DiagnoseSettings<'a> {
     /// The inertial parameters of the given model stay: finds payload, gain and tilt.
     pub keep: bool,
     /// What the user asks for besides.
-    pub wishes: DiagnosisWishes,
+    pub wishes: DiagnosisOptions,
     /// Effects of the user's own, tried beside those that are known.
     pub candidates: Vec<CandidateSection>,
     /// The friction of the given model stays as it is; its covariance is in the deviations of the others.
@@ -107,7 +107,7 @@ impl<'a> DiagnoseSettings<'a> {
         DiagnoseSettings {
             model,
             keep: false,
-            wishes: DiagnosisWishes::default(),
+            wishes: DiagnosisOptions::default(),
             candidates: Vec::new(),
             hold_friction: false,
         }

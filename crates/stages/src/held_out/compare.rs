@@ -29,7 +29,7 @@ use cft_ident_logs::log::{Provenance, escape};
 pub const DIFFERENT: f64 = 1.96;
 
 /// A model file with what it stands for.
-pub struct ModelSide {
+pub struct ComparedFile {
     pub given: GivenModel,
     pub model: AugmentedModel,
 }
@@ -44,7 +44,7 @@ pub struct TriedOnLogs {
 /// Result of the comparison.
 pub struct Compared {
     pub machine: LoggedRobot,
-    pub sides: [ModelSide; 2],
+    pub sides: [ComparedFile; 2],
     pub table: SideBySide,
     pub curves: Vec<FrictionCurves>,
     /// None where no log is given.
@@ -163,17 +163,17 @@ impl TriedOnLogs {
 }
 
 /// A model; without logs one of friction alone will do.
-fn side(given: GivenModel, logs: bool) -> Result<ModelSide, IdentifyError> {
+fn side(given: GivenModel, logs: bool) -> Result<ComparedFile, IdentifyError> {
     let model = match logs {
         true => given.numbers()?,
         false => refined_or_friction(&given.file, &given.name)?,
     };
-    Ok(ModelSide { given, model })
+    Ok(ComparedFile { given, model })
 }
 
 /// Refuses two models whose parameters and torques are not of one robot.
-fn one_robot([a, b]: [&ModelSide; 2]) -> Result<(), IdentifyError> {
-    let describe = |side: &ModelSide| {
+fn one_robot([a, b]: [&ComparedFile; 2]) -> Result<(), IdentifyError> {
+    let describe = |side: &ComparedFile| {
         let (robot, file) = (&side.model.model.robot, &side.given.file.robot);
         let joints = robot.joint_names().iter().enumerate();
         let words = joints.map(|(j, name)| {
@@ -195,7 +195,7 @@ fn one_robot([a, b]: [&ModelSide; 2]) -> Result<(), IdentifyError> {
 }
 
 /// What a reader has to know before believing a difference.
-fn cautions([a, b]: [&ModelSide; 2], logs: bool) -> Vec<String> {
+fn cautions([a, b]: [&ComparedFile; 2], logs: bool) -> Vec<String> {
     let mut out = Vec::new();
     let (first, second) = (&a.given.file, &b.given.file);
     let made = |file: &ModelFile| file.provenance.inputs.clone();
@@ -260,7 +260,7 @@ pub fn compare(
 
 fn on_logs(
     machine: &LoggedRobot,
-    sides: &[ModelSide; 2],
+    sides: &[ComparedFile; 2],
     logs: &[Log],
     control: &Control,
 ) -> Result<TriedOnLogs, IdentifyError> {
@@ -273,7 +273,7 @@ fn on_logs(
     }
     let settings = machine.settings();
     let named = |error| IdentifyError::motion(&machine.name, error);
-    let validation = |side: &ModelSide| {
+    let validation = |side: &ComparedFile| {
         let mut all = TorqueReconstruction::new(&side.model.model, &in_memory.rest_speed, None);
         for (segment, stretch) in in_memory.stretches.iter().enumerate() {
             let hat = side.model.reconstruct(stretch);
@@ -300,7 +300,7 @@ fn on_logs(
 /// Friction of the joints where a model has some.
 fn curves(
     machine: &LoggedRobot,
-    sides: &[ModelSide; 2],
+    sides: &[ComparedFile; 2],
     tried: Option<&TriedOnLogs>,
 ) -> Vec<FrictionCurves> {
     let robot = &machine.robot;
@@ -317,7 +317,7 @@ fn curves(
                 let most = all.flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
                 (most > 0.0).then_some(most)
             });
-            let limit = |side: &ModelSide| side.given.file.robot.limits.get(joint)?.speed;
+            let limit = |side: &ComparedFile| side.given.file.robot.limits.get(joint)?.speed;
             let limit = || sides.iter().find_map(limit);
             let (most, speeds_from) = match seen {
                 Some(most) => (most, "logs"),
@@ -338,7 +338,7 @@ fn curves(
 impl Compared {
     /// The comparison as a document holds it.
     pub fn result(&self) -> ComparisonResult {
-        let model = |side: &ModelSide| {
+        let model = |side: &ComparedFile| {
             let from = &side.given.file.provenance;
             ComparedModel {
                 name: side.given.file_name.clone(),

@@ -37,7 +37,7 @@ pub struct DiagnosisCase {
     /// Effects of the user's own, tried beside those that are known.
     pub own: Vec<&'static Law>,
     /// What the user asks for.
-    pub wishes: DiagnosisWishes,
+    pub wishes: DiagnosisOptions,
     /// What decides.
     pub numbers: Numbers,
     /// What decides on formulas.
@@ -46,14 +46,14 @@ pub struct DiagnosisCase {
 
 /// What the user asks for besides.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct DiagnosisWishes {
+pub struct DiagnosisOptions {
     /// Effects that are written whatever the judge says: name, and joint where it is of one.
     pub accepted: Vec<(String, Option<String>)>,
     /// A formula of what is left is looked for.
     pub search: bool,
 }
 
-impl DiagnosisWishes {
+impl DiagnosisOptions {
     /// Whether it is the formula that is searched, of some joint: `formula:JOINT`.
     pub(crate) fn is_formula(&self, (name, _): &(String, Option<String>)) -> bool {
         self.search && name == FORMULA

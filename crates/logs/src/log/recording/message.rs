@@ -44,7 +44,7 @@ pub(super) struct MessageHead {
 
 /// Where a recording breaks off, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct MessageBreak {
+pub(super) struct RecordingBreak {
     pub(super) reason: String,
     /// How much of it was read, as it stands after "breaks off".
     pub(super) place: String,
@@ -58,7 +58,7 @@ pub(super) trait MessageFile: Send {
     /// The next message of a wanted topic, its bytes in `data`; `None` at the end.
     fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<MessageHead>, LogError>;
 
-    fn broken(&self) -> Option<&MessageBreak>;
+    fn broken(&self) -> Option<&RecordingBreak>;
 }
 
 /// Reads the fields that it was made for out of the messages of one topic: what each encoding does.

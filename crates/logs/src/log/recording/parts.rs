@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use super::format::format_of;
-use super::message::{MessageBreak, MessageFile, MessageHead, Topic};
+use super::message::{MessageFile, MessageHead, RecordingBreak, Topic};
 use crate::log::content::{FileContent, MessageUnpacker};
 use crate::log::{LogError, escape, list, source};
 
@@ -104,7 +104,7 @@ pub(super) struct MessageFiles {
     /// The part whose message was handed out last.
     current: Option<usize>,
     /// What was said of files that broke off.
-    pub(super) broken: Vec<(PathBuf, MessageBreak)>,
+    pub(super) broken: Vec<(PathBuf, RecordingBreak)>,
     /// Every topic seen so far, wanted or not.
     pub(super) seen: Vec<Topic>,
     /// Parts that the recording is said to have and that are not there.
@@ -142,7 +142,7 @@ impl MessageFiles {
             match OpenFile::open(&path, &self.wanted)? {
                 Some(part) => self.parts.push(part),
                 None => {
-                    let nothing = MessageBreak {
+                    let nothing = RecordingBreak {
                         reason: "it is empty: the recorder ended before it wrote anything"
                             .to_owned(),
                         place: "at its first byte".to_owned(),

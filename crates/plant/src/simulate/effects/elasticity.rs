@@ -7,7 +7,7 @@
 //! T = stiffness z + d dz/dt, d = 2 damping sqrt(stiffness inertia), and B (a + d2z/dt2) = tau - F - E - T on the
 //! motor's side. Both sides are integrated.
 
-use super::{BuiltLaw, Effect, EffectSite, InitialCondition, PlantLaw, PlantState, SpringTwist};
+use super::{BuiltLaw, Effect, EffectSite, InitialCondition, JointTwist, PlantLaw, PlantState};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::elasticity::ENTRY;
 
@@ -95,11 +95,11 @@ impl Effect for TwoSides {
         mass[self.joint * (motion.q.len() + 1)] -= self.rotor;
     }
 
-    fn twist(&self, z: &[f64]) -> Option<SpringTwist> {
+    fn twist(&self, z: &[f64]) -> Option<JointTwist> {
         let &[deflection, rate] = z else {
             return None;
         };
-        Some(SpringTwist {
+        Some(JointTwist {
             joint: self.joint,
             deflection,
             rate,

@@ -62,7 +62,7 @@ pub struct InitialCondition<'a> {
 
 /// A joint whose motor and link are joined by a spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpringTwist {
+pub struct JointTwist {
     pub joint: usize,
     /// Position of the motor beyond the link, m or rad, and its rate.
     pub deflection: f64,
@@ -103,7 +103,7 @@ pub trait Effect: Send {
     fn drive(&self, _motion: &PlantState, _logged: &[f64], _acting: &mut [f64]) {}
 
     /// The spring that the effect puts between a motor and its link.
-    fn twist(&self, _z: &[f64]) -> Option<SpringTwist> {
+    fn twist(&self, _z: &[f64]) -> Option<JointTwist> {
         None
     }
 
@@ -255,7 +255,7 @@ impl PlantEffects {
     }
 
     /// The springs between motors and links, for the states z of all effects.
-    pub(super) fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = SpringTwist> + 'a {
+    pub(super) fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = JointTwist> + 'a {
         let each = self.list.iter();
         each.filter_map(|(effect, states)| effect.twist(&z[states.clone()]))
     }

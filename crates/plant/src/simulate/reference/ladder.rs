@@ -11,7 +11,7 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::stroke::{PEAK, SpeedStroke, StrokeMeeting};
+use super::stroke::{PEAK, SpeedStroke, StrokeJunction};
 use crate::simulate::SimulateError;
 use crate::simulate::chance::{ChancePurpose, stream};
 
@@ -74,7 +74,7 @@ impl LadderPlan {
 
     /// Largest plateau speed whose ramps leave [`PLATEAU_SHARE`] of the range.
     pub(crate) fn fastest((low, high): (f64, f64), acceleration: f64) -> f64 {
-        let ramps = 2.0 * PEAK * StrokeMeeting::Turn.distance(1.0);
+        let ramps = 2.0 * PEAK * StrokeJunction::Turn.distance(1.0);
         ((1.0 - PLATEAU_SHARE) * (high - low) * acceleration / ramps).sqrt()
     }
 
@@ -240,7 +240,7 @@ impl LadderPlan {
             let before = k.checked_sub(1).map(|k| order[k].speed);
             let after = order.get(k + 1).map(|r| r.speed);
             let ramp = |neighbour: Option<f64>| {
-                let meeting = neighbour.map_or(StrokeMeeting::Rest, |_| StrokeMeeting::Turn);
+                let meeting = neighbour.map_or(StrokeJunction::Rest, |_| StrokeJunction::Turn);
                 let acceleration = self.meeting(rung.speed, neighbour.unwrap_or(0.0));
                 (meeting, PEAK * rung.speed / acceleration)
             };

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use crate::log::content::{CompressionFormat, FileContent};
 use crate::log::recording::message::{
-    MessageBreak, MessageFile, MessageHead, Schema, Topic, is_wanted,
+    MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
 };
 use crate::log::{LogError, escape_whole, source};
 
@@ -44,7 +44,7 @@ struct BagFile {
     /// Time and number of the last message of the page.
     last: (i64, i64),
     ended: bool,
-    broken: Option<MessageBreak>,
+    broken: Option<RecordingBreak>,
     messages: u64,
 }
 
@@ -109,7 +109,7 @@ pub(super) fn open(
         page: Vec::new(),
         last: (i64::MIN, i64::MIN),
         ended: false,
-        broken: journal.map(|_| MessageBreak {
+        broken: journal.map(|_| RecordingBreak {
             reason: UNCLOSED.to_owned(),
             place: "after its last commit".to_owned(),
         }),
@@ -159,7 +159,7 @@ impl MessageFile for BagFile {
         &self.topics
     }
 
-    fn broken(&self) -> Option<&MessageBreak> {
+    fn broken(&self) -> Option<&RecordingBreak> {
         self.broken.as_ref()
     }
 
@@ -168,7 +168,7 @@ impl MessageFile for BagFile {
             // What is read of a page that breaks off is used.
             if let Err(error) = self.turn() {
                 self.ended = true;
-                self.broken = Some(MessageBreak {
+                self.broken = Some(RecordingBreak {
                     reason: error.to_string(),
                     place: format!("after {} of its messages", self.messages),
                 });

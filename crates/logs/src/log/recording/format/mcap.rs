@@ -16,7 +16,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use super::record::{CUT, ChannelRecord, MessageRecord, SchemaRecord};
 use crate::log::content::{CompressionFormat, ContentBytes, FileContent};
 use crate::log::recording::message::{
-    MessageBreak, MessageFile, MessageHead, Schema, Topic, is_wanted,
+    MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
 };
 use crate::log::{LogError, source};
 
@@ -45,7 +45,7 @@ struct McapFile {
     /// Length of the file, where it is not compressed as a whole [bytes].
     size: Option<u64>,
     ended: bool,
-    broken: Option<MessageBreak>,
+    broken: Option<RecordingBreak>,
 }
 
 struct McapContents {
@@ -95,7 +95,7 @@ impl MessageFile for McapFile {
         &self.contents.topics
     }
 
-    fn broken(&self) -> Option<&MessageBreak> {
+    fn broken(&self) -> Option<&RecordingBreak> {
         self.broken.as_ref()
     }
 
@@ -130,7 +130,7 @@ impl MessageFile for McapFile {
                 Some(Err(error)) => error.to_string(),
             };
             self.ended = true;
-            self.broken = Some(MessageBreak {
+            self.broken = Some(RecordingBreak {
                 reason,
                 place: match self.size {
                     Some(size) => format!("at byte {} of {size}", self.bytes),

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use crate::log::content::{ContentBytes, FileContent, unpacked_chunk};
 use crate::log::recording::message::{
-    MessageBreak, MessageFile, MessageHead, Schema, Topic, is_wanted,
+    MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
 };
 use crate::log::{LogError, source};
 
@@ -36,7 +36,7 @@ struct BagFile {
     at: usize,
     messages: u64,
     ended: bool,
-    broken: Option<MessageBreak>,
+    broken: Option<RecordingBreak>,
 }
 
 /// Why a record cannot be read.
@@ -259,7 +259,7 @@ impl MessageFile for BagFile {
                 Err(RecordProblem::Damaged(reason)) => reason,
             };
             self.ended = true;
-            self.broken = Some(MessageBreak {
+            self.broken = Some(RecordingBreak {
                 reason,
                 place: format!("after {} of its messages", self.messages),
             });
@@ -267,7 +267,7 @@ impl MessageFile for BagFile {
         Ok(None)
     }
 
-    fn broken(&self) -> Option<&MessageBreak> {
+    fn broken(&self) -> Option<&RecordingBreak> {
         self.broken.as_ref()
     }
 }
